@@ -1,0 +1,10 @@
+# Writes a C++ source that holds text files: -DOUTPUT -DFUNCTION -DFILES=a,b,...
+string(REPLACE "," ";" FILES "${FILES}")
+set(text "#include \"sensing/core/embedded_file.h\"\n\nnamespace taclink {\nnamespace {\nconstexpr EmbeddedFile kFiles[] = {\n")
+foreach(file IN LISTS FILES)
+  get_filename_component(name "${file}" NAME)
+  file(READ "${file}" content)
+  string(APPEND text "    {\"${name}\", R\"embedded(${content})embedded\"},\n")
+endforeach()
+string(APPEND text "};\n}  // namespace\n\nstd::span<const EmbeddedFile> ${FUNCTION}() { return kFiles; }\n}  // namespace taclink\n")
+file(WRITE "${OUTPUT}" "${text}")

@@ -1,0 +1,47 @@
+# Flags and helpers for every target of this project.
+
+# The Debug type is for the sanitizers: some optimisation, or the mechanics tests take minutes.
+set(CMAKE_CXX_FLAGS_DEBUG "-O1 -g1 -fno-omit-frame-pointer")
+set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
+
+add_library(taclink_flags INTERFACE)
+target_compile_options(taclink_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -Werror)
+target_include_directories(taclink_flags INTERFACE "${PROJECT_SOURCE_DIR}")
+if(TACLINK_SANITIZER)
+  target_compile_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER} -fno-sanitize-recover=all)
+  target_link_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER})
+endif()
+
+# taclink_library(NAME SOURCES ... LINKS ...): one static library a folder; LINKS are public.
+function(taclink_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
+  add_library(${name} STATIC ${arg_SOURCES})
+  target_link_libraries(${name} PUBLIC taclink_flags ${arg_LINKS})
+endfunction()
+
+# taclink_test(NAME SOURCES ... LINKS ... [LABELS ...] [WITHOUT_MAIN]): one GoogleTest program, its cases known to ctest.
+function(taclink_test name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINKS;LABELS" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE taclink_flags ${arg_LINKS} GTest::gtest_main GTest::gmock)
+  target_compile_definitions(${name} PRIVATE TACLINK_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 300 LABELS "${arg_LABELS}")
+endfunction()
+
+# taclink_embed(TARGET HEADER FUNCTION FILES ...): text files become `std::span<const EmbeddedFile> FUNCTION()`.
+function(taclink_embed target)
+  cmake_parse_arguments(arg "" "FUNCTION" "FILES" ${ARGN})
+  set(output "${CMAKE_CURRENT_BINARY_DIR}/${arg_FUNCTION}.cpp")
+  set(paths "")
+  foreach(file IN LISTS arg_FILES)
+    list(APPEND paths "${CMAKE_CURRENT_SOURCE_DIR}/${file}")
+  endforeach()
+  string(REPLACE ";" "," joined "${paths}")
+  add_custom_command(
+    OUTPUT "${output}"
+    COMMAND ${CMAKE_COMMAND} -DOUTPUT=${output} -DFUNCTION=${arg_FUNCTION} "-DFILES=${joined}"
+            -P "${PROJECT_SOURCE_DIR}/cmake/Embed.cmake"
+    DEPENDS ${paths} "${PROJECT_SOURCE_DIR}/cmake/Embed.cmake"
+    VERBATIM)
+  target_sources(${target} PRIVATE "${output}")
+endfunction()

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "sensing/core/frame.h"
+#include "sensing/core/result.h"
+
+namespace taclink {
+
+/// What a source delivers, known after Start.
+struct SourceInfo {
+  std::string description;  ///< "v4l2 /dev/video0 + /dev/video2, 640x480 YUYV 30/s"
+  int width_px = 0;
+  int height_px = 0;
+  double frame_rate_hz = 0;
+};
+
+/// The seam between what makes pictures (cameras, files, a simulation, a log) and all that follows.
+/// Used from one thread.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+
+  /// Opens what there is to open. May be called again after a failure or after kUnavailable from Next.
+  /// Errors: kUnavailable (may work later), kInvalidArgument and kUnsupported (will not).
+  virtual Result<void> Start() = 0;
+
+  /// Waits for the next pair and writes it into `frame`, whose buffers it reuses. Skips to the newest pair if
+  /// it is late. Errors: kTimeout (nothing yet, call again), kUnavailable (lost: Start again), kEndOfData.
+  virtual Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) = 0;
+
+  virtual SourceInfo Info() const = 0;
+};
+
+}  // namespace taclink

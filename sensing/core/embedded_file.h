@@ -1,0 +1,14 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace taclink {
+
+/// A text file of the source tree that the build puts into the program.
+struct EmbeddedFile {
+  std::string_view name;
+  std::string_view content;
+};
+
+}  // namespace taclink

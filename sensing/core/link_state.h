@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sensing/core/contact.h"
+#include "sensing/core/frame.h"
+#include "sensing/core/skin_shape.h"
+
+namespace taclink {
+
+enum class LinkStatus : uint8_t {
+  kStarting,     ///< no frame yet
+  kCalibrating,  ///< waiting for a good rest picture; nothing is measured yet
+  kOk,
+  kDegraded,  ///< measures, but worse than it could: see the reason
+  kLost,      ///< the source or the markers are gone; nothing is measured now
+};
+
+/// How long each stage of a frame took, ms; 0: did not run.
+struct StageTimes {
+  double decode = 0;
+  double detect = 0;
+  double register_ = 0;  ///< detections to labels
+  double reconstruct = 0;
+  double force = 0;  ///< forces and contacts
+};
+
+struct CameraCounts {
+  int detections = 0;
+  int labelled = 0;
+};
+
+/// All that one frame told about one link. Immutable once published.
+struct LinkState {
+  uint64_t sequence = 0;  ///< of the frame
+  FrameTimes times;
+  LinkStatus status = LinkStatus::kStarting;
+  std::string status_reason;  ///< empty when kOk
+  std::optional<double> pressure_mpa;
+
+  std::array<CameraCounts, kCameraCount> cameras;
+  SkinShape shape;     ///< empty while nothing is measured
+  NodalForces forces;  ///< empty while nothing is measured
+  std::vector<Contact> contacts;
+  Vec3 total_force_n = Vec3::Zero();  ///< sum over the contacts
+  double baseline_age_s = 0;          ///< since the rest shape was taken
+  StageTimes stage_ms;
+
+  bool measured() const { return !shape.positions_mm.empty(); }
+};
+
+}  // namespace taclink

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sensing/core/camera_model.h"
+#include "sensing/core/link_model.h"
+#include "sensing/core/result.h"
+#include "sensing/yaml/yaml_reader.h"
+
+namespace taclink {
+
+/// Loads a link model: the name of a shipped one ("cylinder", "barrel") or a path of a YAML file.
+/// Errors: kNotFound (names the shipped ones), kInvalidArgument (file, line, what was expected).
+Result<LinkModel> LoadLinkModel(const std::string& name_or_path);
+
+/// Parses a model file's text; `name` stands for the file in messages.
+Result<LinkModel> ParseLinkModel(const std::string& name, std::string_view content);
+
+std::vector<std::string> ShippedModelNames();
+
+/// A shipped model's file, to copy and change. Empty: no such model.
+std::string_view ShippedModelText(const std::string& name);
+
+/// One camera as it stands in model and calibration files (keys: focal_px, principal_point_px, k1_per_px2,
+/// k2_per_px4, position_mm, rotation_deg, image_size_px).
+CameraModel ReadCamera(YamlMap map, CameraId id);
+std::string CameraText(const CameraModel& camera, CameraId id, const std::string& indent);
+
+}  // namespace taclink

@@ -1,0 +1,230 @@
+#include "sensing/yaml/yaml_reader.h"
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+namespace taclink {
+namespace {
+
+std::string Line(const YAML::Node& node) {
+  return std::to_string(node.Mark().line + 1);
+}
+
+std::string Quoted(const std::vector<std::string_view>& choices) {
+  std::string text;
+  for (const auto choice : choices) text += (text.empty() ? "" : ", ") + std::string(choice);
+  return text;
+}
+
+std::string Shown(double value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
+}
+
+}  // namespace
+
+YamlMap::YamlMap(std::shared_ptr<Context> context, YAML::Node node, std::string path)
+    : context_(std::move(context)), node_(std::move(node)), path_(std::move(path)) {}
+
+bool YamlMap::Has(const std::string& key) const {
+  return node_.IsMap() && node_[key].IsDefined();
+}
+
+YAML::Node YamlMap::Find(const std::string& key, bool required) {
+  asked_.insert(key);
+  if (node_.IsMap()) {
+    YAML::Node found = node_[key];
+    if (found.IsDefined()) return found;
+  }
+  if (required) FailAt(node_, key, "is missing");
+  return YAML::Node(YAML::NodeType::Undefined);
+}
+
+void YamlMap::FailAt(const YAML::Node& node, const std::string& key, const std::string& what) {
+  if (context_->error) return;
+  const std::string line = node.IsDefined() ? Line(node) : "1";
+  context_->error =
+      Error{ErrorCode::kInvalidArgument, context_->file + ":" + line + ": '" + path_ + key + "' " + what};
+}
+
+void YamlMap::Fail(const std::string& key, const std::string& what) {
+  FailAt(Has(key) ? node_[key] : node_, key, what);
+}
+
+std::string YamlMap::Where() const {
+  return context_->file + ":" + Line(node_);
+}
+
+template <typename T>
+T YamlMap::Scalar(const std::string& key, const YAML::Node& node, const char* expected) {
+  if (!node.IsDefined()) return {};
+  T value{};
+  if (node.IsScalar() && YAML::convert<T>::decode(node, value)) return value;
+  FailAt(node, key,
+         std::string("must be ") + expected + (node.IsScalar() ? ", not '" + node.Scalar() + "'" : ""));
+  return {};
+}
+
+double YamlMap::CheckRange(const std::string& key, double value, Range range) {
+  if (std::isfinite(value) && value >= range.min && value <= range.max) return value;
+  std::string expected = "must be a finite number";
+  if (range.min == kPositive.min) {
+    expected = "must be greater than 0";
+  } else if (std::isfinite(range.min)) {
+    expected = "must be at least " + Shown(range.min);
+  }
+  if (std::isfinite(range.max))
+    expected += std::string(std::isfinite(range.min) ? " and" : "") + " at most " + Shown(range.max);
+  Fail(key, expected + ", not " + Shown(value));
+  return value;
+}
+
+double YamlMap::Number(const std::string& key, Range range) {
+  const YAML::Node node = Find(key, true);
+  const bool known = node.IsDefined() && !context_->error;
+  const double value = Scalar<double>(key, node, "a number");
+  return known && !context_->error ? CheckRange(key, value, range) : value;
+}
+
+double YamlMap::Number(const std::string& key, double fallback, Range range) {
+  asked_.insert(key);
+  return Has(key) ? Number(key, range) : fallback;
+}
+
+int YamlMap::Integer(const std::string& key, Range range) {
+  const YAML::Node node = Find(key, true);
+  const bool known = node.IsDefined() && !context_->error;
+  const int value = Scalar<int>(key, node, "a whole number");
+  if (known && !context_->error) CheckRange(key, value, range);
+  return value;
+}
+
+int YamlMap::Integer(const std::string& key, int fallback, Range range) {
+  asked_.insert(key);
+  return Has(key) ? Integer(key, range) : fallback;
+}
+
+bool YamlMap::Bool(const std::string& key, bool fallback) {
+  const YAML::Node node = Find(key, false);
+  return node.IsDefined() ? Scalar<bool>(key, node, "true or false") : fallback;
+}
+
+std::string YamlMap::Text(const std::string& key) {
+  return Scalar<std::string>(key, Find(key, true), "a text");
+}
+
+std::string YamlMap::Text(const std::string& key, std::string fallback) {
+  asked_.insert(key);
+  return Has(key) ? Text(key) : fallback;
+}
+
+size_t YamlMap::Choice(const std::string& key, const std::vector<std::string_view>& choices) {
+  const std::string text = Text(key);
+  for (size_t i = 0; i < choices.size(); ++i) {
+    if (text == choices[i]) return i;
+  }
+  Fail(key, "must be one of " + Quoted(choices) + ", not '" + text + "'");
+  return 0;
+}
+
+size_t YamlMap::Choice(const std::string& key, const std::vector<std::string_view>& choices,
+                       size_t fallback) {
+  asked_.insert(key);
+  return Has(key) ? Choice(key, choices) : fallback;
+}
+
+std::vector<double> YamlMap::Numbers(const std::string& key, size_t count, Range range) {
+  const YAML::Node node = Find(key, true);
+  std::vector<double> values;
+  if (!node.IsDefined()) return std::vector<double>(count, 0.0);
+  if (node.IsSequence() && (count == 0 || node.size() == count)) {
+    for (const auto& item : node)
+      values.push_back(CheckRange(key, Scalar<double>(key, item, "numbers"), range));
+  } else {
+    FailAt(node, key,
+           "must be a list of " + (count == 0 ? std::string("numbers") : std::to_string(count) + " numbers"));
+    values.assign(count, 0.0);
+  }
+  return values;
+}
+
+std::vector<std::string> YamlMap::Texts(const std::string& key) {
+  const YAML::Node node = Find(key, true);
+  std::vector<std::string> values;
+  if (!node.IsDefined()) return values;
+  if (!node.IsSequence()) FailAt(node, key, "must be a list of texts");
+  for (const auto& item : node) values.push_back(Scalar<std::string>(key, item, "texts"));
+  return values;
+}
+
+YamlMap YamlMap::Map(const std::string& key) {
+  YAML::Node node = Find(key, false);
+  if (!node.IsDefined() || node.IsNull()) {
+    node = YAML::Node(YAML::NodeType::Map);
+  } else if (!node.IsMap()) {
+    FailAt(node, key, "must be a mapping (key: value)");
+    node = YAML::Node(YAML::NodeType::Map);
+  }
+  return {context_, node, path_ + key + "."};
+}
+
+std::vector<YamlMap> YamlMap::Maps(const std::string& key) {
+  const YAML::Node node = Find(key, false);
+  std::vector<YamlMap> maps;
+  if (!node.IsDefined() || node.IsNull()) return maps;
+  if (!node.IsSequence()) {
+    FailAt(node, key, "must be a list");
+    return maps;
+  }
+  for (const auto& item : node) {
+    if (item.IsMap()) {
+      maps.push_back(YamlMap(context_, item, path_ + key + "[" + std::to_string(maps.size()) + "]."));
+    } else {
+      FailAt(item, key, "must be a list of mappings (key: value)");
+    }
+  }
+  return maps;
+}
+
+void YamlMap::Done() {
+  if (!node_.IsMap()) return;
+  for (const auto& entry : node_) {
+    const auto key = entry.first.IsScalar() ? entry.first.Scalar() : std::string("?");
+    if (asked_.contains(key)) continue;
+    std::string known;
+    for (const auto& name : asked_) known += (known.empty() ? "" : ", ") + name;
+    FailAt(entry.first, key, "is not a known key here; known are: " + known);
+    return;
+  }
+}
+
+Result<YamlFile> YamlFile::Load(const std::string& path) {
+  const std::ifstream in(path);
+  if (!in) return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
+  std::ostringstream content;
+  content << in.rdbuf();
+  return Parse(path, content.str());
+}
+
+Result<YamlFile> YamlFile::Parse(const std::string& name, std::string_view content) {
+  try {
+    const YAML::Node node = YAML::Load(std::string(content));
+    if (!node.IsMap()) {
+      return Error{ErrorCode::kInvalidArgument, name + ":1: must be a mapping (key: value) at the top"};
+    }
+    auto context = std::make_shared<YamlMap::Context>();
+    context->file = name;
+    return YamlFile(YamlMap(std::move(context), node, ""));
+  } catch (const YAML::Exception& e) {
+    return Error{ErrorCode::kInvalidArgument, name + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg};
+  }
+}
+
+Result<void> YamlFile::Finish() {
+  if (root_.context_->error) return *root_.context_->error;
+  return {};
+}
+
+}  // namespace taclink

@@ -1,0 +1,93 @@
+#include "sensing/model/model_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace taclink {
+namespace {
+
+using testing::HasSubstr;
+
+std::string Cylinder() {
+  return std::string(ShippedModelText("cylinder"));
+}
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(ModelFile, ShippedModelsLoad) {
+  EXPECT_THAT(ShippedModelNames(), testing::UnorderedElementsAre("cylinder", "barrel"));
+  const auto cylinder = LoadLinkModel("cylinder");
+  ASSERT_TRUE(cylinder.ok()) << cylinder.error().message;
+  EXPECT_EQ(cylinder->markers.count(), 240);
+  const auto barrel = LoadLinkModel("barrel");
+  ASSERT_TRUE(barrel.ok()) << barrel.error().message;
+  EXPECT_EQ(barrel->markers.count(), 256);
+  EXPECT_NEAR(barrel->markers.rings_z_mm.back(), 241, 1e-9);
+}
+
+TEST(ModelFile, NumberingFollowsTheThesis) {
+  const auto model = LoadLinkModel("cylinder");
+  ASSERT_TRUE(model.ok());
+  const int marker = model->MarkerIndex(6, 4);  // node #127 = (7, 5), at 90 degrees and z = 90
+  EXPECT_EQ(marker + 1 + model->markers.paths, 127);
+  const Vec3 p = model->RestMarker(marker);
+  EXPECT_NEAR(p.x(), 0, 1e-9);
+  EXPECT_GT(p.y(), 30);
+  EXPECT_NEAR(p.z(), 90, 1e-9);
+}
+
+TEST(ModelFile, BadInputIsNamedWithFileAndLine) {
+  const auto message = [](const std::string& text) {
+    const auto model = ParseLinkModel("m.yaml", text);
+    return model.ok() ? std::string("accepted") : model.error().message;
+  };
+  EXPECT_THAT(message(Replaced(Cylinder(), "length_mm: 198", "lenght_mm: 198")),
+              HasSubstr("'skin.length_mm' is missing"));
+  EXPECT_THAT(message(Replaced(Cylinder(), "tube: {", "tubes: {}\ntube: {")),
+              HasSubstr("'tubes' is not a known key"));
+  EXPECT_THAT(message(Replaced(Cylinder(), "thickness_mm: 3.5", "thickness_mm: thick")),
+              HasSubstr("m.yaml:7: 'skin.thickness_mm' must be a number, not 'thick'"));
+  EXPECT_THAT(message(Replaced(Cylinder(), "poisson_ratio: 0.5", "poisson_ratio: 0.6")),
+              HasSubstr("at most 0.5"));
+  EXPECT_THAT(message(Replaced(Cylinder(), "youngs_modulus_mpa: 0.1", "youngs_modulus_mpa: .nan")),
+              HasSubstr("youngs_modulus_mpa"));
+  EXPECT_THAT(message(Replaced(Cylinder(), "radius_mm: 36.5", "radius_mm: 15.2")),
+              HasSubstr("inside the tube"));
+  EXPECT_THAT(message(Replaced(Cylinder(), "count: 10", "count: 30")), HasSubstr("between the clamped ends"));
+  EXPECT_THAT(message("{"), HasSubstr("m.yaml:"));
+  EXPECT_THAT(message("[]"), HasSubstr("mapping"));
+  EXPECT_THAT(message(""), HasSubstr("mapping"));
+}
+
+TEST(ModelFile, UnknownNameListsTheShippedOnes) {
+  const auto model = LoadLinkModel("no-such-model");
+  ASSERT_FALSE(model.ok());
+  EXPECT_EQ(model.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(model.error().message, HasSubstr("cylinder"));
+}
+
+TEST(ModelFile, CameraTextReadsBack) {
+  auto model = LoadLinkModel("cylinder");
+  ASSERT_TRUE(model.ok());
+  CameraModel camera = model->nominal_rig[CameraId::kBottom];
+  camera.camera_from_link.rotation =
+      Mat3(Eigen::AngleAxisd(0.03, Vec3(1, 2, 3).normalized())) * camera.camera_from_link.rotation;
+  auto file = YamlFile::Parse("c.yaml", "camera:\n" + CameraText(camera, CameraId::kBottom, "  "));
+  ASSERT_TRUE(file.ok());
+  const CameraModel read = ReadCamera(file->root().Map("camera"), CameraId::kBottom);
+  EXPECT_TRUE(file->Finish().ok());
+  EXPECT_NEAR((read.camera_from_link.rotation - camera.camera_from_link.rotation).norm(), 0, 1e-9);
+  EXPECT_NEAR(
+      (read.camera_from_link.Inverse().translation - camera.camera_from_link.Inverse().translation).norm(), 0,
+      1e-6);
+  EXPECT_NEAR(read.lens.k2_per_px4 / camera.lens.k2_per_px4, 1, 1e-9);
+}
+
+}  // namespace
+}  // namespace taclink
