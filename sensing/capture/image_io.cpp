@@ -8,8 +8,10 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 #include <span>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -188,7 +190,8 @@ Result<void> WritePng(const std::string& path, const cv::Mat& picture) {
   errno = 0;
   const bool closed = std::fclose(file.release()) == 0;
   if (encoded && closed) return {};
-  std::remove(path.c_str());
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);
   return Error{ErrorCode::kUnavailable,
                path + ": can't be written: " + (encoded ? std::strerror(errno) : image.message)};
 }
