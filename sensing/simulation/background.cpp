@@ -16,8 +16,8 @@ constexpr double kOpeningLevel = 18;   // black camera housing inside the LED ri
 constexpr double kHousingLevel = 5;    // outside the near rim
 constexpr double kSkinLevel = 19;      // at both ends; lit more in between
 constexpr double kSkinRise = 13;
-constexpr double kRingLevel = 215;
-constexpr double kGlowLevel = 62;    // beside the ring
+constexpr double kRingLevel = 290;
+constexpr double kGlowLevel = 70;    // beside the ring
 constexpr double kGlowReach = 0.55;  // over the ring's radius in the picture
 constexpr double kRimFade = 9;       // px
 
@@ -96,7 +96,7 @@ void AddSmears(const PictureCircle& far_ring, const PictureCircle& rim, std::mt1
     const Vec2 out(std::cos(angle), std::sin(angle));
     const double thick = dust ? 0.8 : 3 + 0.03 * radius * unit(rng),
                  length = thick * (dust ? 1.5 : 2.2 + 2 * unit(rng));
-    const double height = dust ? 25 * unit(rng) : 9 * unit(rng);
+    const double height = dust ? 25 * unit(rng) : 13 * unit(rng);
     const Vec2 at = center + radius * out;
     const int reach = static_cast<int>(3 * length) + 1;
     const int left = static_cast<int>(at.x()), top = static_cast<int>(at.y());
@@ -127,21 +127,22 @@ struct Surroundings {
     const double lit = Bell((share - 0.62) / 0.38) * (0.75 + 0.5 * streaks.At(angle));
     const double reach = kGlowReach * far_ring.radius_px();
     const double halo = effects.glow * kGlowLevel * std::exp(-d / reach) * (0.25 + 1.1 * glow.At(angle));
-    PixelLook look{kSkinLevel + kSkinRise * lit + halo + smear + RingLight(d, p), 0.06 * halo, 0.16 * halo};
+    PixelLook look{kSkinLevel + kSkinRise * lit + halo + smear + RingLight(d, p), 0.05 * halo,
+                   (0.06 + 0.26 * streaks.At(angle)) * halo};
     if (beyond_rim > 0) {
       const double inner = std::exp(-beyond_rim / kRimFade);
       look.level = kHousingLevel + inner * (look.level - kHousingLevel);
     }
     const double arc = ArcWindow(rim.Angle(p));
     const double red = arc * Bell((beyond_rim - 3) / 2.2), white = arc * arc * Bell((beyond_rim - 7) / 2.5);
-    look.level += 75 * red + 165 * white;
+    look.level += 70 * red + 215 * white;
     look.u += 2 * white - 8 * red;
     look.v += 52 * red;
     return look;
   }
 
   double RingLight(double d, const Vec2& p) const {
-    return effects.glow * kRingLevel * Bell((d - 1.0) / 1.15) * (0.35 + 0.75 * ring.At(far_ring.Angle(p)));
+    return effects.glow * kRingLevel * Bell((d - 1.0) / 1.15) * (0.1 + 1.0 * ring.At(far_ring.Angle(p)));
   }
 };
 
