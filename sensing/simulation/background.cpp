@@ -21,25 +21,28 @@ constexpr double kGlowLevel = 70;    // beside the ring
 constexpr double kGlowReach = 0.55;  // over the ring's radius in the picture
 constexpr double kRimFade = 9;       // px
 
-// A sum of a few random waves around the circle, scaled to [0, 1].
+// A sum of a few random waves around the circle, scaled to [0, 1]; a table, as every pixel asks.
 class Ripple {
  public:
-  Ripple(std::mt19937_64& rng, int lowest, int highest) : lowest_(lowest) {
+  Ripple(std::mt19937_64& rng, int lowest, int highest) {
     std::uniform_real_distribution<double> phase(0, 2 * kPi), size(0.3, 1);
-    for (int n = lowest; n <= highest; ++n) waves_.push_back({size(rng), phase(rng)});
-    for (const auto& wave : waves_) total_ += wave[0];
+    std::array<double, kBins> sum{};
+    double total = 0;
+    for (int n = lowest; n <= highest; ++n) {
+      const double height = size(rng), start = phase(rng);
+      total += height;
+      for (size_t i = 0; i < kBins; ++i)
+        sum[i] += height * std::sin(n * 2 * kPi * static_cast<double>(i) / kBins + start);
+    }
+    for (size_t i = 0; i < kBins; ++i) table_[i] = std::clamp(0.5 + 0.9 * sum[i] / total, 0.0, 1.0);
   }
   double At(double angle) const {
-    double sum = 0;
-    for (size_t i = 0; i < waves_.size(); ++i)
-      sum += waves_[i][0] * std::sin((lowest_ + static_cast<int>(i)) * angle + waves_[i][1]);
-    return std::clamp(0.5 + 0.9 * sum / total_, 0.0, 1.0);
+    return table_[static_cast<size_t>((angle / (2 * kPi) + 1) * kBins) % kBins];
   }
 
  private:
-  int lowest_;
-  double total_ = 0;
-  std::vector<std::array<double, 2>> waves_;
+  static constexpr size_t kBins = 1024;
+  std::array<double, kBins> table_;
 };
 
 // A circle around the link's axis as the camera sees it.

@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kJitterTableSize = 8192;   // a power of two
 constexpr size_t kNoiseOffsets = 1U << 17;  // frames start at one of so many places of the noise table
-constexpr double kMarkerLevel = 268;        // right before the lens, facing it
+constexpr double kMarkerLevel = 255;        // right before the lens, facing it
 constexpr double kHardlyDeformedMm = 0.5;   // shallower dents hide nothing
 constexpr double kGrazeMm = 0.3;  // a wall this close to the line of sight hides less than half a marker
 
@@ -51,7 +51,7 @@ std::vector<int> FarToNear(const std::vector<Vec3>& markers, const Vec3& camera_
 
 Renderer::Renderer(const LinkModel& model, const StereoRig& rig, const CameraEffects& effects, uint64_t seed)
     : dome_radius_mm_(model.markers.diameter_mm / 2),
-      light_reach_mm_(0.7 * model.length_mm),
+      light_reach_mm_(0.9 * model.length_mm),
       effects_(effects),
       seed_(seed) {
   const RadiusGrid wall = RestWall(model);
@@ -121,16 +121,14 @@ void PackYuyv(const cv::Mat& gray, const cv::Mat& chroma, RawImage& image) {
   image.height_px = gray.rows;
   image.bytes.resize(2 * gray.total());
   image.valid = true;
-  constexpr uint8_t kNoColour = 128;
-  uint8_t* out = image.bytes.data();
-  for (int y = 0; y < gray.rows; ++y, out += 2 * static_cast<size_t>(gray.cols)) {
-    const uint8_t* luma = gray.ptr<uint8_t>(y);
-    if (chroma.empty()) {
-      for (int x = 0; x < gray.cols; ++x) out[2 * x] = luma[x], out[2 * x + 1] = kNoColour;
-    } else {
-      const uint8_t* colour = chroma.ptr<uint8_t>(y);
-      for (int x = 0; x < gray.cols; ++x) out[2 * x] = luma[x], out[2 * x + 1] = colour[x];
-    }
+  // YUYV is a picture of two channels: brightness, and U and V in turn.
+  cv::Mat yuyv(gray.rows, gray.cols, CV_8UC2, image.bytes.data());
+  if (chroma.empty()) {
+    yuyv.setTo(cv::Scalar::all(128));
+    cv::insertChannel(gray, yuyv, 0);
+  } else {
+    const std::array<cv::Mat, 2> channels = {gray, chroma};
+    cv::merge(channels.data(), channels.size(), yuyv);
   }
 }
 
