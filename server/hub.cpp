@@ -25,6 +25,10 @@ std::vector<DeliveryCounts> Subscription::Counts() const {
   return queue_->Counts();
 }
 
+uint64_t Subscription::dropped() const {
+  return queue_->dropped();
+}
+
 size_t Subscription::waiting() const {
   return queue_->waiting();
 }

@@ -74,6 +74,7 @@ class Subscription {
   /// The next state, at once. Null: there is none, and the next one to come will be notified.
   PublicationPtr Take();
   std::vector<DeliveryCounts> Counts() const;  ///< by link
+  uint64_t dropped() const;                    ///< of all links
   size_t waiting() const;
   size_t capacity() const;
 

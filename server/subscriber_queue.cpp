@@ -47,6 +47,11 @@ bool SubscriberQueue::Offer(const PublicationPtr& publication) {
   return std::exchange(armed_, false);
 }
 
+void SubscriberQueue::CountDrop(size_t link) {
+  ++links_[link].counts.dropped;
+  ++dropped_;
+}
+
 void SubscriberQueue::PushEvery(PublicationPtr& publication) {
   if (count_ < ring_.size()) {
     std::swap(At(count_++), publication);
@@ -54,14 +59,14 @@ void SubscriberQueue::PushEvery(PublicationPtr& publication) {
   }
   std::swap(At(0), publication);
   first_ = (first_ + 1) % ring_.size();
-  ++links_[publication->link()].counts.dropped;
+  CountDrop(publication->link());
 }
 
 // The newest takes the place of the older one, so that a fast link can't push a slow one back.
 void SubscriberQueue::PushLatest(PublicationPtr& publication) {
   for (size_t place = 0; place < count_; ++place) {
     if (At(place)->link() != publication->link()) continue;
-    ++links_[publication->link()].counts.dropped;
+    CountDrop(publication->link());
     std::swap(At(place), publication);
     return;
   }

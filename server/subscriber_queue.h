@@ -22,6 +22,7 @@ class SubscriberQueue {
   bool closed() const { return closed_; }
 
   std::vector<DeliveryCounts> Counts() const;
+  uint64_t dropped() const { return dropped_; }
   size_t waiting() const;
   size_t capacity() const { return ring_.size(); }
 
@@ -32,6 +33,7 @@ class SubscriberQueue {
     DeliveryCounts counts;
   };
 
+  void CountDrop(size_t link);
   bool Due(PerLink& link, int64_t published_ns) const;
   void PushEvery(PublicationPtr& publication);
   void PushLatest(PublicationPtr& publication);
@@ -43,6 +45,7 @@ class SubscriberQueue {
   const std::function<void()> notify_;
 
   std::atomic<bool> closed_ = false;
+  std::atomic<uint64_t> dropped_ = 0;
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   std::vector<PerLink> links_;
