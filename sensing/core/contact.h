@@ -16,10 +16,11 @@ constexpr const char* Name(ForceModel model) {
 /// What the world exerts on the skin, lumped at the markers' places on the mid-surface. Link frame, N.
 struct NodalForces {
   ForceModel model = ForceModel::kLinear;
-  std::vector<Vec3> forces_n;         ///< by marker index
-  std::vector<int> loaded;            ///< indices of the markers with a force
+  std::vector<Vec3> forces_n;    ///< by marker index
+  std::vector<double> sigmas_n;  ///< by marker index: standard deviation of the force; 0 where there is none
+  std::vector<int> loaded;       ///< indices of the markers with a force
   Eigen::MatrixXd loaded_covariance;  ///< of the inward forces of `loaded`, in its order; N^2
-  double residual_sigmas = 0;         ///< RMS of the unexplained displacement, in standard deviations
+  double residual = 0;                ///< RMS of the unexplained displacement, in standard deviations
   bool converged = true;              ///< false: the solver stopped at its limit of loads
 };
 

@@ -174,9 +174,10 @@ void LinearForceEstimator::RemoveBias() {
 void LinearForceEstimator::Estimate(const SkinShape& shape, double pressure_mpa, NodalForces& forces) {
   forces.model = ForceModel::kLinear;
   forces.forces_n.assign(static_cast<size_t>(markers_), Vec3::Zero());
+  forces.sigmas_n.assign(static_cast<size_t>(markers_), 0.0);
   forces.loaded.clear();
   forces.loaded_covariance.resize(0, 0);
-  forces.residual_sigmas = 0;
+  forces.residual = 0;
   forces.converged = true;
   const bool moved = Whiten(shape, pressure_mpa);
   residual_ = data_;
@@ -189,7 +190,7 @@ void LinearForceEstimator::Estimate(const SkinShape& shape, double pressure_mpa,
   }
   const auto n = static_cast<Eigen::Index>(loaded_.size());
   const double residual2 = residual_.squaredNorm() / std::max(1, 3 * used_markers_);
-  forces.residual_sigmas = std::sqrt(residual2);
+  forces.residual = std::sqrt(residual2);
   if (n == 0) return;
   for (Eigen::Index k = 0; k < n; ++k) {
     const auto m = static_cast<size_t>(loaded_[static_cast<size_t>(k)]);
@@ -199,6 +200,10 @@ void LinearForceEstimator::Estimate(const SkinShape& shape, double pressure_mpa,
   // What is left unexplained beyond the noise is the model's error; it widens the result.
   forces.loaded_covariance =
       std::max(1.0, residual2) * gram_.topLeftCorner(n, n).llt().solve(Eigen::MatrixXd::Identity(n, n));
+  for (Eigen::Index k = 0; k < n; ++k) {
+    forces.sigmas_n[static_cast<size_t>(loaded_[static_cast<size_t>(k)])] =
+        std::sqrt(forces.loaded_covariance(k, k));
+  }
 }
 
 }  // namespace taclink
