@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sensing/shape/inference.h"
+
 namespace taclink {
 namespace {
 
@@ -17,10 +19,9 @@ double Variance(double sigma_px, double camera_sigma_px) {
 }  // namespace
 
 ShapeReconstructor::ShapeReconstructor(const LinkModel& model, const StereoRig& rig, ShapeOptions options)
-    : options_(options),
+    : model_(model),
+      options_(options),
       projectors_{Projector(rig[CameraId::kTop]), Projector(rig[CameraId::kBottom])},
-      paths_(model.markers.paths),
-      rings_(model.markers.rings()),
       length_mm_(model.length_mm),
       tube_radius_mm_(model.tube_outer_radius_mm),
       model_rest_mm_(model.RestMarkers()),
@@ -47,6 +48,7 @@ void ShapeReconstructor::Reconstruct(const LabelledMarkers& markers, SkinShape& 
   shape.sources.assign(count, MarkerSource::kInferred);
   static const MarkerObservation kUnseen;
   for (size_t i = 0; i < count; ++i) {
+    shape.positions_mm[i] = baseline_mm_[i];
     const MarkerObservation& top = i < markers.cameras[0].size() ? markers.cameras[0][i] : kUnseen;
     const MarkerObservation& bottom = i < markers.cameras[1].size() ? markers.cameras[1][i] : kUnseen;
     if (top.seen && bottom.seen) {
@@ -58,7 +60,7 @@ void ShapeReconstructor::Reconstruct(const LabelledMarkers& markers, SkinShape& 
     }
     shape.displacements_mm[i] = shape.positions_mm[i] - baseline_mm_[i];
   }
-  Infer(shape);
+  InferUnseen(model_, options_.inferred_sigma_mm, shape);
   for (size_t i = 0; i < count; ++i) shape.covariances_mm2[i] += baseline_covariance_mm2_[i];
 }
 
@@ -130,34 +132,6 @@ bool ShapeReconstructor::FromOneCamera(CameraId id, const MarkerObservation& see
   shape.positions_mm[marker] = *p;
   shape.covariances_mm2[marker] = covariance;
   return true;
-}
-
-void ShapeReconstructor::Infer(SkinShape& shape) const {
-  const auto index = [&](int path, int ring) { return static_cast<size_t>(ring * paths_ + path); };
-  for (int path = 0; path < paths_; ++path) {
-    double z_before = 0;
-    Vec3 u_before = Vec3::Zero();
-    for (int ring = 0; ring < rings_; ++ring) {
-      const size_t i = index(path, ring);
-      const double z = model_rest_mm_[i].z();
-      if (shape.sources[i] != MarkerSource::kInferred) {
-        z_before = z, u_before = shape.displacements_mm[i];
-        continue;
-      }
-      double z_after = length_mm_;
-      Vec3 u_after = Vec3::Zero();
-      for (int next = ring + 1; next < rings_; ++next) {
-        const size_t k = index(path, next);
-        if (shape.sources[k] == MarkerSource::kInferred) continue;
-        z_after = model_rest_mm_[k].z(), u_after = shape.displacements_mm[k];
-        break;
-      }
-      const Vec3 u = u_before + (u_after - u_before) * ((z - z_before) / (z_after - z_before));
-      shape.displacements_mm[i] = u;
-      shape.positions_mm[i] = baseline_mm_[i] + u;
-      shape.covariances_mm2[i] = options_.inferred_sigma_mm * options_.inferred_sigma_mm * Mat3::Identity();
-    }
-  }
 }
 
 }  // namespace taclink

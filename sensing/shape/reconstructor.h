@@ -52,11 +52,10 @@ class ShapeReconstructor {
                    SkinShape& shape) const;
   bool FromOneCamera(CameraId id, const MarkerObservation& seen, size_t marker, SkinShape& shape) const;
   bool Plausible(const Vec3& p, size_t marker) const;
-  void Infer(SkinShape& shape) const;
 
+  const LinkModel model_;
   const ShapeOptions options_;
   const std::vector<Projector> projectors_;  // by camera
-  int paths_, rings_;
   double length_mm_, tube_radius_mm_;
   std::vector<double> rest_radius_mm_;  // by marker, of the model
   std::vector<Vec3> model_rest_mm_, baseline_mm_;
