@@ -1,5 +1,6 @@
 #include "sensing/pipeline/link_pipeline.h"
 
+#include <algorithm>
 #include <array>
 #include <opencv2/core.hpp>
 #include <string>
@@ -103,7 +104,9 @@ struct LinkPipeline::Stages {
     SetStatus(state, LinkStatus::kCalibrating, "taking the rest shape; do not touch the skin");
     if (!*complete) return;
     tracker.emplace(model, rest.calibration()->rig);
-    reconstructor.emplace(model, rest.calibration()->rig);
+    ShapeOptions shape_options;
+    shape_options.camera_sigma_px = std::max(shape_options.camera_sigma_px, rest.noise_px());
+    reconstructor.emplace(model, rest.calibration()->rig, shape_options);
     SkinShape baseline;
     reconstructor->Reconstruct(rest.markers(), baseline);
     reconstructor->SetBaseline(baseline);
