@@ -78,7 +78,8 @@ bool SourceSupervisor::TryNext(StereoFrame& frame, milliseconds timeout) {
   switch (result.error().code) {
     case ErrorCode::kTimeout:
       if (clock_.MonotonicNs() - alive_at_ns_ >= StallNs()) {
-        Failed({ErrorCode::kUnavailable, "no frame for " + std::to_string(StallNs() / 1'000'000'000) + " s"});
+        Failed({ErrorCode::kUnavailable, "no frame for " + std::to_string(StallNs() / 1'000'000'000) +
+                                             " s: " + result.error().message});
       }
       break;
     case ErrorCode::kEndOfData:
