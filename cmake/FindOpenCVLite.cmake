@@ -12,7 +12,7 @@ if(OpenCVLite_FOUND AND NOT TARGET OpenCV::core)
     add_library(OpenCV::${module} UNKNOWN IMPORTED)
     set_target_properties(OpenCV::${module} PROPERTIES
       IMPORTED_LOCATION "${OpenCVLite_${module}_LIBRARY}"
-      INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "${OpenCVLite_INCLUDE_DIR}")
+      INTERFACE_INCLUDE_DIRECTORIES "${OpenCVLite_INCLUDE_DIR}")
   endforeach()
   target_link_libraries(OpenCV::imgproc INTERFACE OpenCV::core)
 endif()

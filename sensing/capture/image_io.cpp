@@ -183,6 +183,7 @@ Result<void> WritePng(const std::string& path, const cv::Mat& picture) {
   image.width = static_cast<png_uint_32>(picture.cols);
   image.height = static_cast<png_uint_32>(picture.rows);
   image.format = picture.channels() == 1 ? PNG_FORMAT_GRAY : PNG_FORMAT_BGR;
+  image.flags = PNG_IMAGE_FLAG_FAST;  // camera noise hardly compresses anyway
   File file(std::fopen(path.c_str(), "wbe"));
   if (!file) return Error{ErrorCode::kUnavailable, path + ": can't be written: " + std::strerror(errno)};
   const bool encoded = png_image_write_to_stdio(&image, file.get(), 0, picture.data,

@@ -1,0 +1,45 @@
+#include "client/command/frame_json.h"
+
+#include "client/command/json.h"
+
+namespace taclink::command {
+namespace {
+
+constexpr double kMmPerMetre = 1e3;
+constexpr double kMm2PerSquareMetre = 1e6;
+constexpr double kKpaPerPascal = 1e-3;
+
+Json ContactJson(const client::Contact& contact) {
+  return {{"id", contact.id},
+          {"center_mm", ToJson(contact.center_m, kMmPerMetre)},
+          {"normal", contact.normal},
+          {"force_n", contact.force_n},
+          {"force_sigma_n", contact.force_sigma_n ? Json(*contact.force_sigma_n) : Json(nullptr)},
+          {"normal_force_n", contact.normal_force_n},
+          {"area_mm2", contact.area_m2 * kMm2PerSquareMetre}};
+}
+
+}  // namespace
+
+std::string FrameJson(const client::Frame& frame) {
+  const auto latency = frame.latency_s();
+  Json contacts = Json::array();
+  for (const auto& contact : frame.contacts) contacts.push_back(ContactJson(contact));
+  Json json = {{"link", frame.link},
+               {"sequence", frame.sequence},
+               {"exposure_utc_ns", frame.times.exposure_utc_ns},
+               {"latency_ms", latency ? Json(*latency * 1e3) : Json(nullptr)},
+               {"status", client::Name(frame.status)},
+               {"reason", frame.status_reason},
+               {"pressure_kpa", frame.pressure_pa ? Json(*frame.pressure_pa * kKpaPerPascal) : Json(nullptr)},
+               {"force_model", client::Name(frame.force_model)},
+               {"markers", {{"seen", frame.markers_seen}, {"inferred", frame.markers_inferred}}},
+               {"contacts", std::move(contacts)},
+               {"total_force_n", frame.total_force_n}};
+  if (!frame.positions_m.empty()) json["positions_mm"] = ToJson(frame.positions_m, kMmPerMetre);
+  if (!frame.displacements_m.empty()) json["displacements_mm"] = ToJson(frame.displacements_m, kMmPerMetre);
+  if (!frame.nodal_forces_n.empty()) json["nodal_forces_n"] = ToJson(frame.nodal_forces_n, 1);
+  return json.dump();
+}
+
+}  // namespace taclink::command

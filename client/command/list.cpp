@@ -1,0 +1,80 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+#include "client/command/commands.h"
+#include "client/command/json.h"
+#include "client/taclink/client.h"
+
+namespace taclink::command {
+namespace {
+
+struct Options {
+  std::string server = "127.0.0.1:50051";
+  bool json = false;
+};
+
+std::string Milliseconds(double seconds) {
+  return seconds > 0 ? fmt::format("{:.1f}", seconds * 1e3) : "-";
+}
+
+void PrintTable(const client::Arm& arm) {
+  size_t width = 4;
+  for (const auto& link : arm.links) width = std::max(width, link.name.size());
+  fmt::print("{:<{}}  {:<11}  {:>7}  {:>6}  {:>6}  {:>8}  {}\n", "LINK", width, "STATE", "RATE/s", "P50 ms",
+             "P99 ms", "CONTACTS", "REASON");
+  for (const auto& link : arm.links) {
+    fmt::print("{:<{}}  {:<11}  {:>7.1f}  {:>6}  {:>6}  {:>8}  {}\n", link.name, width,
+               client::Name(link.status), link.rate_hz, Milliseconds(link.latency_p50_s),
+               Milliseconds(link.latency_p99_s), link.contacts,
+               link.status_reason.empty() ? "-" : link.status_reason);
+  }
+}
+
+void PrintJson(const client::Arm& arm) {
+  Json links = Json::array();
+  for (const auto& link : arm.links) {
+    links.push_back({{"link", link.name},
+                     {"model", link.model.name},
+                     {"source", client::Name(link.source)},
+                     {"source_description", link.source_description},
+                     {"state", client::Name(link.status)},
+                     {"reason", link.status_reason},
+                     {"rate_hz", link.rate_hz},
+                     {"latency_p50_ms", link.latency_p50_s * 1e3},
+                     {"latency_p99_ms", link.latency_p99_s * 1e3},
+                     {"contacts", link.contacts},
+                     {"frames", link.frames},
+                     {"frames_skipped", link.frames_skipped},
+                     {"source_restarts", link.source_restarts}});
+  }
+  const Json json = {{"arm", arm.name}, {"server_version", arm.server_version}, {"links", std::move(links)}};
+  fmt::print("{}\n", json.dump());
+}
+
+Result<void> Run(const Options& options) {
+  auto connection = client::Client::Connect(options.server);
+  if (!connection) return connection.error();
+  const auto arm = connection->GetArm();
+  if (!arm) return arm.error();
+  if (options.json) {
+    PrintJson(*arm);
+  } else {
+    PrintTable(*arm);
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddList(CLI::App& app, Selected& selected) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("list", "Show the links of a server");
+  AddServerOption(*command, options->server);
+  command->add_flag("--json", options->json, "One JSON object");
+  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+}
+
+}  // namespace taclink::command

@@ -1,0 +1,59 @@
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "client/command/commands.h"
+
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kUsage = 2;
+
+int Complain(std::string message, int code) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::fprintf(stderr, "taclink: %s\n", message.c_str());
+  return code;
+}
+
+}  // namespace
+
+namespace taclink::command {
+
+void AddServerOption(CLI::App& command, std::string& address) {
+  command.add_option("--server", address, "Address of the server, host:port")
+      ->envname("TACLINK_SERVER")
+      ->capture_default_str();
+}
+
+}  // namespace taclink::command
+
+int main(int argc, char** argv) {
+  CLI::App app("Looks at soft tactile links: live from a server, or offline from files", "taclink");
+  app.set_version_flag("--version", std::string(TACLINK_VERSION));
+  app.require_subcommand(1);
+  taclink::command::Selected selected;
+  taclink::command::AddList(app, selected);
+  taclink::command::AddWatch(app, selected);
+  taclink::command::AddDetect(app, selected);
+  taclink::command::AddSolve(app, selected);
+  taclink::command::AddSimulate(app, selected);
+  taclink::command::AddSkin(app, selected);
+  taclink::command::AddShow(app, selected);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return app.exit(e);
+    // CLI11 only says that a subcommand is missing.
+    const bool unknown = argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty();
+    return Complain(unknown ? "no command '" + std::string(argv[1]) + "'; see taclink --help"
+                            : std::string(e.what()) + "; see taclink --help",
+                    kUsage);
+  }
+  try {
+    const auto result = selected();
+    return result ? 0 : Complain(result.error().message, kFailed);
+  } catch (const std::exception& e) {
+    return Complain(std::string("failed unexpectedly: ") + e.what(), kFailed);
+  }
+}

@@ -1,0 +1,229 @@
+#include "client/messages.h"
+
+namespace taclink::client {
+namespace {
+
+using Floats = google::protobuf::RepeatedField<float>;
+
+Vector3 From(const v1::Vector3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+template <size_t N>
+std::vector<std::array<double, N>> Grouped(const Floats& values) {
+  std::vector<std::array<double, N>> out(static_cast<size_t>(values.size()) / N);
+  int next = 0;
+  for (auto& group : out) {
+    for (double& value : group) value = static_cast<double>(values[next++]);
+  }
+  return out;
+}
+
+LinkStatus From(v1::LinkStatus status) {
+  switch (status) {
+    case v1::LINK_STATUS_STARTING:
+      return LinkStatus::kStarting;
+    case v1::LINK_STATUS_CALIBRATING:
+      return LinkStatus::kCalibrating;
+    case v1::LINK_STATUS_OK:
+      return LinkStatus::kOk;
+    case v1::LINK_STATUS_DEGRADED:
+      return LinkStatus::kDegraded;
+    case v1::LINK_STATUS_LOST:
+      return LinkStatus::kLost;
+    default:
+      return LinkStatus::kUnknown;
+  }
+}
+
+MarkerSource From(v1::MarkerSource source) {
+  switch (source) {
+    case v1::MARKER_SOURCE_BOTH:
+      return MarkerSource::kBoth;
+    case v1::MARKER_SOURCE_TOP:
+      return MarkerSource::kTop;
+    case v1::MARKER_SOURCE_BOTTOM:
+      return MarkerSource::kBottom;
+    case v1::MARKER_SOURCE_INFERRED:
+      return MarkerSource::kInferred;
+    default:
+      return MarkerSource::kUnknown;
+  }
+}
+
+SourceKind From(v1::SourceKind kind) {
+  switch (kind) {
+    case v1::SOURCE_KIND_V4L2:
+      return SourceKind::kV4l2;
+    case v1::SOURCE_KIND_FILES:
+      return SourceKind::kFiles;
+    case v1::SOURCE_KIND_SIMULATED:
+      return SourceKind::kSimulated;
+    default:
+      return SourceKind::kUnknown;
+  }
+}
+
+LinkModel From(const v1::LinkModel& message) {
+  LinkModel model;
+  model.name = message.name();
+  model.description = message.description();
+  model.length_m = message.length_m();
+  model.thickness_m = message.thickness_m();
+  model.tube_radius_m = message.tube_radius_m();
+  model.youngs_modulus_pa = message.material().youngs_modulus_pa();
+  model.poisson_ratio = message.material().poisson_ratio();
+  const v1::MarkerGrid& grid = message.markers();
+  model.paths = static_cast<int>(grid.paths());
+  model.rings = static_cast<int>(grid.rings());
+  model.first_path_angle_rad = grid.first_path_angle_rad();
+  model.ring_z_m.assign(grid.ring_z_m().begin(), grid.ring_z_m().end());
+  model.marker_diameter_m = grid.diameter_m();
+  model.rest_positions_m = Grouped<3>(grid.rest_positions_m());
+  model.profile_z_m.assign(message.profile_z_m().begin(), message.profile_z_m().end());
+  model.profile_radius_m.assign(message.profile_radius_m().begin(), message.profile_radius_m().end());
+  return model;
+}
+
+Link From(const v1::Link& message) {
+  Link link;
+  link.name = message.name();
+  link.index = static_cast<int>(message.index());
+  link.model = From(message.model());
+  const v1::Quaternion& q = message.base_from_link().rotation();
+  link.base_from_link = {From(message.base_from_link().translation_m()), {q.x(), q.y(), q.z(), q.w()}};
+  link.source = From(message.source().kind());
+  link.source_description = message.source().description();
+  link.status = From(message.status());
+  link.status_reason = message.status_reason();
+  const v1::LinkStatistics& statistics = message.statistics();
+  link.rate_hz = statistics.rate_hz();
+  link.latency_p50_s = statistics.latency_p50_s();
+  link.latency_p99_s = statistics.latency_p99_s();
+  link.frames = statistics.frames();
+  link.frames_skipped = statistics.frames_skipped();
+  link.source_restarts = statistics.source_restarts();
+  link.contacts = static_cast<int>(statistics.contacts());
+  return link;
+}
+
+Contact From(const v1::Contact& message) {
+  Contact contact;
+  contact.id = message.id();
+  contact.center_m = From(message.center_m());
+  contact.normal = From(message.normal());
+  contact.force_n = From(message.force_n());
+  if (message.has_force_sigma_n()) contact.force_sigma_n = From(message.force_sigma_n());
+  contact.normal_force_n = message.normal_force_n();
+  contact.area_m2 = message.area_m2();
+  for (const uint32_t marker : message.markers()) contact.markers.push_back(static_cast<int>(marker));
+  return contact;
+}
+
+FrameTimes From(const v1::FrameTimes& message) {
+  return {.exposure_utc_ns = message.exposure_utc_ns(),
+          .exposure_ns = message.exposure_ns(),
+          .received_ns = message.received_ns(),
+          .tracked_ns = message.tracked_ns(),
+          .solved_ns = message.solved_ns(),
+          .published_ns = message.published_ns()};
+}
+
+}  // namespace
+
+const char* Name(LinkStatus status) {
+  switch (status) {
+    case LinkStatus::kStarting:
+      return "starting";
+    case LinkStatus::kCalibrating:
+      return "calibrating";
+    case LinkStatus::kOk:
+      return "ok";
+    case LinkStatus::kDegraded:
+      return "degraded";
+    case LinkStatus::kLost:
+      return "lost";
+    case LinkStatus::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
+const char* Name(ForceModel model) {
+  return model == ForceModel::kLinear ? "linear" : "unknown";
+}
+
+const char* Name(SourceKind kind) {
+  switch (kind) {
+    case SourceKind::kV4l2:
+      return "v4l2";
+    case SourceKind::kFiles:
+      return "files";
+    case SourceKind::kSimulated:
+      return "simulated";
+    case SourceKind::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
+Arm FromMessage(const v1::Arm& message) {
+  Arm arm{.name = message.name(), .server_version = message.server_version(), .links = {}};
+  for (const auto& link : message.links()) arm.links.push_back(From(link));
+  return arm;
+}
+
+Frame FromMessage(const v1::LinkFrame& message) {
+  Frame frame;
+  frame.link = message.link();
+  frame.link_index = static_cast<int>(message.link_index());
+  frame.sequence = message.sequence();
+  frame.times = From(message.times());
+  frame.status = From(message.status());
+  frame.status_reason = message.status_reason();
+  if (message.has_pressure_pa()) frame.pressure_pa = message.pressure_pa();
+  frame.markers_seen = static_cast<int>(message.markers_seen());
+  frame.markers_inferred = static_cast<int>(message.markers_inferred());
+  for (const auto& contact : message.contacts()) frame.contacts.push_back(From(contact));
+  frame.total_force_n = From(message.total_force_n());
+  frame.force_model =
+      message.force_model() == v1::FORCE_MODEL_LINEAR ? ForceModel::kLinear : ForceModel::kUnknown;
+  frame.baseline_age_s = message.baseline_age_s();
+  const v1::StageTimes& stages = message.stage_times();
+  frame.stage_times = {.decode_s = stages.decode_s(),
+                       .detect_s = stages.detect_s(),
+                       .register_s = stages.register_s(),
+                       .reconstruct_s = stages.reconstruct_s(),
+                       .force_s = stages.force_s()};
+  frame.positions_m = Grouped<3>(message.positions_m());
+  frame.displacements_m = Grouped<3>(message.displacements_m());
+  frame.displacement_covariances_m2 = Grouped<6>(message.displacement_covariances_m2());
+  frame.nodal_forces_n = Grouped<3>(message.nodal_forces_n());
+  frame.nodal_force_sigmas_n.assign(message.nodal_force_sigmas_n().begin(),
+                                    message.nodal_force_sigmas_n().end());
+  for (const int source : message.marker_sources())
+    frame.marker_sources.push_back(From(static_cast<v1::MarkerSource>(source)));
+  frame.force_residual = message.force_residual();
+  frame.force_converged = !message.force_not_converged();
+  return frame;
+}
+
+std::vector<StreamCounts> FromMessage(const v1::StreamStatus& message) {
+  std::vector<StreamCounts> counts;
+  for (const auto& link : message.links())
+    counts.push_back({link.link(), link.frames_sent(), link.frames_dropped()});
+  return counts;
+}
+
+v1::StreamFramesRequest ToMessage(const StreamOptions& options) {
+  v1::StreamFramesRequest request;
+  for (const auto& link : options.links) request.add_links(link);
+  request.set_detail(options.detail == Detail::kFull       ? v1::DETAIL_FULL
+                     : options.detail == Detail::kGeometry ? v1::DETAIL_GEOMETRY
+                                                           : v1::DETAIL_CONTACTS);
+  request.set_max_rate_hz(options.max_rate_hz);
+  request.set_delivery(options.delivery == Delivery::kEvery ? v1::DELIVERY_EVERY : v1::DELIVERY_LATEST);
+  return request;
+}
+
+}  // namespace taclink::client

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "client/taclink/client.h"
+#include "taclink/v1/tactile.pb.h"
+
+namespace taclink::client {
+
+// Messages to the client's types and back; both are in SI units.
+Arm FromMessage(const v1::Arm& message);
+Frame FromMessage(const v1::LinkFrame& message);
+std::vector<StreamCounts> FromMessage(const v1::StreamStatus& message);
+v1::StreamFramesRequest ToMessage(const StreamOptions& options);
+
+}  // namespace taclink::client

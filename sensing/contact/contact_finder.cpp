@@ -1,0 +1,147 @@
+#include "sensing/contact/contact_finder.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace taclink {
+
+ContactFinder::ContactFinder(const LinkModel& model, const ContactOptions& options)
+    : model_(model), options_(options), open_(static_cast<size_t>(model.markers.count())) {
+  const auto& grid = model_.markers;
+  for (int m = 0; m < grid.count(); ++m) {
+    const auto ring = static_cast<size_t>(model_.RingOf(m));
+    const double below = ring > 0 ? grid.rings_z_mm[ring - 1] : 0;
+    const double above = ring + 1 < grid.rings_z_mm.size() ? grid.rings_z_mm[ring + 1] : model_.length_mm;
+    const double z = grid.rings_z_mm[ring];
+    const double radius = model_.PointAtDepth(0, z, 0).head<2>().norm();
+    areas_mm2_.push_back(radius * grid.path_pitch_rad() * (above - below) / 2 *
+                         std::hypot(1.0, model_.profile.Slope(z)));
+  }
+}
+
+void ContactFinder::Find(const SkinShape& shape, const NodalForces& forces, std::vector<Contact>& contacts) {
+  contacts.clear();
+  std::fill(open_.begin(), open_.end(), 0);
+  for (const int m : forces.loaded) open_[static_cast<size_t>(m)] = 1;
+  for (const int first : forces.loaded) {
+    if (!open_[static_cast<size_t>(first)]) continue;
+    Collect(first, region_);
+    Contact contact = Describe(shape, forces, region_);
+    if (contact.normal_force_n >= options_.min_force_n) contacts.push_back(std::move(contact));
+  }
+  std::sort(contacts.begin(), contacts.end(),
+            [](const Contact& a, const Contact& b) { return a.normal_force_n > b.normal_force_n; });
+  AssignIds(contacts);
+}
+
+void ContactFinder::Collect(int first, std::vector<int>& region) {
+  region.clear();
+  queue_.assign(1, first);
+  open_[static_cast<size_t>(first)] = 0;
+  const int paths = model_.markers.paths, rings = model_.markers.rings();
+  while (!queue_.empty()) {
+    const int m = queue_.back();
+    queue_.pop_back();
+    region.push_back(m);
+    for (int d_ring = -1; d_ring <= 1; ++d_ring) {
+      const int ring = model_.RingOf(m) + d_ring;
+      if (ring < 0 || ring >= rings) continue;
+      for (int d_path = -1; d_path <= 1; ++d_path) {
+        const int next = model_.MarkerIndex((model_.PathOf(m) + d_path + paths) % paths, ring);
+        if (!open_[static_cast<size_t>(next)]) continue;
+        open_[static_cast<size_t>(next)] = 0;
+        queue_.push_back(next);
+      }
+    }
+  }
+}
+
+Contact ContactFinder::Describe(const SkinShape& shape, const NodalForces& forces,
+                                const std::vector<int>& region) const {
+  Contact contact;
+  contact.markers = region;
+  double weight = 0, path = 0, ring = 0;
+  const int paths = model_.markers.paths, origin = model_.PathOf(region.front());
+  for (const int m : region) {
+    const Vec3& f = forces.forces_n[static_cast<size_t>(m)];
+    contact.force_n += f;
+    const double w = f.norm();
+    // Paths are counted from the first one of the region, so that a region over path 1 has a middle.
+    int from_origin = (model_.PathOf(m) - origin + paths) % paths;
+    if (from_origin > paths / 2) from_origin -= paths;
+    weight += w;
+    path += w * from_origin;
+    ring += w * model_.RingOf(m);
+    contact.area_mm2 += areas_mm2_[static_cast<size_t>(m)];
+  }
+  path = origin + path / weight;
+  ring /= weight;
+  contact.center_mm = OuterPointAt(shape, path, ring);
+  contact.normal =
+      DeformedNormal(shape, static_cast<int>(std::lround(path)), static_cast<int>(std::lround(ring)));
+  contact.normal_force_n = -contact.force_n.dot(contact.normal);
+
+  Mat3 covariance = Mat3::Zero();
+  for (size_t i = 0; i < forces.loaded.size(); ++i) {
+    const int a = forces.loaded[i];
+    if (std::find(region.begin(), region.end(), a) == region.end()) continue;
+    for (size_t j = 0; j < forces.loaded.size(); ++j) {
+      const int b = forces.loaded[j];
+      if (std::find(region.begin(), region.end(), b) == region.end()) continue;
+      const Vec3 along_a = forces.forces_n[static_cast<size_t>(a)].normalized();
+      const Vec3 along_b = forces.forces_n[static_cast<size_t>(b)].normalized();
+      covariance += forces.loaded_covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) *
+                    along_a * along_b.transpose();
+    }
+  }
+  contact.force_sigma_n = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  return contact;
+}
+
+void ContactFinder::AssignIds(std::vector<Contact>& contacts) {
+  for (Contact& contact : contacts) {
+    Contact* nearest = nullptr;
+    double best = options_.same_contact_mm;
+    for (Contact& old : previous_) {
+      const double distance = (old.center_mm - contact.center_mm).norm();
+      if (old.id != 0 && distance < best) {
+        best = distance;
+        nearest = &old;
+      }
+    }
+    contact.id = nearest != nullptr ? nearest->id : next_id_++;
+    if (nearest != nullptr) nearest->id = 0;  // taken
+  }
+  previous_ = contacts;
+}
+
+Vec3 ContactFinder::DeformedNormal(const SkinShape& shape, int path, int ring) const {
+  const int paths = model_.markers.paths, rings = model_.markers.rings();
+  const auto at = [&](int p, int r) -> const Vec3& {
+    return shape.positions_mm[static_cast<size_t>(
+        model_.MarkerIndex((p % paths + paths) % paths, std::clamp(r, 0, rings - 1)))];
+  };
+  const Vec3 around = at(path + 1, ring) - at(path - 1, ring);
+  const Vec3 along = at(path, ring + 1) - at(path, ring - 1);
+  return around.cross(along).normalized();
+}
+
+Vec3 ContactFinder::OuterPoint(const SkinShape& shape, int path, int ring) const {
+  const int paths = model_.markers.paths;
+  const int m = model_.MarkerIndex((path % paths + paths) % paths, ring);
+  return shape.positions_mm[static_cast<size_t>(m)] +
+         model_.markers.center_depth_mm * DeformedNormal(shape, path, ring);
+}
+
+Vec3 ContactFinder::OuterPointAt(const SkinShape& shape, double path, double ring) const {
+  const int path_0 = static_cast<int>(std::floor(path));
+  const int ring_0 = std::clamp(static_cast<int>(std::floor(ring)), 0, model_.markers.rings() - 2);
+  const double a = path - path_0, b = ring - ring_0;
+  return (1 - a) * (1 - b) * OuterPoint(shape, path_0, ring_0) +
+         a * (1 - b) * OuterPoint(shape, path_0 + 1, ring_0) +
+         (1 - a) * b * OuterPoint(shape, path_0, ring_0 + 1) +
+         a * b * OuterPoint(shape, path_0 + 1, ring_0 + 1);
+}
+
+}  // namespace taclink

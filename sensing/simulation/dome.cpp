@@ -1,0 +1,94 @@
+#include "sensing/simulation/dome.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace taclink {
+namespace {
+
+constexpr double kPixelVariance = 1.0 / 12;     // of a square pixel's own averaging, px^2
+constexpr double kSmoothstepHalfWidth = 2.236;  // of the smoothstep that has a Gaussian's variance, in sigmas
+constexpr double kLeastFacing = 0.02;           // flatter sights of the wall draw the dome's profile alone
+constexpr double kHiddenFacing = -0.1;          // the wall turns away
+constexpr double kAmbient = 0.80;               // light from everywhere: the walls scatter it
+constexpr double kLightAside = 0.6;             // the LEDs stand beside the lens, nearer to the wall
+
+// The dome in the plane across the line of sight, with the unit of length mm: u towards the dome's top, w
+// across. Seen is the union of the half disc u > 0 and the half of the base's ellipse u < 0, whose half axis
+// is radius * facing.
+struct DomeSight {
+  Vec2 foot_px;     // u = w = 0
+  Mat2 px_from_mm;  // columns: u, w
+  double facing;    // cosine between the wall's inward normal and the line of sight
+};
+
+bool Look(const Projector& camera, const Dome& dome, DomeSight& sight) {
+  const Vec3 inward = -dome.normal;
+  const Vec3 to_camera = (camera.center_in_link() - dome.foot_mm).normalized();
+  sight.facing = inward.dot(to_camera);
+  if (sight.facing < kHiddenFacing) return false;
+  sight.facing = std::max(sight.facing, kLeastFacing);
+  const Vec3 across = inward - inward.dot(to_camera) * to_camera;
+  const double sine = across.norm();
+  const Vec3 up = sine > 1e-6 ? Vec3(across / sine) : to_camera.unitOrthogonal();
+  // The affine image is taken where the silhouette's centroid is, so that it errs there least.
+  const double rise = 4 * dome.radius_mm / (3 * kPi) * (1 - sight.facing) / 2;
+  const auto seen = camera.ProjectWithJacobian(dome.foot_mm + rise * up);
+  if (!seen) return false;
+  sight.px_from_mm.col(0) = seen->jacobian * up;
+  sight.px_from_mm.col(1) = seen->jacobian * to_camera.cross(up);
+  sight.foot_px = seen->pixel - rise * sight.px_from_mm.col(0) + dome.shift_px;
+  return std::abs(sight.px_from_mm.determinant()) > 1e-9;
+}
+
+}  // namespace
+
+void DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat& gray) {
+  DomeSight sight;
+  if (!Look(camera, dome, sight)) return;
+  const double half_width = kSmoothstepHalfWidth * std::sqrt(blur_px * blur_px + kPixelVariance);
+  const Vec2 extent = dome.radius_mm * sight.px_from_mm.rowwise().norm() + Vec2::Constant(half_width + 1);
+  if (!extent.allFinite() || !sight.foot_px.allFinite()) return;
+  const auto clip = [](double v, int size) {
+    return static_cast<int>(std::clamp(std::ceil(v), 0.0, static_cast<double>(size)));
+  };
+  const int x0 = clip(sight.foot_px.x() - extent.x(), gray.cols),
+            x1 = clip(sight.foot_px.x() + extent.x(), gray.cols);
+  const int y0 = clip(sight.foot_px.y() - extent.y(), gray.rows),
+            y1 = clip(sight.foot_px.y() + extent.y(), gray.rows);
+
+  // In units of the radius from here on; floats, as this is most of a picture's cost.
+  const Eigen::Matrix2f m = (sight.px_from_mm.inverse() / dome.radius_mm).cast<float>();
+  const float u_by_x = m(0, 0), u_by_y = m(0, 1), w_by_x = m(1, 0), w_by_y = m(1, 1);
+  const float facing = static_cast<float>(sight.facing);
+  const float px_by_u = 1 / std::hypot(u_by_x, u_by_y);
+  const float soft = static_cast<float>(0.5 / half_width);
+  const float light_norm = static_cast<float>(1 / std::hypot(1.0, kLightAside));
+  const float ambient = static_cast<float>(kAmbient * dome.level);
+  const float direct = static_cast<float>((1 - kAmbient) * dome.level) * light_norm;
+  const float aside = static_cast<float>(kLightAside);
+  for (int y = y0; y < y1; ++y) {
+    uint8_t* row = gray.ptr<uint8_t>(y);
+    const float dx = static_cast<float>(x0 - sight.foot_px.x()),
+                dy = static_cast<float>(y - sight.foot_px.y());
+    float u = u_by_x * dx + u_by_y * dy, w = w_by_x * dx + w_by_y * dy;
+    for (int x = x0; x < x1; ++x, u += u_by_x, w += w_by_x) {
+      // Signed distances, px, to the ball's outline, (1 - q) over the gradient of q, and to the base's lower
+      // edge.
+      const float q2 = u * u + w * w + 1e-6F;
+      const float gx = u * u_by_x + w * w_by_x, gy = u * u_by_y + w * w_by_y;
+      const float to_outline = (1 - std::sqrt(q2)) * std::sqrt(q2 / (gx * gx + gy * gy + 1e-12F));
+      const float to_base = (u + facing * std::sqrt(std::max(0.0F, 1 - w * w))) * px_by_u;
+      const float inside = std::min(to_outline, to_base);
+      const float t = std::clamp(0.5F + inside * soft, 0.0F, 1.0F);
+      const float cover = t * t * (3 - 2 * t);
+      if (cover <= 0) continue;
+      const float front = std::sqrt(std::max(0.0F, 1 - u * u - w * w));
+      const float shade = ambient + direct * std::max(0.0F, front - aside * u);
+      const float value = static_cast<float>(row[x]) + cover * (shade - static_cast<float>(row[x]));
+      row[x] = static_cast<uint8_t>(std::clamp(value + 0.5F, 0.0F, 255.0F));
+    }
+  }
+}
+
+}  // namespace taclink

@@ -1,0 +1,135 @@
+#include "sensing/simulation/renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "sensing/simulation/occlusion.h"
+#include "sensing/simulation/random.h"
+
+namespace taclink {
+namespace {
+
+constexpr size_t kJitterTableSize = 8192;   // a power of two
+constexpr size_t kNoiseOffsets = 1U << 17;  // frames start at one of so many places of the noise table
+constexpr double kMarkerLevel = 235;        // right before the lens, facing it
+constexpr double kHardlyDeformedMm = 0.5;   // shallower dents hide nothing
+constexpr double kGrazeMm = 0.3;  // a wall this close to the line of sight hides less than half a marker
+
+// Independent streams of one frame.
+enum class Stream : uint64_t { kNoise = 1, kJitter = 2 };
+
+uint64_t FrameBits(uint64_t seed, uint64_t frame, CameraId id, Stream stream) {
+  return MixBits(MixBits(MixBits(seed) + frame) + Index(id) * 16 + static_cast<uint64_t>(stream));
+}
+
+RadiusGrid RestWall(const LinkModel& model) {
+  RadiusGrid wall;
+  wall.columns = 1;
+  constexpr int kRows = 128;
+  for (int i = 0; i <= kRows; ++i) {
+    const Vec3 p = model.PointAtDepth(0, model.length_mm * i / kRows, model.thickness_mm);
+    wall.z_mm.push_back(p.z());
+    wall.radius_mm.push_back(p.x());
+  }
+  wall.row_min_mm = wall.radius_mm;
+  return wall;
+}
+
+std::vector<int> FarToNear(const std::vector<Vec3>& markers, const Vec3& camera_mm) {
+  std::vector<int> order(markers.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return (markers[static_cast<size_t>(a)] - camera_mm).squaredNorm() >
+           (markers[static_cast<size_t>(b)] - camera_mm).squaredNorm();
+  });
+  return order;
+}
+
+}  // namespace
+
+Renderer::Renderer(const LinkModel& model, const StereoRig& rig, const CameraEffects& effects, uint64_t seed)
+    : dome_radius_mm_(model.markers.diameter_mm / 2),
+      light_reach_mm_(1.6 * model.length_mm),
+      effects_(effects),
+      seed_(seed) {
+  const RadiusGrid wall = RestWall(model);
+  const std::vector<Vec3> markers = model.RestMarkers();
+  size_t pixels = 0;
+  for (const CameraId id : kBothCameras) {
+    const Projector projector(rig[id]);
+    Eye eye{projector, MakeBackground(model, rig[id], id, effects, MixBits(seed)),
+            FarToNear(markers, projector.center_in_link())};
+    for (const Vec3& p : markers)
+      eye.hides_at_rest = eye.hides_at_rest || IsHidden(wall, p, projector.center_in_link(), kGrazeMm);
+    pixels = std::max(pixels, eye.background.gray.total());
+    eyes_.push_back(std::move(eye));
+  }
+  std::mt19937_64 rng(MixBits(seed + 1));
+  std::normal_distribution<double> normal;
+  for (size_t i = 0; i < kJitterTableSize; ++i)
+    jitter_px_.emplace_back(effects.marker_jitter_px * normal(rng), effects.marker_jitter_px * normal(rng));
+  if (effects.sensor_noise_levels <= 0) return;
+  noise_above_.resize(pixels + kNoiseOffsets);
+  noise_below_.resize(pixels + kNoiseOffsets);
+  for (size_t i = 0; i < noise_above_.size(); ++i) {
+    const double level = std::clamp(std::round(effects.sensor_noise_levels * normal(rng)), -255.0, 255.0);
+    noise_above_[i] = static_cast<uint8_t>(std::max(level, 0.0));
+    noise_below_[i] = static_cast<uint8_t>(std::max(-level, 0.0));
+  }
+}
+
+bool Renderer::Sees(const SkinTruth& truth, CameraId id, int marker) const {
+  const Eye& eye = eyes_[Index(id)];
+  const bool may_hide = eye.hides_at_rest || truth.inner_wall.largest_inward_change_mm > kHardlyDeformedMm;
+  const Vec3& p = truth.marker_mm[static_cast<size_t>(marker)];
+  return !may_hide || !IsHidden(truth.inner_wall, p, eye.projector.center_in_link(), kGrazeMm);
+}
+
+Dome Renderer::MarkerDome(const SkinTruth& truth, CameraId id, int marker) const {
+  const auto m = static_cast<size_t>(marker);
+  Dome dome{truth.marker_wall_mm[m], truth.marker_normal[m], dome_radius_mm_};
+  // The light falls off slowly: LEDs stand at both ends and the walls scatter.
+  const double distance = (dome.foot_mm - eyes_[Index(id)].projector.center_in_link()).norm();
+  dome.level = effects_.exposure * kMarkerLevel / (1 + distance / light_reach_mm_);
+  if (effects_.marker_jitter_px > 0)
+    dome.shift_px = jitter_px_[(FrameBits(seed_, truth.frame, id, Stream::kJitter) + m) % kJitterTableSize];
+  return dome;
+}
+
+void Renderer::Render(const SkinTruth& truth, CameraId id, cv::Mat& gray) const {
+  const Eye& eye = eyes_[Index(id)];
+  eye.background.gray.copyTo(gray);
+  for (const int marker : eye.far_to_near) {
+    if (Sees(truth, id, marker))
+      DrawDome(eye.projector, MarkerDome(truth, id, marker), effects_.blur_px, gray);
+  }
+  if (noise_above_.empty()) return;
+  const size_t offset = FrameBits(seed_, truth.frame, id, Stream::kNoise) % kNoiseOffsets;
+  // OpenCV takes its inputs as non-const; it does not write them.
+  const auto noise = [&](const std::vector<uint8_t>& table) {
+    return cv::Mat(gray.rows, gray.cols, CV_8U, const_cast<uint8_t*>(table.data() + offset));
+  };
+  cv::add(gray, noise(noise_above_), gray);
+  cv::subtract(gray, noise(noise_below_), gray);
+}
+
+void PackYuyv(const cv::Mat& gray, const cv::Mat& chroma, RawImage& image) {
+  image.format = PixelFormat::kYuyv;
+  image.width_px = gray.cols;
+  image.height_px = gray.rows;
+  image.bytes.resize(2 * gray.total());
+  image.valid = true;
+  // YUYV is a picture of two channels: brightness, and U and V in turn.
+  cv::Mat yuyv(gray.rows, gray.cols, CV_8UC2, image.bytes.data());
+  if (chroma.empty()) {
+    yuyv.setTo(cv::Scalar::all(128));
+    cv::insertChannel(gray, yuyv, 0);
+  } else {
+    const std::array<cv::Mat, 2> channels = {gray, chroma};
+    cv::merge(channels.data(), channels.size(), yuyv);
+  }
+}
+
+}  // namespace taclink

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "sensing/camera/projection.h"
+#include "sensing/core/frame.h"
+#include "sensing/core/link_model.h"
+#include "sensing/simulation/background.h"
+#include "sensing/simulation/dome.h"
+#include "sensing/simulation/scene.h"
+#include "sensing/simulation/skin_truth.h"
+
+namespace taclink {
+
+/// Makes the pictures that a link's cameras take of a skin. A picture depends on the truth (its frame number
+/// picks the noise) and the seed alone. Constant after construction; allocates nothing once its pictures are
+/// made.
+class Renderer {
+ public:
+  Renderer(const LinkModel& model, const StereoRig& rig, const CameraEffects& effects, uint64_t seed);
+
+  /// 8-bit brightness as the sensor delivers it.
+  void Render(const SkinTruth& truth, CameraId id, cv::Mat& gray) const;
+
+  /// Whether the camera can see the marker at all: not behind the skin, in front of the lens.
+  bool Sees(const SkinTruth& truth, CameraId id, int marker) const;
+
+  /// Colour of the surroundings, for PackYuyv.
+  const cv::Mat& chroma(CameraId id) const { return eyes_[Index(id)].background.chroma; }
+
+ private:
+  struct Eye {
+    Projector projector;
+    Background background;
+    std::vector<int> far_to_near;  // marker indices in drawing order
+    bool hides_at_rest = false;    // the undeformed wall already hides a marker
+  };
+
+  Dome MarkerDome(const SkinTruth& truth, CameraId id, int marker) const;
+
+  double dome_radius_mm_;
+  double light_reach_mm_;
+  CameraEffects effects_;
+  uint64_t seed_;
+  std::vector<Eye> eyes_;                           // by camera
+  std::vector<Vec2> jitter_px_;                     // a table of Gaussian shifts
+  std::vector<uint8_t> noise_above_, noise_below_;  // Gaussian noise split by sign
+};
+
+/// YUYV bytes from brightness and colour (`chroma` as in Background; empty: grey). Reuses the image's buffer.
+void PackYuyv(const cv::Mat& gray, const cv::Mat& chroma, RawImage& image);
+
+}  // namespace taclink

@@ -1,0 +1,146 @@
+#include "sensing/simulation/scene.h"
+
+#include <algorithm>
+#include <fstream>
+#include <span>
+#include <utility>
+
+#include "sensing/core/embedded_file.h"
+#include "sensing/core/geometry.h"
+#include "sensing/yaml/yaml_reader.h"
+
+namespace taclink {
+
+std::span<const EmbeddedFile> EmbeddedScenes();
+
+namespace {
+
+constexpr int kFormatVersion = 1;
+
+SkinPlace ReadPlace(YamlMap map) {
+  SkinPlace place;
+  if (map.Has("path") || map.Has("ring")) {
+    place.path = map.Integer("path", {.min = 1, .max = 256});
+    place.ring = map.Integer("ring", {.min = 1, .max = 256});
+  } else {
+    place.angle_rad = RadFromDeg(map.Number("angle_deg", {.min = -3600, .max = 3600}));
+    place.z_mm = map.Number("z_mm", kNotNegative);
+  }
+  map.Done();
+  return place;
+}
+
+SceneContact ReadContact(YamlMap& map, double duration_s) {
+  SceneContact contact;
+  contact.where = map.Where();
+  contact.at = ReadPlace(map.Map("at"));
+  if (map.Has("move_to")) contact.move_to = ReadPlace(map.Map("move_to"));
+  contact.patch_diameter_mm = map.Number("patch_diameter_mm", 5.5, kPositive);
+  if (map.Has("force_n")) contact.force_n = map.Number("force_n", kNotNegative);
+  if (map.Has("depth_mm")) contact.depth_mm = map.Number("depth_mm", kNotNegative);
+  if (contact.force_n.has_value() == contact.depth_mm.has_value())
+    map.Fail("force_n", "or 'depth_mm': give exactly one of them");
+  contact.begin_s = map.Number("begin_s", {.min = 0, .max = duration_s});
+  contact.end_s = map.Number("end_s", {.min = 0, .max = duration_s});
+  contact.ramp_s = map.Number("ramp_s", 0.2, kNotNegative);
+  if (contact.end_s <= contact.begin_s) map.Fail("end_s", "must be after begin_s");
+  if (2 * contact.ramp_s > contact.end_s - contact.begin_s)
+    map.Fail("ramp_s", "must fit twice between begin_s and end_s");
+  map.Done();
+  return contact;
+}
+
+std::vector<PressureKey> ReadPressure(YamlMap& root) {
+  if (!root.Has("pressure_keyframes"))
+    return {{0, root.Number("pressure_kpa", 0.0, {.min = -10, .max = 10})}};
+  if (root.Has("pressure_kpa")) root.Fail("pressure_kpa", "or 'pressure_keyframes': give only one of them");
+  std::vector<PressureKey> keys;
+  for (YamlMap& map : root.Maps("pressure_keyframes")) {
+    const PressureKey key{map.Number("time_s", kNotNegative), map.Number("kpa", {.min = -10, .max = 10})};
+    if (!keys.empty() && key.time_s <= keys.back().time_s) map.Fail("time_s", "must rise from key to key");
+    map.Done();
+    keys.push_back(key);
+  }
+  if (keys.empty()) root.Fail("pressure_keyframes", "must hold at least one {time_s, kpa}");
+  return keys;
+}
+
+CameraEffects ReadCameraEffects(YamlMap map) {
+  CameraEffects effects;
+  effects.marker_jitter_px = map.Number("marker_jitter_px", effects.marker_jitter_px, {.min = 0, .max = 20});
+  effects.sensor_noise_levels =
+      map.Number("sensor_noise_levels", effects.sensor_noise_levels, {.min = 0, .max = 60});
+  effects.blur_px = map.Number("blur_px", effects.blur_px, {.min = 0, .max = 10});
+  effects.exposure = map.Number("exposure", effects.exposure, {.min = 0, .max = 10});
+  effects.glow = map.Number("glow", effects.glow, {.min = 0, .max = 5});
+  effects.vignetting = map.Number("vignetting", effects.vignetting, {.min = 0, .max = 2});
+  map.Done();
+  return effects;
+}
+
+Result<Scene> ReadScene(YamlFile file) {
+  YamlMap& root = file.root();
+  Scene scene;
+  root.Integer("taclink_scene", {.min = kFormatVersion, .max = kFormatVersion});
+  scene.name = root.Text("name");
+  scene.description = root.Text("description", "");
+  scene.model = root.Text("model", "cylinder");
+  scene.frame_rate_hz = root.Number("frame_rate_hz", 30.0, {.min = 0.1, .max = 1000});
+  scene.duration_s = root.Number("duration_s", {.min = 0.01, .max = 1e6});
+  scene.loop = root.Bool("loop", true);
+  scene.seed = static_cast<uint64_t>(root.Integer("seed", 1, kNotNegative));
+  scene.pressure = ReadPressure(root);
+  for (YamlMap& map : root.Maps("contacts")) scene.contacts.push_back(ReadContact(map, scene.duration_s));
+  if (scene.contacts.size() > kMaxSceneContacts)
+    root.Fail("contacts", "must be at most " + std::to_string(kMaxSceneContacts));
+  scene.camera = ReadCameraEffects(root.Map("camera"));
+  root.Done();
+  if (auto good = file.Finish(); !good) return good.error();
+  return scene;
+}
+
+}  // namespace
+
+double Scene::PressureKpa(double time_s) const {
+  const auto after = std::find_if(pressure.begin(), pressure.end(),
+                                  [&](const PressureKey& key) { return key.time_s > time_s; });
+  if (after == pressure.begin()) return pressure.front().kpa;
+  const PressureKey& left = *(after - 1);
+  if (after == pressure.end()) return left.kpa;
+  const double share = (time_s - left.time_s) / (after->time_s - left.time_s);
+  return left.kpa + share * (after->kpa - left.kpa);
+}
+
+Result<Scene> ParseScene(const std::string& name, std::string_view text) {
+  auto file = YamlFile::Parse(name, text);
+  if (!file) return file.error();
+  return ReadScene(std::move(*file));
+}
+
+Result<Scene> LoadScene(const std::string& name_or_path) {
+  if (const auto text = ShippedSceneText(name_or_path); !text.empty()) return ParseScene(name_or_path, text);
+  if (!std::ifstream(name_or_path)) {
+    std::string names;
+    for (const auto& name : ShippedSceneNames()) names += (names.empty() ? "" : ", ") + name;
+    return Error{ErrorCode::kNotFound,
+                 "scene '" + name_or_path + "' is neither a file nor a shipped scene (" + names + ")"};
+  }
+  auto file = YamlFile::Load(name_or_path);
+  if (!file) return file.error();
+  return ReadScene(std::move(*file));
+}
+
+std::vector<std::string> ShippedSceneNames() {
+  std::vector<std::string> names;
+  for (const auto& file : EmbeddedScenes()) names.emplace_back(file.name.substr(0, file.name.rfind('.')));
+  return names;
+}
+
+std::string_view ShippedSceneText(const std::string& name) {
+  for (const auto& file : EmbeddedScenes()) {
+    if (file.name == name + ".yaml") return file.content;
+  }
+  return {};
+}
+
+}  // namespace taclink

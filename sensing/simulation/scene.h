@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sensing/core/result.h"
+
+namespace taclink {
+
+/// A place on the skin: a marker's, or any.
+struct SkinPlace {
+  int path = 0;  ///< from 1; 0: angle_rad and z_mm say where
+  int ring = 0;  ///< from 1
+  double angle_rad = 0;
+  double z_mm = 0;
+};
+
+/// Something that pushes radially inward with an even load over a round patch.
+struct SceneContact {
+  SkinPlace at;
+  std::optional<SkinPlace> move_to;  ///< slides there from begin to end at an even speed
+  double patch_diameter_mm = 5.5;
+  // Exactly one of the two is set.
+  std::optional<double> force_n;
+  std::optional<double> depth_mm;  ///< of the centre, radially from the undeformed surface
+  double begin_s = 0;
+  double end_s = 0;
+  double ramp_s = 0;  ///< smooth rise after begin and fall before end
+  std::string where;  ///< "file:line", for messages
+};
+
+struct PressureKey {
+  double time_s = 0;
+  double kpa = 0;
+};
+
+/// How the cameras depart from ideal ones. Levels are of 255.
+struct CameraEffects {
+  double marker_jitter_px = 0;     ///< standard deviation of each drawn marker's shift, each axis
+  double sensor_noise_levels = 2;  ///< standard deviation of each pixel
+  double blur_px = 0.7;            ///< standard deviation of the lens' blur
+  double exposure = 1;             ///< scales all brightness
+  double glow = 1;                 ///< of the far LED ring; 0: none
+  double vignetting = 1;           ///< darkening to the picture's edge; 0: none
+};
+
+/// What happens to a simulated link, over time.
+struct Scene {
+  std::string name;
+  std::string description;
+  std::string model;  ///< a shipped link model's name or a file's path
+  double frame_rate_hz = 30;
+  double duration_s = 0;
+  bool loop = true;
+  uint64_t seed = 1;
+  std::vector<PressureKey> pressure;  ///< at least one; straight lines between them, constant outside
+  std::vector<SceneContact> contacts;
+  CameraEffects camera;
+
+  double PressureKpa(double time_s) const;  ///< time within [0, duration_s]
+};
+
+inline constexpr int kMaxSceneContacts = 16;
+
+/// Loads a scene: the name of a shipped one or a path of a YAML file.
+/// Errors: kNotFound (names the shipped ones), kInvalidArgument (file, line, what was expected).
+Result<Scene> LoadScene(const std::string& name_or_path);
+
+/// Parses a scene file's text; `name` stands for the file in messages.
+Result<Scene> ParseScene(const std::string& name, std::string_view text);
+
+std::vector<std::string> ShippedSceneNames();
+
+/// A shipped scene's file, to copy and change. Empty: no such scene.
+std::string_view ShippedSceneText(const std::string& name);
+
+}  // namespace taclink

@@ -1,0 +1,87 @@
+#include "sensing/simulation/simulated_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace taclink {
+
+Result<std::unique_ptr<SimulatedSource>> SimulatedSource::Make(const LinkModel& model, const Scene& scene,
+                                                               Clock& clock) {
+  auto skin = SimulatedSkin::Make(model, scene);
+  if (!skin) return skin.error();
+  return std::unique_ptr<SimulatedSource>(new SimulatedSource(model, scene, clock, std::move(*skin)));
+}
+
+SimulatedSource::SimulatedSource(const LinkModel& model, Scene scene, Clock& clock,
+                                 std::unique_ptr<SimulatedSkin> skin)
+    : scene_(std::move(scene)),
+      clock_(clock),
+      skin_(std::move(skin)),
+      renderer_(model, model.nominal_rig, scene_.camera, scene_.seed) {
+  const CameraModel& camera = model.nominal_rig[CameraId::kTop];
+  info_ = {"simulated scene '" + scene_.name + "' on model '" + model.name + "'", camera.width_px,
+           camera.height_px, scene_.frame_rate_hz};
+  truth_.contacts.reserve(kMaxSceneContacts);
+}
+
+Result<void> SimulatedSource::Start() {
+  started_ = true;
+  start_ns_ = clock_.MonotonicNs();
+  next_frame_ = 0;
+  return {};
+}
+
+SourceInfo SimulatedSource::Info() const {
+  return info_;
+}
+
+int64_t SimulatedSource::ExposureNs(uint64_t frame) const {
+  return start_ns_ + std::llround(static_cast<double>(frame) * 1e9 / scene_.frame_rate_hz);
+}
+
+Result<void> SimulatedSource::Next(StereoFrame& frame, std::chrono::milliseconds timeout) {
+  if (!started_) return Error{ErrorCode::kUnavailable, info_.description + ": not started"};
+  const int64_t now = clock_.MonotonicNs();
+  const int64_t deadline = now + std::chrono::nanoseconds(timeout).count();
+  uint64_t due = next_frame_;
+  while (ExposureNs(due + 1) <= now) {  // late: skip to the newest, most of the way at once
+    const double behind = static_cast<double>(now - ExposureNs(due)) * 1e-9 * scene_.frame_rate_hz;
+    due += std::max<uint64_t>(1, behind > 2 ? static_cast<uint64_t>(behind) - 1 : 1);
+  }
+  if (!scene_.loop && static_cast<double>(due) > scene_.duration_s * scene_.frame_rate_hz)
+    return Error{ErrorCode::kEndOfData, info_.description + ": the scene is over"};
+  const int64_t exposure = ExposureNs(due);
+  if (exposure > deadline) {
+    clock_.SleepUntilMonotonicNs(deadline);
+    return Error{ErrorCode::kTimeout, info_.description + ": no frame yet"};
+  }
+  if (exposure > now) clock_.SleepUntilMonotonicNs(exposure);
+  Take(due, frame);
+  next_frame_ = due + 1;
+  return {};
+}
+
+void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
+  skin_->Evaluate(static_cast<double>(frame_number) / scene_.frame_rate_hz, truth_);
+  for (const CameraId id : kBothCameras) {
+    renderer_.Render(truth_, id, gray_);
+    PackYuyv(gray_, renderer_.chroma(id), frame.images[Index(id)]);
+  }
+  frame.sequence = frame_number;
+  frame.pressure_mpa = truth_.pressure_mpa;
+  frame.times = {};
+  frame.times.exposure_monotonic_ns = ExposureNs(frame_number);
+  const int64_t now = clock_.MonotonicNs();
+  frame.times.exposure_utc_ns = clock_.UtcNs() - now + frame.times.exposure_monotonic_ns;
+  frame.times.received_ns = now;
+}
+
+Result<std::unique_ptr<FrameSource>> MakeSimulatedSource(const LinkModel& model, const Scene& scene,
+                                                         Clock& clock) {
+  auto source = SimulatedSource::Make(model, scene, clock);
+  if (!source) return source.error();
+  return std::unique_ptr<FrameSource>(std::move(*source));
+}
+
+}  // namespace taclink

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "sensing/capture/frame_source.h"
+#include "sensing/core/clock.h"
+#include "sensing/core/link_model.h"
+#include "sensing/core/result.h"
+#include "sensing/simulation/renderer.h"
+#include "sensing/simulation/scene.h"
+#include "sensing/simulation/simulated_skin.h"
+
+namespace taclink {
+
+/// Plays a scene as a pair of cameras would deliver it: YUYV at the scene's rate by the clock. Frame k of the
+/// scene has the sequence number k, whatever was skipped.
+class SimulatedSource final : public FrameSource {
+ public:
+  /// The cameras are the model's nominal ones. Errors: kInvalidArgument (the scene does not fit the model).
+  static Result<std::unique_ptr<SimulatedSource>> Make(const LinkModel& model, const Scene& scene,
+                                                       Clock& clock);
+
+  Result<void> Start() override;  ///< from the scene's beginning
+  Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override;
+  SourceInfo Info() const override;
+
+  /// Of the last frame.
+  const SkinTruth& truth() const { return truth_; }
+
+ private:
+  SimulatedSource(const LinkModel& model, Scene scene, Clock& clock, std::unique_ptr<SimulatedSkin> skin);
+  int64_t ExposureNs(uint64_t frame) const;
+  void Take(uint64_t frame_number, StereoFrame& frame);
+
+  // Constant after construction.
+  Scene scene_;
+  Clock& clock_;
+  std::unique_ptr<SimulatedSkin> skin_;
+  Renderer renderer_;
+  SourceInfo info_;
+  // Changed by Start and Next.
+  bool started_ = false;
+  int64_t start_ns_ = 0;
+  uint64_t next_frame_ = 0;
+  SkinTruth truth_;
+  cv::Mat gray_;
+};
+
+Result<std::unique_ptr<FrameSource>> MakeSimulatedSource(const LinkModel& model, const Scene& scene,
+                                                         Clock& clock);
+
+}  // namespace taclink

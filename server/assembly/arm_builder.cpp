@@ -1,0 +1,41 @@
+#include "server/assembly/arm_builder.h"
+
+#include <utility>
+
+#include "sensing/model/model_file.h"
+#include "server/assembly/processor_factory.h"
+#include "server/assembly/source_factory.h"
+
+namespace taclink::server {
+namespace {
+
+Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
+  auto model = LoadLinkModel(link.model);
+  if (!model) return model.error();
+  auto source = MakeSource(link, *model, clock);
+  if (!source) return source.error();
+  auto process = MakeProcessor(link, *model);
+  if (!process) return process.error();
+  return LinkParts{.description = {.name = link.name,
+                                   .model = std::move(*model),
+                                   .base_from_link = link.BaseFromLink(),
+                                   .source = static_cast<SourceKind>(link.source.index())},
+                   .source = std::move(*source),
+                   .process = std::move(*process)};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock) {
+  std::vector<LinkParts> links;
+  std::vector<std::string> names;
+  for (const LinkConfig& link : config.links) {
+    auto parts = BuildLink(link, clock);
+    if (!parts) return Error{parts.error().code, "link '" + link.name + "': " + parts.error().message};
+    links.push_back(std::move(*parts));
+    names.push_back(link.name);
+  }
+  return std::make_unique<Arm>(config.arm_name, std::move(links), MakeEncoder(names), clock);
+}
+
+}  // namespace taclink::server

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <memory>
+
+#include "sensing/core/clock.h"
+#include "server/arm.h"
+#include "server/config.h"
+
+namespace taclink::server {
+
+/// Builds the configured arm, not started. Errors name the link.
+Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock);
+
+/// The API's bytes of a state of the arm's links, named by index.
+FrameEncoder MakeEncoder(const std::vector<std::string>& link_names);
+
+}  // namespace taclink::server

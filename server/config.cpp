@@ -1,0 +1,171 @@
+#include "server/config.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <span>
+#include <sstream>
+
+#include "sensing/core/embedded_file.h"
+#include "sensing/yaml/yaml_reader.h"
+#include "server/config_names.h"
+
+namespace taclink {
+std::span<const EmbeddedFile> EmbeddedConfigs();
+}
+
+namespace taclink::server {
+namespace {
+
+constexpr Range kPixels{.min = 16, .max = 16384};
+constexpr Range kFrameRate{.min = 0.01, .max = 1000};
+constexpr double kLongestArmMm = 1e5;
+
+struct Reader {
+  std::string folder;
+
+  std::string Path(const std::string& path) const {
+    return (std::filesystem::path(folder) / path).lexically_normal().string();
+  }
+  // Models and scenes: a bare word names a shipped one.
+  std::string NameOrPath(const std::string& text) const {
+    const bool path =
+        text.find('/') != std::string::npos || text.ends_with(".yaml") || text.ends_with(".yml");
+    return path ? Path(text) : text;
+  }
+
+  SourceConfig ReadSource(YamlMap& link) const;
+  LinkConfig ReadLink(YamlMap link) const;
+};
+
+V4l2SourceConfig ReadV4l2(YamlMap& link) {
+  V4l2SourceConfig config;
+  const auto devices = link.Texts("devices");
+  if (devices.size() == kCameraCount) {
+    std::copy(devices.begin(), devices.end(), config.devices.begin());
+  } else {
+    link.Fail("devices", "must be a list of two device paths, the top and the bottom camera's");
+  }
+  config.width_px = link.Integer("width_px", config.width_px, kPixels);
+  config.height_px = link.Integer("height_px", config.height_px, kPixels);
+  config.frame_rate_hz = link.Number("frame_rate_hz", config.frame_rate_hz, kFrameRate);
+  config.format = kCameraFormats[link.Choice("format", {kFormatNames.begin(), kFormatNames.end()}, 0)];
+  if (link.Has("exposure_100us")) config.exposure_100us = link.Integer("exposure_100us", {.min = 1});
+  if (link.Has("gain")) config.gain = link.Integer("gain", kNotNegative);
+  return config;
+}
+
+SourceConfig Reader::ReadSource(YamlMap& link) const {
+  switch (link.Choice("source", {kSourceNames.begin(), kSourceNames.end()})) {
+    case 0:
+      return ReadV4l2(link);
+    case 1: {
+      FileSourceConfig config;
+      config.folder = Path(link.Text("folder"));
+      config.frame_rate_hz = link.Number("frame_rate_hz", config.frame_rate_hz, kFrameRate);
+      config.loop = link.Bool("loop", config.loop);
+      return config;
+    }
+    default:
+      return SimulatedSourceConfig{.scene = NameOrPath(link.Text("scene"))};
+  }
+}
+
+bool GoodName(const std::string& name) {
+  const auto good = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.'; };
+  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), good);
+}
+
+LinkConfig Reader::ReadLink(YamlMap link) const {
+  LinkConfig config;
+  config.name = link.Text("name");
+  if (!GoodName(config.name)) link.Fail("name", "must be 1 to 64 letters, digits, '_', '-' or '.'");
+  config.model = NameOrPath(link.Text("model"));
+  config.source = ReadSource(link);
+  if (link.Has("calibration")) config.calibration = Path(link.Text("calibration"));
+  if (link.Has("pressure_kpa")) config.pressure_kpa = link.Number("pressure_kpa", {.min = -100, .max = 100});
+  if (YamlMap pose = link.Map("pose"); link.Has("pose")) {
+    const auto position = pose.Numbers("position_mm", 3, {.min = -kLongestArmMm, .max = kLongestArmMm});
+    std::copy_n(position.begin(), 3, config.position_mm.begin());
+    if (pose.Has("rotation_deg")) {
+      const auto rotation = pose.Numbers("rotation_deg", 3, {.min = -360, .max = 360});
+      std::copy_n(rotation.begin(), 3, config.rotation_deg.begin());
+    }
+    pose.Done();
+  }
+  link.Done();
+  return config;
+}
+
+void ReadServer(YamlMap& root, Config& config) {
+  YamlMap server = root.Map("server");
+  config.listen = server.Text("listen", config.listen);
+  if (const auto good = CheckListenAddress(config.listen); !good) server.Fail("listen", good.error().message);
+  server.Done();
+  YamlMap limits = root.Map("limits");
+  config.limits.max_streams =
+      limits.Integer("max_streams", config.limits.max_streams, {.min = 1, .max = 10000});
+  config.limits.queue_messages =
+      limits.Integer("queue_messages", config.limits.queue_messages, {.min = 1, .max = 100000});
+  limits.Done();
+}
+
+void ReadArm(YamlMap& root, const Reader& reader, Config& config) {
+  YamlMap arm = root.Map("arm");
+  config.arm_name = arm.Text("name");
+  if (!GoodName(config.arm_name)) arm.Fail("name", "must be 1 to 64 letters, digits, '_', '-' or '.'");
+  std::set<std::string> names;
+  for (YamlMap& link : arm.Maps("links")) {
+    config.links.push_back(reader.ReadLink(link));
+    if (!names.insert(config.links.back().name).second) link.Fail("name", "is used by another link");
+  }
+  if (config.links.empty()) arm.Fail("links", "must name at least one link");
+  arm.Done();
+}
+
+}  // namespace
+
+Result<Config> ParseConfig(const std::string& name, std::string_view text, const std::string& folder) {
+  auto file = YamlFile::Parse(name, text);
+  if (!file) return file.error();
+  YamlMap& root = file->root();
+  const int version = root.Integer("taclink_config");
+  if (version != kConfigVersion) root.Fail("taclink_config", "must be 1, the version of this format");
+  Config config;
+  ReadServer(root, config);
+  ReadArm(root, Reader{folder}, config);
+  root.Done();
+  if (const auto finished = file->Finish(); !finished) return finished.error();
+  return config;
+}
+
+Result<Config> LoadConfig(const std::string& path) {
+  const std::ifstream in(path);
+  if (!in || std::filesystem::is_directory(path)) {
+    return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
+  }
+  std::ostringstream text;
+  text << in.rdbuf();
+  return ParseConfig(path, text.str(), std::filesystem::path(path).parent_path().string());
+}
+
+std::string_view DemoConfigText() {
+  return EmbeddedConfigs().front().content;
+}
+
+Result<Config> DemoConfig() {
+  return ParseConfig("demo.yaml", DemoConfigText(), "");
+}
+
+Rigid3 LinkConfig::BaseFromLink() const {
+  const auto about = [this](size_t axis, const Vec3& unit) {
+    return Eigen::AngleAxisd(RadFromDeg(rotation_deg[axis]), unit);
+  };
+  const Mat3 rotation =
+      (about(2, Vec3::UnitZ()) * about(1, Vec3::UnitY()) * about(0, Vec3::UnitX())).toRotationMatrix();
+  return {rotation, Vec3(position_mm[0], position_mm[1], position_mm[2])};
+}
+
+}  // namespace taclink::server

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "sensing/core/frame.h"
+#include "sensing/core/geometry.h"
+#include "sensing/core/result.h"
+
+namespace taclink::server {
+
+struct V4l2SourceConfig {
+  std::array<std::string, kCameraCount> devices;  ///< top, bottom
+  int width_px = 640;
+  int height_px = 480;
+  double frame_rate_hz = 30;
+  PixelFormat format = PixelFormat::kYuyv;
+  std::optional<int> exposure_100us;  ///< none: the camera decides
+  std::optional<int> gain;
+};
+
+struct FileSourceConfig {
+  std::string folder;
+  double frame_rate_hz = 30;
+  bool loop = true;
+};
+
+struct SimulatedSourceConfig {
+  std::string scene;  ///< name of a shipped one or path
+};
+
+using SourceConfig = std::variant<V4l2SourceConfig, FileSourceConfig, SimulatedSourceConfig>;
+
+struct LinkConfig {
+  std::string name;
+  std::string model;  ///< name of a shipped one or path
+  SourceConfig source;
+  std::optional<std::string> calibration;  ///< path; none: from the first rest picture
+  std::optional<double> pressure_kpa;      ///< gauge, constant; none: the source's, or 0
+  std::array<double, 3> position_mm{};     ///< of the link frame's origin in the base frame
+  /// Roll, pitch, yaw about the base frame's fixed x, y, z, applied in this order (as in URDF).
+  std::array<double, 3> rotation_deg{};
+
+  Rigid3 BaseFromLink() const;
+};
+
+struct LimitsConfig {
+  int max_streams = 64;
+  int queue_messages = 256;  ///< frames that can wait for one stream with `every`
+};
+
+/// All that `taclinkd` is told. Paths are usable as they stand.
+struct Config {
+  std::string listen = "127.0.0.1:50051";  ///< host:port, [ip6]:port or unix:path; port 0: any free one
+  LimitsConfig limits;
+  std::string arm_name;
+  std::vector<LinkConfig> links;
+};
+
+/// Errors: kNotFound, kInvalidArgument with file, line and what was expected.
+Result<Config> LoadConfig(const std::string& path);
+/// `name` stands for the file in messages; relative paths in the text are relative to `folder`.
+Result<Config> ParseConfig(const std::string& name, std::string_view text, const std::string& folder);
+/// The simulated arm that runs when there is no file.
+Result<Config> DemoConfig();
+std::string_view DemoConfigText();
+
+/// As a file that reads back to the same.
+std::string ConfigText(const Config& config);
+
+/// Errors: kInvalidArgument (no such form of address).
+Result<void> CheckListenAddress(const std::string& address);
+/// Whether only this machine can connect there.
+bool IsLoopback(const std::string& address);
+
+}  // namespace taclink::server

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "sensing/core/link_state.h"
+#include "wire/detail.h"
+
+namespace taclink::server {
+
+/// Makes the bytes of a state of link `link` at a level of detail. Called by several threads at a time.
+using FrameEncoder = std::function<std::string(size_t link, const LinkState& state, Detail detail)>;
+
+/// One published state, shared by all who want it.
+class Publication {
+ public:
+  Publication(size_t link, uint64_t order, std::shared_ptr<const LinkState> state,
+              const FrameEncoder& encoder)
+      : link_(link), order_(order), state_(std::move(state)), encoder_(encoder) {}
+
+  size_t link() const { return link_; }
+  uint64_t order() const { return order_; }  ///< rises from publication to publication of the hub
+  const LinkState& state() const { return *state_; }
+  /// Encoded by the first who asks, once for each level of detail.
+  std::shared_ptr<const std::string> Encoded(Detail detail) const;
+
+ private:
+  // Constant after construction.
+  const size_t link_;
+  const uint64_t order_;
+  const std::shared_ptr<const LinkState> state_;
+  const FrameEncoder& encoder_;  // the hub's, which outlives its publications
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  mutable std::array<std::shared_ptr<const std::string>, kDetailCount> encoded_;
+};
+using PublicationPtr = std::shared_ptr<const Publication>;
+
+/// What happens to states that a subscriber is too slow for.
+enum class Delivery : uint8_t {
+  kLatest,  ///< only the newest of each link waits
+  kEvery,   ///< all wait in order; when the queue is full the oldest falls out, so that what is left is one
+            ///< piece
+};
+
+struct SubscriberOptions {
+  std::vector<bool> links;  ///< by link: wanted; empty: all
+  Delivery delivery = Delivery::kLatest;
+  double max_rate_hz = 0;       ///< of each link; 0: all
+  size_t queue_capacity = 256;  ///< with kEvery, states of all links together
+};
+
+struct DeliveryCounts {
+  uint64_t taken = 0;
+  uint64_t dropped = 0;  ///< wanted, but replaced or pushed out before they were taken
+};
+
+class SubscriberQueue;
+
+/// A place in the hub's list of receivers; leaves the list when it is destroyed. Take from one thread at a
+/// time.
+class Subscription {
+ public:
+  explicit Subscription(std::shared_ptr<SubscriberQueue> queue) : queue_(std::move(queue)) {}
+  ~Subscription();
+  Subscription(const Subscription&) = delete;
+  Subscription& operator=(const Subscription&) = delete;
+
+  /// The next state, at once. Null: there is none, and the next one to come will be notified.
+  PublicationPtr Take();
+  std::vector<DeliveryCounts> Counts() const;  ///< by link
+  uint64_t dropped() const;                    ///< of all links
+  size_t waiting() const;
+  size_t capacity() const;
+
+ private:
+  const std::shared_ptr<SubscriberQueue> queue_;
+};
+
+/// Hands every link's states to all subscribers. A publisher never waits for a subscriber: what a slow one
+/// can't take is dropped and counted. Memory is bounded by the subscribers' queues.
+class Hub {
+ public:
+  Hub(size_t links, FrameEncoder encoder);
+  ~Hub();
+
+  /// Called by one thread for each link; different links at any time.
+  void Publish(size_t link, std::shared_ptr<const LinkState> state);
+
+  /// `notify` is called, by a publisher and outside any lock, when a state arrives after Take found none; it
+  /// must be quick and must not throw. One call may still be under way when the subscription is destroyed, so
+  /// it may hold only what outlives that. kLatest begins with the newest state of each link. The hub must
+  /// outlive the subscription.
+  std::unique_ptr<Subscription> Subscribe(SubscriberOptions options, std::function<void()> notify);
+
+  /// The newest state of a link; null: none yet.
+  PublicationPtr Latest(size_t link) const;
+  size_t links() const { return links_; }
+
+ private:
+  using Queues = std::vector<std::weak_ptr<SubscriberQueue>>;
+
+  // Constant after construction.
+  const size_t links_;
+  const FrameEncoder encoder_;
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  std::vector<PublicationPtr> latest_;    // by link
+  std::shared_ptr<const Queues> queues_;  // replaced as a whole, so that publishers iterate without the lock
+  uint64_t next_order_ = 0;
+};
+
+}  // namespace taclink::server

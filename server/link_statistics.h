@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <vector>
+
+namespace taclink::server {
+
+/// Measured over a link's last frames.
+struct LinkStatistics {
+  double rate_hz = 0;         ///< over the last 2 s; 0: no frames
+  double latency_p50_ms = 0;  ///< exposure to published, last 300 frames; 0: none yet
+  double latency_p99_ms = 0;
+  uint64_t frames = 0;          ///< solved since the start
+  uint64_t frames_skipped = 0;  ///< exposed but not solved, since the start
+};
+
+class LinkStatisticsCollector {
+ public:
+  LinkStatisticsCollector();
+
+  /// A frame was published. A sequence that does not rise means that the source began anew.
+  void Record(uint64_t sequence, int64_t exposure_ns, int64_t published_ns);
+  LinkStatistics Snapshot(int64_t now_ns) const;
+
+ private:
+  struct Entry {
+    int64_t published_ns = 0;
+    int64_t latency_ns = 0;
+  };
+
+  double Rate(int64_t now_ns) const;
+
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  std::vector<Entry> ring_;  // frames_ % size is the next place
+  uint64_t frames_ = 0;
+  uint64_t frames_skipped_ = 0;
+  uint64_t last_sequence_ = 0;
+};
+
+}  // namespace taclink::server

@@ -1,0 +1,124 @@
+#include "server/link_worker.h"
+
+#include <spdlog/spdlog.h>
+
+#include <exception>
+#include <utility>
+
+namespace taclink::server {
+namespace {
+
+// A state that says nothing but `status`; its buffers stay.
+void ResetTo(LinkState& state, LinkStatus status, std::string reason) {
+  state.times = {};
+  state.status = status;
+  state.status_reason = std::move(reason);
+  state.pressure_mpa.reset();
+  state.cameras = {};
+  state.shape.positions_mm.clear();
+  state.shape.displacements_mm.clear();
+  state.shape.covariances_mm2.clear();
+  state.shape.sources.clear();
+  state.forces.forces_n.clear();
+  state.forces.sigmas_n.clear();
+  state.forces.residual = 0;
+  state.forces.converged = true;
+  state.contacts.clear();
+  state.total_force_n = Vec3::Zero();
+  state.baseline_age_s = 0;
+  state.stage_ms = {};
+}
+
+}  // namespace
+
+LinkWorker::LinkWorker(size_t link, std::string name, std::unique_ptr<FrameSource> source,
+                       FrameProcessor process, Hub& hub, Clock& clock, LinkWorkerOptions options)
+    : link_(link),
+      name_(std::move(name)),
+      process_(std::move(process)),
+      hub_(hub),
+      clock_(clock),
+      options_(options),
+      supervisor_(name_, std::move(source), clock, options.supervisor) {}
+
+LinkWorker::~LinkWorker() {
+  Stop();
+}
+
+void LinkWorker::Start() {
+  capture_ = std::jthread([this](const std::stop_token& stop) { Capture(stop); });
+  solve_ = std::jthread([this](const std::stop_token& stop) { Solve(stop); });
+}
+
+void LinkWorker::RequestStop() {
+  capture_.request_stop();
+  solve_.request_stop();
+}
+
+void LinkWorker::Stop() {
+  RequestStop();
+  if (capture_.joinable()) capture_.join();
+  if (solve_.joinable()) solve_.join();
+}
+
+void LinkWorker::Capture(const std::stop_token& stop) {
+  StereoFrame frame;
+  while (!stop.stop_requested()) {
+    if (supervisor_.Next(frame, options_.poll)) mailbox_.Put(frame);
+  }
+}
+
+void LinkWorker::Solve(const std::stop_token& stop) {
+  StereoFrame frame;
+  while (!stop.stop_requested()) {
+    if (mailbox_.Take(frame, options_.poll)) {
+      SolveOne(frame);
+    } else {
+      PublishStatusIfDue();
+    }
+  }
+}
+
+void LinkWorker::SolveOne(const StereoFrame& frame) {
+  auto state = pool_.Acquire();
+  try {
+    process_(frame, *state);
+  } catch (const std::exception& e) {
+    spdlog::error("link {}: frame {} could not be processed: {}", name_, frame.sequence, e.what());
+    ResetTo(*state, LinkStatus::kLost, std::string("processing failed: ") + e.what());
+    state->times = frame.times;
+  }
+  state->sequence = frame.sequence;
+  last_sequence_ = frame.sequence;
+  const int64_t exposure_ns = frame.times.exposure_monotonic_ns;
+  Publish(std::move(state));
+  statistics_.Record(frame.sequence, exposure_ns, last_published_ns_);
+}
+
+void LinkWorker::PublishStatusIfDue() {
+  const SourceCondition condition = supervisor_.condition();
+  const bool running = condition.state == SourceCondition::State::kRunning;
+  const bool news = !running && condition.changes != reported_changes_;
+  const int64_t silence_ns = clock_.MonotonicNs() - last_published_ns_;
+  const bool due =
+      last_published_ns_ == 0 || silence_ns >= std::chrono::nanoseconds(options_.heartbeat).count();
+  if (!news && !due) return;
+  reported_changes_ = condition.changes;
+
+  auto state = pool_.Acquire();
+  if (condition.state == SourceCondition::State::kStarting) {
+    ResetTo(*state, LinkStatus::kStarting, "waiting for the first frame");
+  } else {
+    ResetTo(*state, LinkStatus::kLost, running ? "no new frame; waiting" : condition.reason);
+  }
+  state->sequence = last_sequence_;
+  Publish(std::move(state));
+}
+
+void LinkWorker::Publish(std::unique_ptr<LinkState> state) {
+  last_published_ns_ = clock_.MonotonicNs();
+  state->times.published_ns = last_published_ns_;
+  hub_.Publish(link_, pool_.Share(std::move(state)));
+}
+
+}  // namespace taclink::server

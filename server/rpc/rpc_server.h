@@ -1,0 +1,42 @@
+#pragma once
+
+#include <grpcpp/server.h>
+
+#include <boost/asio/thread_pool.hpp>
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "sensing/core/result.h"
+#include "server/arm.h"
+#include "server/rpc/tactile_service.h"
+
+namespace taclink::server {
+
+/// gRPC over one arm: TactileService, health, reflection. The arm must outlive it.
+class RpcServer {
+ public:
+  /// Listens at once. Errors: kUnavailable (the address can't be had).
+  static Result<std::unique_ptr<RpcServer>> Start(const std::string& listen, Arm& arm, ServiceLimits limits);
+  ~RpcServer();
+
+  /// Tells every stream why, then ends all calls by `patience` at the latest. May be called twice.
+  void Shutdown(const std::string& reason, std::chrono::milliseconds patience);
+
+  /// Where it listens, with the real port.
+  const std::string& address() const { return address_; }
+  /// For calls from within this process.
+  std::shared_ptr<grpc::Channel> InProcessChannel() { return server_->InProcessChannel({}); }
+  size_t streams() const { return service_.streams(); }
+
+ private:
+  RpcServer(Arm& arm, ServiceLimits limits);
+
+  // Constant after Start. The service outlives the server that calls it.
+  const std::shared_ptr<boost::asio::thread_pool> senders_;
+  TactileService service_;
+  std::unique_ptr<grpc::Server> server_;
+  std::string address_;
+};
+
+}  // namespace taclink::server

@@ -1,0 +1,129 @@
+#include "server/source_supervisor.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+namespace taclink::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+
+int64_t Ns(milliseconds duration) {
+  return nanoseconds(duration).count();
+}
+
+// Libraries below a source may throw; that must not end the link's thread.
+template <typename F>
+Result<void> Guarded(F call) {
+  try {
+    return call();
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInternal, e.what()};
+  }
+}
+
+}  // namespace
+
+SourceSupervisor::SourceSupervisor(std::string name, std::unique_ptr<FrameSource> source, Clock& clock,
+                                   SupervisorOptions options)
+    : name_(std::move(name)),
+      source_(std::move(source)),
+      clock_(clock),
+      options_(options),
+      backoff_(options.first_backoff) {}
+
+bool SourceSupervisor::Next(StereoFrame& frame, milliseconds timeout) {
+  if (started_) return TryNext(frame, timeout);
+  const bool ended = condition().state == SourceCondition::State::kEnded;
+  const int64_t now = clock_.MonotonicNs();
+  if (ended || now < retry_at_ns_) {
+    Wait(ended ? now + Ns(timeout) : retry_at_ns_, timeout);
+  } else {
+    TryStart();
+  }
+  return false;
+}
+
+void SourceSupervisor::Wait(int64_t until_ns, milliseconds timeout) {
+  clock_.SleepUntilMonotonicNs(std::min(until_ns, clock_.MonotonicNs() + Ns(timeout)));
+}
+
+void SourceSupervisor::TryStart() {
+  if (std::exchange(ever_tried_, true)) {
+    const std::lock_guard lock(mutex_);
+    ++condition_.restarts;
+  }
+  const auto result = Guarded([this] { return source_->Start(); });
+  if (!result) return Failed(result.error());
+  started_ = true;
+  alive_at_ns_ = clock_.MonotonicNs();
+  const SourceInfo info = source_->Info();
+  spdlog::info("link {}: source started: {}", name_, info.description);
+  const std::lock_guard lock(mutex_);
+  condition_.info = info;
+}
+
+bool SourceSupervisor::TryNext(StereoFrame& frame, milliseconds timeout) {
+  const auto result = Guarded([&] { return source_->Next(frame, timeout); });
+  if (result) {
+    alive_at_ns_ = clock_.MonotonicNs();
+    backoff_ = options_.first_backoff;  // only a frame proves that the source works
+    SetCondition(SourceCondition::State::kRunning, "");
+    return true;
+  }
+  switch (result.error().code) {
+    case ErrorCode::kTimeout:
+      if (clock_.MonotonicNs() - alive_at_ns_ >= StallNs()) {
+        Failed({ErrorCode::kUnavailable, "no frame for " + std::to_string(StallNs() / 1'000'000'000) +
+                                             " s: " + result.error().message});
+      }
+      break;
+    case ErrorCode::kEndOfData:
+      started_ = false;
+      SetCondition(SourceCondition::State::kEnded,
+                   "the source has no more frames: " + result.error().message);
+      break;
+    default:
+      Failed(result.error());
+  }
+  return false;
+}
+
+void SourceSupervisor::Failed(const Error& error) {
+  started_ = false;
+  retry_at_ns_ = clock_.MonotonicNs() + Ns(backoff_);
+  backoff_ = std::min(backoff_ * 2, options_.longest_backoff);
+  SetCondition(SourceCondition::State::kLost, error.message + "; trying again");
+}
+
+int64_t SourceSupervisor::StallNs() const {
+  const double rate_hz = condition().info.frame_rate_hz;
+  const int64_t five_frames = rate_hz > 0 ? static_cast<int64_t>(5e9 / rate_hz) : 0;
+  return std::max(Ns(options_.stall), five_frames);
+}
+
+void SourceSupervisor::SetCondition(SourceCondition::State state, std::string reason) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (condition_.state == state && condition_.reason == reason) return;
+    condition_.state = state;
+    condition_.reason = reason;
+    ++condition_.changes;
+  }
+  if (state == SourceCondition::State::kRunning) {
+    spdlog::info("link {}: frames arrive", name_);
+  } else {
+    spdlog::warn("link {}: {}", name_, reason);
+  }
+}
+
+SourceCondition SourceSupervisor::condition() const {
+  const std::lock_guard lock(mutex_);
+  return condition_;
+}
+
+}  // namespace taclink::server

@@ -1,0 +1,57 @@
+#include "sensing/mechanics/skin_push.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "sensing/model/model_file.h"
+
+namespace taclink {
+namespace {
+
+class SkinPushTest : public testing::Test {
+ protected:
+  double ForceN(double pressure_kpa, double depth_mm, int refinement = 1) const {
+    const auto result = PushSkin(model_, {.marker = model_.MarkerIndex(6, 4),
+                                          .depth_mm = depth_mm,
+                                          .pressure_mpa = pressure_kpa * 1e-3,
+                                          .refinement = refinement});
+    EXPECT_TRUE(result.ok());
+    return result->force_n;
+  }
+  const LinkModel model_ = LoadLinkModel("cylinder").value();
+};
+
+// Linear column of the probe table: an independent linear MITC4 model, one node pushed.
+TEST_F(SkinPushTest, AgreesWithTheLinearProbeTable) {
+  EXPECT_NEAR(ForceN(0, 5), 0.13, 0.01);
+  EXPECT_NEAR(ForceN(0, 10), 0.27, 0.015);
+  EXPECT_NEAR(ForceN(0.5, 5), 0.17, 0.01);
+  EXPECT_NEAR(ForceN(1.0, 10), 0.34, 0.015);
+  EXPECT_NEAR(ForceN(1.5, 5), 0.25, 0.015);
+  EXPECT_NEAR(ForceN(1.5, 10), 0.38, 0.015);
+}
+
+TEST_F(SkinPushTest, FinerMeshPushesMoreNodesAndStaysClose) {
+  const auto fine = PushSkin(model_, {.marker = model_.MarkerIndex(6, 4), .depth_mm = 5, .refinement = 4});
+  ASSERT_TRUE(fine.ok());
+  EXPECT_GE(fine->nodes_in_contact, 2);
+  EXPECT_NEAR(fine->force_n / ForceN(0, 5), 1, 0.15);
+}
+
+TEST_F(SkinPushTest, DiscThatDoesNotTouchFeelsNothing) {
+  EXPECT_EQ(ForceN(0, -1), 0);
+  EXPECT_GT(ForceN(1.5, -1), 0);  // inflated by more than 1 mm
+}
+
+TEST_F(SkinPushTest, RefusesWhatCannotBe) {
+  const auto message = [&](const SkinPush& push) {
+    const auto result = PushSkin(model_, push);
+    return result.ok() ? std::string("accepted") : result.error().message;
+  };
+  EXPECT_THAT(message({.marker = 240, .depth_mm = 1}), testing::HasSubstr("24 paths and 10 rings"));
+  EXPECT_THAT(message({.marker = 0, .depth_mm = 22}), testing::HasSubstr("at most 21.5 mm"));
+  EXPECT_THAT(message({.marker = 0, .depth_mm = std::nan("")}), testing::HasSubstr("finite"));
+}
+
+}  // namespace
+}  // namespace taclink

@@ -1,0 +1,157 @@
+#include "wire/convert.h"
+
+#include "wire/units.h"
+
+namespace taclink::wire {
+namespace {
+
+// Enough for a smooth outline and for R(z) to a few micrometres.
+constexpr int kProfileSamples = 65;
+
+}  // namespace
+
+v1::Detail ToWire(Detail detail) {
+  switch (detail) {
+    case Detail::kContacts:
+      return v1::DETAIL_CONTACTS;
+    case Detail::kGeometry:
+      return v1::DETAIL_GEOMETRY;
+    case Detail::kFull:
+      return v1::DETAIL_FULL;
+  }
+  return v1::DETAIL_UNSPECIFIED;
+}
+
+Detail FromWire(v1::Detail detail) {
+  switch (detail) {
+    case v1::DETAIL_GEOMETRY:
+      return Detail::kGeometry;
+    case v1::DETAIL_FULL:
+      return Detail::kFull;
+    default:
+      return Detail::kContacts;
+  }
+}
+
+v1::LinkStatus ToWire(LinkStatus status) {
+  switch (status) {
+    case LinkStatus::kStarting:
+      return v1::LINK_STATUS_STARTING;
+    case LinkStatus::kCalibrating:
+      return v1::LINK_STATUS_CALIBRATING;
+    case LinkStatus::kOk:
+      return v1::LINK_STATUS_OK;
+    case LinkStatus::kDegraded:
+      return v1::LINK_STATUS_DEGRADED;
+    case LinkStatus::kLost:
+      return v1::LINK_STATUS_LOST;
+  }
+  return v1::LINK_STATUS_UNSPECIFIED;
+}
+
+LinkStatus FromWire(v1::LinkStatus status) {
+  switch (status) {
+    case v1::LINK_STATUS_STARTING:
+      return LinkStatus::kStarting;
+    case v1::LINK_STATUS_CALIBRATING:
+      return LinkStatus::kCalibrating;
+    case v1::LINK_STATUS_OK:
+      return LinkStatus::kOk;
+    case v1::LINK_STATUS_DEGRADED:
+      return LinkStatus::kDegraded;
+    default:
+      return LinkStatus::kLost;
+  }
+}
+
+v1::ForceModel ToWire(ForceModel model) {
+  switch (model) {
+    case ForceModel::kLinear:
+      return v1::FORCE_MODEL_LINEAR;
+  }
+  return v1::FORCE_MODEL_UNSPECIFIED;
+}
+
+ForceModel FromWire(v1::ForceModel) {
+  return ForceModel::kLinear;
+}
+
+v1::MarkerSource ToWire(MarkerSource source) {
+  switch (source) {
+    case MarkerSource::kBoth:
+      return v1::MARKER_SOURCE_BOTH;
+    case MarkerSource::kTop:
+      return v1::MARKER_SOURCE_TOP;
+    case MarkerSource::kBottom:
+      return v1::MARKER_SOURCE_BOTTOM;
+    case MarkerSource::kInferred:
+      return v1::MARKER_SOURCE_INFERRED;
+  }
+  return v1::MARKER_SOURCE_UNSPECIFIED;
+}
+
+MarkerSource FromWire(v1::MarkerSource source) {
+  switch (source) {
+    case v1::MARKER_SOURCE_BOTH:
+      return MarkerSource::kBoth;
+    case v1::MARKER_SOURCE_TOP:
+      return MarkerSource::kTop;
+    case v1::MARKER_SOURCE_BOTTOM:
+      return MarkerSource::kBottom;
+    default:
+      return MarkerSource::kInferred;
+  }
+}
+
+void Fill(const Vec3& value, double scale, v1::Vector3& out) {
+  out.set_x(value.x() * scale);
+  out.set_y(value.y() * scale);
+  out.set_z(value.z() * scale);
+}
+
+Vec3 FromWire(const v1::Vector3& value, double scale) {
+  return {value.x() * scale, value.y() * scale, value.z() * scale};
+}
+
+void Fill(const Rigid3& base_from_link, v1::Pose& out) {
+  Fill(base_from_link.translation, kMetresPerMm, *out.mutable_translation_m());
+  const Eigen::Quaterniond q(base_from_link.rotation);
+  auto& rotation = *out.mutable_rotation();
+  rotation.set_x(q.x());
+  rotation.set_y(q.y());
+  rotation.set_z(q.z());
+  rotation.set_w(q.w());
+}
+
+void Fill(const LinkModel& model, v1::LinkModel& out) {
+  out.set_name(model.name);
+  out.set_description(model.description);
+  out.set_length_m(model.length_mm * kMetresPerMm);
+  out.set_thickness_m(model.thickness_mm * kMetresPerMm);
+  out.set_tube_radius_m(model.tube_outer_radius_mm * kMetresPerMm);
+  out.mutable_material()->set_youngs_modulus_pa(model.material.youngs_modulus_mpa * kPascalsPerMpa);
+  out.mutable_material()->set_poisson_ratio(model.material.poisson_ratio);
+
+  auto& markers = *out.mutable_markers();
+  markers.set_paths(static_cast<uint32_t>(model.markers.paths));
+  markers.set_rings(static_cast<uint32_t>(model.markers.rings()));
+  markers.set_first_path_angle_rad(model.markers.first_path_angle_rad);
+  for (const double z : model.markers.rings_z_mm) markers.add_ring_z_m(z * kMetresPerMm);
+  markers.set_diameter_m(model.markers.diameter_mm * kMetresPerMm);
+  for (const Vec3& p : model.RestMarkers()) {
+    for (int axis = 0; axis < 3; ++axis)
+      markers.add_rest_positions_m(static_cast<float>(p[axis] * kMetresPerMm));
+  }
+
+  // The normal of a slanted surface leans along z, so the outer point's own z and radius are sent; the ends
+  // are where the skin is clamped.
+  for (int i = 0; i < kProfileSamples; ++i) {
+    const double z = model.length_mm * i / (kProfileSamples - 1);
+    const Vec3 outer = model.PointAtDepth(0, z, 0);
+    const bool end = i == 0 || i == kProfileSamples - 1;
+    out.add_profile_z_m((end ? z : outer.z()) * kMetresPerMm);
+    out.add_profile_radius_m(outer.x() * kMetresPerMm);
+  }
+}
+
+}  // namespace taclink::wire

@@ -1,0 +1,31 @@
+#pragma once
+
+#include "sensing/core/contact.h"
+#include "sensing/core/link_model.h"
+#include "sensing/core/link_state.h"
+#include "taclink/v1/arm.pb.h"
+#include "taclink/v1/frame.pb.h"
+#include "wire/detail.h"
+
+namespace taclink::wire {
+
+// Small pieces that both frames and the arm's description are made of.
+
+v1::Detail ToWire(Detail detail);
+v1::LinkStatus ToWire(LinkStatus status);
+v1::ForceModel ToWire(ForceModel model);
+v1::MarkerSource ToWire(MarkerSource source);
+
+/// Values that this build does not know become the weakest one: kContacts, kLost, kLinear, kInferred.
+Detail FromWire(v1::Detail detail);
+LinkStatus FromWire(v1::LinkStatus status);
+ForceModel FromWire(v1::ForceModel model);
+MarkerSource FromWire(v1::MarkerSource source);
+
+void Fill(const Vec3& value, double scale, v1::Vector3& out);
+Vec3 FromWire(const v1::Vector3& value, double scale);
+
+void Fill(const Rigid3& base_from_link, v1::Pose& out);
+void Fill(const LinkModel& model, v1::LinkModel& out);
+
+}  // namespace taclink::wire

@@ -1,0 +1,227 @@
+#include "wire/frame_codec.h"
+
+#include <google/protobuf/io/coded_stream.h>
+
+#include <array>
+#include <utility>
+
+#include "taclink/v1/tactile.pb.h"
+#include "wire/convert.h"
+#include "wire/units.h"
+
+namespace taclink::wire {
+namespace {
+
+using Floats = google::protobuf::RepeatedField<float>;
+
+// The upper triangle row by row, as displacement_covariances_m2 documents.
+constexpr std::array<std::pair<int, int>, 6> kUpperTriangle = {
+    {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
+
+void FillVectors(const std::vector<Vec3>& values, double scale, Floats& out) {
+  out.Reserve(static_cast<int>(values.size()) * 3);
+  for (const Vec3& value : values) {
+    for (int axis = 0; axis < 3; ++axis) out.AddAlreadyReserved(static_cast<float>(value[axis] * scale));
+  }
+}
+
+std::vector<Vec3> VectorsFrom(const Floats& values, double scale) {
+  std::vector<Vec3> out(static_cast<size_t>(values.size()) / 3);
+  for (size_t i = 0; i < out.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      out[i][axis] = static_cast<double>(values[static_cast<int>(i) * 3 + axis]) * scale;
+    }
+  }
+  return out;
+}
+
+void FillTimes(const FrameTimes& times, v1::FrameTimes& out) {
+  out.set_exposure_utc_ns(times.exposure_utc_ns);
+  out.set_exposure_ns(times.exposure_monotonic_ns);
+  out.set_received_ns(times.received_ns);
+  out.set_tracked_ns(times.tracked_ns);
+  out.set_solved_ns(times.solved_ns);
+  out.set_published_ns(times.published_ns);
+}
+
+FrameTimes TimesFrom(const v1::FrameTimes& times) {
+  return {.exposure_monotonic_ns = times.exposure_ns(),
+          .exposure_utc_ns = times.exposure_utc_ns(),
+          .received_ns = times.received_ns(),
+          .tracked_ns = times.tracked_ns(),
+          .solved_ns = times.solved_ns(),
+          .published_ns = times.published_ns()};
+}
+
+void FillStageTimes(const StageTimes& ms, v1::StageTimes& out) {
+  out.set_decode_s(ms.decode * kSecondsPerMs);
+  out.set_detect_s(ms.detect * kSecondsPerMs);
+  out.set_register_s(ms.register_ * kSecondsPerMs);
+  out.set_reconstruct_s(ms.reconstruct * kSecondsPerMs);
+  out.set_force_s(ms.force * kSecondsPerMs);
+}
+
+StageTimes StageTimesFrom(const v1::StageTimes& s) {
+  return {.decode = s.decode_s() / kSecondsPerMs,
+          .detect = s.detect_s() / kSecondsPerMs,
+          .register_ = s.register_s() / kSecondsPerMs,
+          .reconstruct = s.reconstruct_s() / kSecondsPerMs,
+          .force = s.force_s() / kSecondsPerMs};
+}
+
+void FillContact(const Contact& contact, v1::Contact& out) {
+  out.set_id(contact.id);
+  Fill(contact.center_mm, kMetresPerMm, *out.mutable_center_m());
+  Fill(contact.normal, 1, *out.mutable_normal());
+  Fill(contact.force_n, 1, *out.mutable_force_n());
+  if (contact.force_sigma_n) Fill(*contact.force_sigma_n, 1, *out.mutable_force_sigma_n());
+  out.set_normal_force_n(contact.normal_force_n);
+  out.set_area_m2(contact.area_mm2 * kSquareMetresPerMm2);
+  for (const int marker : contact.markers) out.add_markers(static_cast<uint32_t>(marker));
+}
+
+Contact ContactFrom(const v1::Contact& message) {
+  Contact contact;
+  contact.id = message.id();
+  contact.center_mm = FromWire(message.center_m(), 1 / kMetresPerMm);
+  contact.normal = FromWire(message.normal(), 1);
+  contact.force_n = FromWire(message.force_n(), 1);
+  if (message.has_force_sigma_n()) contact.force_sigma_n = FromWire(message.force_sigma_n(), 1);
+  contact.normal_force_n = message.normal_force_n();
+  contact.area_mm2 = message.area_m2() / kSquareMetresPerMm2;
+  for (const uint32_t marker : message.markers()) contact.markers.push_back(static_cast<int>(marker));
+  return contact;
+}
+
+void FillFull(const LinkState& state, v1::LinkFrame& out) {
+  FillVectors(state.shape.displacements_mm, kMetresPerMm, *out.mutable_displacements_m());
+  auto& covariances = *out.mutable_displacement_covariances_m2();
+  covariances.Reserve(static_cast<int>(state.shape.covariances_mm2.size() * kUpperTriangle.size()));
+  for (const Mat3& covariance : state.shape.covariances_mm2) {
+    for (const auto& [row, column] : kUpperTriangle) {
+      covariances.AddAlreadyReserved(static_cast<float>(covariance(row, column) * kSquareMetresPerMm2));
+    }
+  }
+  for (const MarkerSource source : state.shape.sources) out.add_marker_sources(ToWire(source));
+  FillVectors(state.forces.forces_n, 1, *out.mutable_nodal_forces_n());
+  for (const double sigma : state.forces.sigmas_n) out.add_nodal_force_sigmas_n(static_cast<float>(sigma));
+  out.set_force_residual(state.forces.residual);
+  out.set_force_not_converged(!state.forces.converged);
+}
+
+void ReadFull(const v1::LinkFrame& frame, LinkState& state) {
+  state.shape.displacements_mm = VectorsFrom(frame.displacements_m(), 1 / kMetresPerMm);
+  const auto& covariances = frame.displacement_covariances_m2();
+  state.shape.covariances_mm2.resize(static_cast<size_t>(covariances.size()) / kUpperTriangle.size());
+  int next = 0;
+  for (Mat3& covariance : state.shape.covariances_mm2) {
+    for (const auto& [row, column] : kUpperTriangle) {
+      const double value = static_cast<double>(covariances[next++]) / kSquareMetresPerMm2;
+      covariance(row, column) = value;
+      covariance(column, row) = value;
+    }
+  }
+  for (const int source : frame.marker_sources()) {
+    state.shape.sources.push_back(FromWire(static_cast<v1::MarkerSource>(source)));
+  }
+  state.forces.forces_n = VectorsFrom(frame.nodal_forces_n(), 1);
+  state.forces.sigmas_n.assign(frame.nodal_force_sigmas_n().begin(), frame.nodal_force_sigmas_n().end());
+  state.forces.residual = frame.force_residual();
+  state.forces.converged = !frame.force_not_converged();
+}
+
+// Whether an array of `size` numbers holds `each` for every marker, or nothing at all.
+bool Fits(int size, int each, int markers) {
+  return size == 0 || size == each * markers;
+}
+
+bool LengthsFit(const v1::LinkFrame& frame) {
+  const int markers = frame.positions_m_size() / 3;
+  return frame.positions_m_size() % 3 == 0 && Fits(frame.displacements_m_size(), 3, markers) &&
+         Fits(frame.displacement_covariances_m2_size(), 6, markers) &&
+         Fits(frame.nodal_forces_n_size(), 3, markers) &&
+         Fits(frame.nodal_force_sigmas_n_size(), 1, markers) && Fits(frame.marker_sources_size(), 1, markers);
+}
+
+}  // namespace
+
+void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFrame& out) {
+  out.Clear();
+  out.set_link(link.name);
+  out.set_link_index(link.index);
+  out.set_sequence(state.sequence);
+  FillTimes(state.times, *out.mutable_times());
+  out.set_status(ToWire(state.status));
+  out.set_status_reason(state.status_reason);
+  out.set_detail(ToWire(detail));
+  if (state.pressure_mpa) out.set_pressure_pa(*state.pressure_mpa * kPascalsPerMpa);
+  out.set_markers_seen(static_cast<uint32_t>(state.shape.seen()));
+  out.set_markers_inferred(static_cast<uint32_t>(state.shape.CountOf(MarkerSource::kInferred)));
+  for (const Contact& contact : state.contacts) FillContact(contact, *out.add_contacts());
+  Fill(state.total_force_n, 1, *out.mutable_total_force_n());
+  out.set_force_model(ToWire(state.forces.model));
+  out.set_baseline_age_s(state.baseline_age_s);
+  FillStageTimes(state.stage_ms, *out.mutable_stage_times());
+  for (const CameraCounts& counts : state.cameras) {
+    auto& camera = *out.add_cameras();
+    camera.set_detections(static_cast<uint32_t>(counts.detections));
+    camera.set_labelled(static_cast<uint32_t>(counts.labelled));
+  }
+  if (detail >= Detail::kGeometry)
+    FillVectors(state.shape.positions_mm, kMetresPerMm, *out.mutable_positions_m());
+  if (detail >= Detail::kFull) FillFull(state, out);
+}
+
+std::string EncodeFrame(const LinkId& link, const LinkState& state, Detail detail) {
+  thread_local v1::LinkFrame frame;  // keeps its arrays from frame to frame
+  Fill(link, state, detail, frame);
+  return frame.SerializeAsString();
+}
+
+std::string FrameResponsePrefix(size_t frame_bytes) {
+  using google::protobuf::io::CodedOutputStream;
+  constexpr uint32_t kLengthDelimited = 2;
+  constexpr uint32_t kTag = v1::StreamFramesResponse::kFrameFieldNumber << 3 | kLengthDelimited;
+  std::array<uint8_t, 10> buffer{};
+  uint8_t* end = CodedOutputStream::WriteVarint32ToArray(kTag, buffer.data());
+  end = CodedOutputStream::WriteVarint32ToArray(static_cast<uint32_t>(frame_bytes), end);
+  return {buffer.data(), end};
+}
+
+Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
+  if (!LengthsFit(frame)) {
+    return Error{ErrorCode::kInvalidArgument, "frame " + std::to_string(frame.sequence()) + " of link '" +
+                                                  frame.link() +
+                                                  "' has arrays of lengths that do not fit each other"};
+  }
+  DecodedFrame decoded{
+      .link = {frame.link(), frame.link_index()}, .detail = FromWire(frame.detail()), .state = {}};
+  LinkState& state = decoded.state;
+  state.sequence = frame.sequence();
+  state.times = TimesFrom(frame.times());
+  state.status = FromWire(frame.status());
+  state.status_reason = frame.status_reason();
+  if (frame.has_pressure_pa()) state.pressure_mpa = frame.pressure_pa() / kPascalsPerMpa;
+  for (const auto& contact : frame.contacts()) state.contacts.push_back(ContactFrom(contact));
+  state.total_force_n = FromWire(frame.total_force_n(), 1);
+  state.forces.model = FromWire(frame.force_model());
+  state.baseline_age_s = frame.baseline_age_s();
+  state.stage_ms = StageTimesFrom(frame.stage_times());
+  for (size_t i = 0; i < kCameraCount && static_cast<int>(i) < frame.cameras_size(); ++i) {
+    const auto& camera = frame.cameras(static_cast<int>(i));
+    state.cameras[i] = {static_cast<int>(camera.detections()), static_cast<int>(camera.labelled())};
+  }
+  state.shape.positions_mm = VectorsFrom(frame.positions_m(), 1 / kMetresPerMm);
+  ReadFull(frame, state);
+  return decoded;
+}
+
+Result<DecodedFrame> DecodeFrame(std::string_view bytes) {
+  v1::LinkFrame frame;
+  if (!frame.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    return Error{ErrorCode::kInvalidArgument, "these bytes are no LinkFrame message"};
+  }
+  return FromWire(frame);
+}
+
+}  // namespace taclink::wire
