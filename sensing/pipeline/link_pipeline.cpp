@@ -15,7 +15,7 @@ namespace taclink {
 namespace {
 
 // Below these fractions of seen markers a link is called degraded, or lost.
-constexpr double kDegradedFraction = 0.8;
+constexpr double kDegradedFraction = 0.7;
 constexpr double kLostFraction = 0.4;
 
 void SetStatus(LinkState& state, LinkStatus status, std::string reason) {

@@ -48,7 +48,7 @@ TEST(ModelFile, BadInputIsNamedWithFileAndLine) {
     return model.ok() ? std::string("accepted") : model.error().message;
   };
   EXPECT_THAT(message(Replaced(Cylinder(), "length_mm: 198", "lenght_mm: 198")),
-              HasSubstr("'skin.length_mm' is missing"));
+              HasSubstr("'skin.lenght_mm' is not a known key"));
   EXPECT_THAT(message(Replaced(Cylinder(), "tube: {", "tubes: {}\ntube: {")),
               HasSubstr("'tubes' is not a known key"));
   EXPECT_THAT(message(Replaced(Cylinder(), "thickness_mm: 3.5", "thickness_mm: thick")),
