@@ -17,6 +17,7 @@ constexpr int kOpening = 2;    // cells each way: the opening is 5 cells wide, m
 constexpr int kMeanSlack = 3;  // gray levels below the local mean that still count, for flat insides
 constexpr int kSlackPerContrast = 5;  // and 5/49 of the contrast
 constexpr int kHole = 3;              // px: shorter gaps in a blob's row are shade or a scratch
+constexpr int kSmallArea = 60;        // px^2
 constexpr double kSplitLevels[] = {0.5, 0.7};
 constexpr int kNeighbourhood = 48;  // px, cells over which typical contrast is looked up
 
@@ -358,18 +359,19 @@ MarkerDetector::Levels MarkerDetector::MeasureLevels(const cv::Mat& gray, const 
 bool MarkerDetector::Measure(const cv::Mat& gray, const Blob& blob, const Levels& levels,
                              Detection& detection) const {
   if (levels.dark_outline < options_.min_dark_outline) return false;
-  const double low =
-      std::max(levels.background + 0.25 * levels.contrast(), std::min(levels.outline, levels.peak - 1));
-  const double high = std::max(0.5 * (low + levels.peak), low + 1);
+  // Small blobs are mostly edge: weights linear in the gray level keep every pixel's coverage.
+  const bool small = blob.area < kSmallArea;
+  const double low = std::max(levels.background + (small ? 0.1 : 0.25) * levels.contrast(),
+                              std::min(levels.outline, levels.peak - 1));
+  const double high = std::max(small ? levels.peak : 0.5 * (low + levels.peak), low + 1);
   const auto low16 = static_cast<int>(16 * low), slope = static_cast<int>(4096 / (high - low));
   const int x_middle = (blob.x0 + blob.x1) / 2, y_middle = (blob.y0 + blob.y1) / 2;
   int64_t w_sum = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0, ramp = 0;
-  for (int i = blob.first_run; i < blob.first_run + blob.runs; ++i) {
-    const Run& run = sorted_[static_cast<size_t>(i)];
-    const uint8_t* row = gray.ptr(run.y);
-    const int dy = run.y - y_middle;
+  const auto add = [&](int y, int begin, int end) {
+    const uint8_t* row = gray.ptr(y);
+    const int dy = y - y_middle;
     int64_t s0 = 0, s1 = 0, s2 = 0;
-    for (int x = run.begin; x < run.end; ++x) {
+    for (int x = begin; x < end; ++x) {
       const int dx = x - x_middle;
       const int w = std::clamp(((16 * row[x] - low16) * slope) >> 8, 0, 256);
       s0 += w, s1 += w * dx, s2 += w * dx * dx;
@@ -377,7 +379,16 @@ bool MarkerDetector::Measure(const cv::Mat& gray, const Blob& blob, const Levels
     }
     w_sum += s0, wx += s1, wy += s0 * dy;
     wxx += s2, wxy += s1 * dy, wyy += s0 * dy * dy;
+  };
+  // Small blobs with a rim of a pixel, or a good part of their edge would be left out.
+  const int rim = small ? 1 : 0;
+  const Run* const first = sorted_.data() + blob.first_run;
+  const Run* const last = first + blob.runs - 1;
+  for (const Run* run = first; run <= last; ++run) {
+    add(run->y, std::max(run->begin - rim, 0), std::min(run->end + rim, width_));
   }
+  if (rim != 0 && first->y > 0) add(first->y - 1, first->begin, first->end);
+  if (rim != 0 && last->y + 1 < height_) add(last->y + 1, last->begin, last->end);
   const double area = static_cast<double>(w_sum) / 256;
   if (area < 0.5 * options_.min_area_px2) return false;
   const auto mean = [&](int64_t sum) { return static_cast<double>(sum) / static_cast<double>(w_sum); };

