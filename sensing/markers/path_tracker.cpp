@@ -34,8 +34,9 @@ PathTracker::PathTracker(const LinkModel& model, const StereoRig& rig, PathTrack
     : model_(model), options_(options), numbering_(model, options.numbering) {
   const auto paths = static_cast<size_t>(model.markers.paths);
   for (const CameraId id : kBothCameras) {
-    views_.push_back({Projector(rig[id]), {}, {}, {}});
+    views_.push_back({Projector(rig[id]), {}, {}, {}, {}});
     FindEnds(id, views_.back());
+    FindAreas(views_.back());
     chains_[Index(id)].resize(paths);
     for (auto& chain : chains_[Index(id)]) chain.reserve(static_cast<size_t>(numbering_.max_chain()));
     path_rays_[Index(id)].reserve(static_cast<size_t>(numbering_.max_chain()));
@@ -67,6 +68,34 @@ void PathTracker::FindEnds(CameraId id, View& view) const {
     }
     view.starts.push_back(start.value_or(view.ends.back()));
   }
+}
+
+// A marker's area in the picture: its disc laid on the skin, or the dome seen from the side where that is
+// more.
+void PathTracker::FindAreas(View& view) const {
+  const double disc = kPi / 4 * model_.markers.diameter_mm * model_.markers.diameter_mm;
+  for (int j = 0; j < model_.markers.rings(); ++j) {
+    const Vec3 p = model_.RestMarker(model_.MarkerIndex(0, j));
+    const auto projected = view.projector.ProjectWithJacobian(p);
+    if (!projected) continue;
+    const Vec3 around = Vec3(-p.y(), p.x(), 0).normalized();
+    const Vec2 across = projected->jacobian * around, along = projected->jacobian * Vec3::UnitZ();
+    const double flat = std::abs(across.x() * along.y() - across.y() * along.x()) * disc;
+    const double side = across.squaredNorm() * disc / 2;
+    view.areas.push_back(
+        {(projected->pixel - view.projector.model().lens.principal_point_px).norm(), std::max(flat, side)});
+  }
+  std::sort(view.areas.begin(), view.areas.end(),
+            [](const auto& a, const auto& b) { return a.radius_px < b.radius_px; });
+}
+
+bool PathTracker::AreaFits(const View& view, const Detection& d) const {
+  if (d.area_px2 <= 0 || d.clipped || view.areas.empty()) return true;
+  const double radius = (d.center_px - view.projector.model().lens.principal_point_px).norm();
+  const auto outer =
+      std::find_if(view.areas.begin(), view.areas.end(), [&](const auto& a) { return a.radius_px > radius; });
+  const double expected = (outer == view.areas.end() ? view.areas.back() : *outer).area_px2;
+  return d.area_px2 > expected / options_.max_area_ratio && d.area_px2 < expected * options_.max_area_ratio;
 }
 
 void PathTracker::Label(const std::array<Detections, kCameraCount>& detections, LabelledMarkers& out) {
@@ -110,7 +139,7 @@ void PathTracker::SortIntoPaths(CameraId id, const Detections& detections) {
     rays_[Index(id)].push_back({projector.center_in_link(), direction.value_or(Vec3::UnitZ())});
     const auto azimuth =
         direction ? AzimuthAtRadius(rays_[Index(id)].back(), mean_radius_mm_) : std::optional<double>();
-    if (azimuth) {
+    if (azimuth && AreaFits(views_[Index(id)], d)) {
       const double place =
           (*azimuth - model_.markers.first_path_angle_rad) / model_.markers.path_pitch_rad() + 2 * paths;
       const auto nearest = static_cast<int>(std::lround(place));

@@ -16,6 +16,8 @@ struct PathTrackerOptions {
   double beta_rad = RadFromDeg(30);   ///< search angle at the far end, (4.29)
   /// A detection further than this from a path's angle is none of it; in path pitches.
   double sector = 0.6;
+  /// A detection whose area is off the expected one by more than this factor is dust or a reflection.
+  double max_area_ratio = 6;
   RingNumberingOptions numbering;
 };
 
@@ -53,9 +55,15 @@ class PathTracker {
     Projector projector;
     std::vector<Vec2> starts, ends;  // by path: pixels of the clamped ends, (4.7) and (4.8)
     std::vector<bool> usable;
+    struct Area {
+      double radius_px, area_px2;
+    };
+    std::vector<Area> areas;  // of the markers at rest, by rising distance from the principal point
   };
 
   void FindEnds(CameraId id, View& view) const;
+  void FindAreas(View& view) const;
+  bool AreaFits(const View& view, const Detection& d) const;
   void SortIntoPaths(CameraId id, const Detections& detections);
   void Trace(CameraId id);
   void FindBest(int path, Tracing& tracing) const;

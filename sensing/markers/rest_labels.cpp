@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -13,12 +14,13 @@
 namespace taclink {
 namespace {
 
-constexpr double kSearchHalfWidth = 64, kSearchStep = 4;    // px around the nominal principal point
-constexpr double kMinCoherence = 0.55;                      // of the path angles; 1: all on lines, 0: none
-constexpr double kSector = 0.25;                            // path pitches off a line
-constexpr double kRingGate = 0.4;                           // of the distance to the next ring
-constexpr double kMinSeen = 0.5;                            // of all markers
-constexpr double kMaxScaleOff = 0.35, kMaxShapeOff = 0.15;  // log radius against the nominal lens
+constexpr double kSearchHalfWidth = 64, kSearchStep = 4;  // px around the nominal principal point
+constexpr double kMinCoherence = 0.55;                    // of the path angles; 1: all on lines, 0: none
+constexpr double kSector = 0.25;                          // path pitches off a line
+constexpr double kRingGate = 0.4;                         // of the distance to the next ring
+constexpr double kMinSeen = 0.5;                          // of all markers
+constexpr double kMaxShift = 0.3, kMaxStretch = 0.2;      // log radius against the nominal lens
+constexpr double kMinOnRings = 0.5;                       // of the spots on paths
 
 struct Star {  // lines through a point, evenly spaced
   Vec2 center = Vec2::Zero();
@@ -138,10 +140,6 @@ class RestLabeller {
       by_path_[static_cast<size_t>(place.path)].push_back(
           {static_cast<int>(i), place.path, std::log(at.norm())});
     }
-    for (auto& path : by_path_) {  // near, large radius, first
-      std::sort(path.begin(), path.end(),
-                [](const Spot& a, const Spot& b) { return a.log_radius > b.log_radius; });
-    }
   }
 
   // Rings counted from the camera's end. NaN: the nominal lens can't see it.
@@ -157,67 +155,63 @@ class RestLabeller {
   }
   int RingFromNear(int i) const { return id_ == CameraId::kTop ? i : model_.markers.rings() - 1 - i; }
 
-  /// The count of spots that most paths have (the larger of two), at most one per ring.
-  size_t UsualCount() const {
-    std::vector<int> votes(static_cast<size_t>(model_.markers.rings()) + 1, 0);
-    for (const auto& path : by_path_) {
-      if (path.size() < votes.size()) ++votes[path.size()];
-    }
-    size_t usual = 0;
-    for (size_t n = 2; n < votes.size(); ++n) {
-      if (votes[n] >= std::max(1, votes[usual])) usual = n;
-    }
-    return usual;
-  }
-
-  // What every ring's radius is: the median over the paths that have the usual count, at the place in the
-  // sequence where the nominal lens agrees best; further rings by the nominal lens, scaled alike.
+  // All rings together: the nominal log radii, shifted (scale) and stretched (lens) so that most spots lie on
+  // one; then every ring's own median. No single path needs to be complete for that.
   Result<void> FindRings() {
-    const size_t usual = UsualCount();
-    if (usual < 2 || static_cast<double>(usual) < kMinSeen * model_.markers.rings())
-      return Refusal("most paths have too few spots");
-    std::vector<double> medians;
-    for (size_t i = 0; i < usual; ++i) {
-      std::vector<double> values;
-      for (const auto& path : by_path_) {
-        if (path.size() == usual) values.push_back(path[i].log_radius);
-      }
-      std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2), values.end());
-      medians.push_back(values[values.size() / 2]);
-    }
     const std::vector<double> nominal = NominalLogRadii();
-    double best = std::numeric_limits<double>::infinity(), best_scale = 0;
-    size_t best_skip = 0;
-    for (size_t skip = 0; skip + usual <= nominal.size(); ++skip) {
-      const auto [scale, spread] = Compare(medians, nominal, skip);
-      // A scale near 1 counts a little: without it two rings of two would fit anywhere.
-      const double cost = spread + 0.1 * std::abs(scale);
-      if (cost < best) best = cost, best_scale = scale, best_skip = skip;
+    size_t seen_by_lens = 0;
+    double middle = 0;
+    for (const double r : nominal) {
+      if (!std::isnan(r)) middle += r, ++seen_by_lens;
     }
-    const auto [scale, spread] = Compare(medians, nominal, best_skip);
-    if (!(std::abs(scale) < kMaxScaleOff && spread < kMaxShapeOff))
-      return Refusal("the rings' distances do not fit the model");
-    ring_log_radii_.clear();
-    for (size_t i = 0; i < nominal.size(); ++i) {
-      const bool measured = i >= best_skip && i < best_skip + usual;
-      ring_log_radii_.push_back(measured ? medians[i - best_skip] : nominal[i] + best_scale);
+    if (seen_by_lens < nominal.size()) return Refusal("the model's nominal lens does not see all rings");
+    middle /= static_cast<double>(seen_by_lens);
+    double best = 0;
+    std::vector<double> radii(nominal.size());
+    for (double stretch = -kMaxStretch; stretch <= kMaxStretch; stretch += 0.02) {
+      for (double shift = -kMaxShift; shift <= kMaxShift; shift += 0.01) {
+        for (size_t i = 0; i < radii.size(); ++i) {
+          radii[i] = middle + shift + (1 + stretch) * (nominal[i] - middle);
+        }
+        // The nominal lens counts a little: else a shift by a whole ring might do.
+        const double score = Score(radii) * (1 - 0.1 * std::abs(shift) - 0.1 * std::abs(stretch));
+        if (score > best) best = score, ring_log_radii_ = radii;
+      }
     }
+    if (best < kMinOnRings) return Refusal("the rings' distances do not fit the model");
+    for (int round = 0; round < 3; ++round) CenterRings();
     return {};
   }
 
-  struct Agreement {
-    double scale, spread;  // mean and standard deviation of the log radius against the nominal one
-  };
-  static Agreement Compare(const std::vector<double>& medians, const std::vector<double>& nominal,
-                           size_t skip) {
-    double sum = 0, squares = 0, count = 0;
-    for (size_t i = 0; i < medians.size(); ++i) {
-      const double off = medians[i] - nominal[i + skip];
-      if (std::isnan(off)) continue;
-      sum += off, squares += off * off, ++count;
+  // Part of the spots that lie on rings; the nearer the more.
+  double Score(const std::vector<double>& radii) const {
+    double sum = 0;
+    int count = 0;
+    for (const auto& path : by_path_) {
+      for (const Spot& spot : path) {
+        const RingPlace place = PlaceAmong(radii, spot.log_radius);
+        const double off = place.off / (0.3 * place.spacing);
+        sum += std::max(0.0, 1 - off * off);
+        ++count;
+      }
     }
-    const double mean = sum / std::max(1.0, count);
-    return {mean, std::sqrt(std::max(0.0, squares / std::max(1.0, count) - mean * mean))};
+    return sum / std::max(1, count);
+  }
+
+  void CenterRings() {
+    std::vector<std::vector<double>> on_ring(ring_log_radii_.size());
+    for (const auto& path : by_path_) {
+      for (const Spot& spot : path) {
+        if (const auto ring = NearestRing(spot.log_radius))
+          on_ring[static_cast<size_t>(*ring)].push_back(spot.log_radius);
+      }
+    }
+    for (size_t i = 0; i < on_ring.size(); ++i) {
+      if (on_ring[i].size() < 3) continue;
+      const auto middle = on_ring[i].begin() + static_cast<long>(on_ring[i].size() / 2);
+      std::nth_element(on_ring[i].begin(), middle, on_ring[i].end());
+      ring_log_radii_[i] = *middle;
+    }
   }
 
   Result<std::vector<MarkerObservation>> Observations() const {
@@ -242,17 +236,24 @@ class RestLabeller {
     return seen;
   }
 
-  std::optional<int> NearestRing(double log_radius) const {
-    const auto& radii = ring_log_radii_;
-    size_t best = 0;
-    for (size_t i = 1; i < radii.size(); ++i) {
-      if (std::abs(radii[i] - log_radius) < std::abs(radii[best] - log_radius)) best = i;
-    }
+  struct RingPlace {
+    size_t ring;
+    double off, spacing;  // log radius; spacing to the nearer neighbour
+  };
+  // `radii` fall; the ring nearest to a spot.
+  static RingPlace PlaceAmong(const std::vector<double>& radii, double log_radius) {
+    const auto after = std::lower_bound(radii.begin(), radii.end(), log_radius, std::greater<>());
+    auto best = static_cast<size_t>(after - radii.begin());
+    if (best == radii.size() || (best > 0 && radii[best - 1] - log_radius < log_radius - radii[best])) --best;
     double spacing = std::numeric_limits<double>::infinity();
-    if (best > 0) spacing = std::min(spacing, std::abs(radii[best - 1] - radii[best]));
-    if (best + 1 < radii.size()) spacing = std::min(spacing, std::abs(radii[best + 1] - radii[best]));
-    if (!(std::abs(radii[best] - log_radius) <= kRingGate * spacing)) return std::nullopt;
-    return static_cast<int>(best);
+    if (best > 0) spacing = std::min(spacing, radii[best - 1] - radii[best]);
+    if (best + 1 < radii.size()) spacing = std::min(spacing, radii[best] - radii[best + 1]);
+    return {best, std::abs(radii[best] - log_radius), spacing};
+  }
+  std::optional<int> NearestRing(double log_radius) const {
+    const RingPlace place = PlaceAmong(ring_log_radii_, log_radius);
+    if (!(place.off <= kRingGate * place.spacing)) return std::nullopt;
+    return static_cast<int>(place.ring);
   }
 
   const LinkModel& model_;

@@ -299,6 +299,12 @@ bool RingNumbering::SingleHolds(CameraId id, int ring, double expected_mm) const
   const bool last_place = next_place < 0 || next_place >= static_cast<int>(chains_[Index(id)].size());
   if (last_ring != last_place) return false;
   if (!last_ring && labels[static_cast<size_t>(next_ring)] != next_place) return false;
+  // Nor may it meet a ray of the other camera well on another ring.
+  for (int other = 0; other < static_cast<int>(chains_[1 - Index(id)].size()); ++other) {
+    const Pair& pair = id == CameraId::kTop ? PairOf(place, other) : PairOf(other, place);
+    if (pair.ring >= 0 && pair.ring != ring && RivalCost(pair, pair.ring) < options_.max_rival_cost - 1)
+      return false;
+  }
   const auto bend = Bend(id, place, ring);
   if (!bend) return false;
   for (const int other : {ring - 1, ring + 1}) {

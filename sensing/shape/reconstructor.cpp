@@ -9,7 +9,7 @@
 namespace taclink {
 namespace {
 
-constexpr int kSteps = 2;            // Gauss-Newton; the start is within microns already
+constexpr int kSteps = 1;            // Gauss-Newton; the start is nearly there
 constexpr double kEndMarginMm = 10;  // a marker may lie this far beyond a clamped end's plane: it does not
 
 double Variance(double sigma_px, double camera_sigma_px) {

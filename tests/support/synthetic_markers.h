@@ -87,6 +87,9 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
   for (const CameraId id : kBothCameras) {
     const Projector projector(rig[id]);
     const double width = rig[id].width_px, height = rig[id].height_px;
+    const auto camera_scale = [&](const Vec3& p) {  // px per mm across
+      return rig[id].lens.focal_px / (p - projector.center_in_link()).norm();
+    };
     std::vector<std::pair<Detection, int>> all;
     for (int i = 0; i < model.markers.count(); ++i) {
       const Vec3 rest = model.RestMarker(i);
@@ -99,6 +102,8 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
           d.center_px.y() > height - 3)
         continue;
       d.sigma_px = options.noise_px;
+      const double scale = camera_scale(rest);
+      d.area_px2 = scale * scale * model.markers.diameter_mm * model.markers.diameter_mm * 0.5;
       all.emplace_back(d, i);
     }
     DropCovered(all, [&](int marker) {
@@ -108,6 +113,7 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
       Detection d;
       d.center_px = Vec2(width * uniform(random), height * uniform(random));
       d.sigma_px = options.noise_px;
+      d.area_px2 = 5 + 10 * uniform(random);  // dust
       all.emplace_back(d, -1);
     }
     std::shuffle(all.begin(), all.end(), random);
