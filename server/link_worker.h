@@ -27,7 +27,7 @@ struct LinkWorkerOptions {
   std::chrono::milliseconds poll{100};
   /// Without frames the status is published this often.
   std::chrono::milliseconds heartbeat{1000};
-  SupervisorOptions supervisor;
+  SupervisorOptions supervisor = {};
 };
 
 /// Runs one link: a capture thread (source -> mailbox) and a FEM thread (mailbox -> processor -> hub).
