@@ -78,8 +78,8 @@ class LinkWorkerTest : public testing::Test {
 TEST_F(LinkWorkerTest, FramesBecomeStatesInOrder) {
   Run(Copy);
   for (uint64_t i = 1; i <= 10; ++i) {
-    script_->Push(i, clock_.MonotonicNs());
     clock_.Advance(milliseconds(4));
+    script_->Push(i, clock_.MonotonicNs() - 4'000'000);
     const auto publication = NextFrame();
     ASSERT_NE(publication, nullptr);
     EXPECT_EQ(publication->state().sequence, i);
