@@ -14,6 +14,11 @@ using Selected = std::function<Result<void>()>;
 /// Each registers one subcommand with its options.
 void AddList(CLI::App& app, Selected& selected);
 void AddWatch(CLI::App& app, Selected& selected);
+void AddDetect(CLI::App& app, Selected& selected);
+void AddSolve(CLI::App& app, Selected& selected);
+void AddSimulate(CLI::App& app, Selected& selected);
+void AddSkin(CLI::App& app, Selected& selected);
+void AddShow(CLI::App& app, Selected& selected);
 
 /// `--server`, or the environment variable TACLINK_SERVER, or the local default.
 void AddServerOption(CLI::App& command, std::string& address);

@@ -1,43 +1,34 @@
 #pragma once
 
 #include <array>
-#include <concepts>
-#include <string>
-#include <string_view>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "sensing/core/geometry.h"
 
 namespace taclink::command {
 
-/// Writes one JSON value on one line. Commas are set by itself; keys and values are given in order.
-class JsonWriter {
- public:
-  JsonWriter& Begin(char bracket);  ///< '{' or '['
-  JsonWriter& End(char bracket);    ///< '}' or ']'
-  JsonWriter& Key(std::string_view key);
+/// Keeps keys in the order they were written.
+using Json = nlohmann::ordered_json;
 
-  JsonWriter& Value(std::string_view text);
-  JsonWriter& Value(const char* text) { return Value(std::string_view(text)); }
-  JsonWriter& Value(double number);  ///< null if it is not finite
-  JsonWriter& Value(std::integral auto number) { return Raw(std::to_string(number)); }
-  JsonWriter& Null() { return Raw("null"); }
-  template <size_t N>
-  JsonWriter& Value(const std::array<double, N>& numbers, double scale = 1) {
-    Begin('[');
-    for (const double number : numbers) Value(number * scale);
-    return End(']');
-  }
-  template <typename... T>
-  JsonWriter& Field(std::string_view key, const T&... value) {
-    return Key(key).Value(value...);
-  }
+inline Json ToJson(const Vec3& v) {
+  return Json::array({v.x(), v.y(), v.z()});
+}
 
-  const std::string& text() const { return text_; }
+inline Json ToJson(const std::array<double, 3>& v, double scale) {
+  return Json::array({scale * v[0], scale * v[1], scale * v[2]});
+}
 
- private:
-  JsonWriter& Raw(std::string_view text);
-  void Separate();
+inline Json ToJson(const std::vector<Vec3>& points) {
+  Json list = Json::array();
+  for (const Vec3& p : points) list.push_back(ToJson(p));
+  return list;
+}
 
-  std::string text_;
-  bool first_ = true;  // in the present bracket, or right after a key
-};
+inline Json ToJson(const std::vector<std::array<double, 3>>& points, double scale) {
+  Json list = Json::array();
+  for (const auto& p : points) list.push_back(ToJson(p, scale));
+  return list;
+}
 
 }  // namespace taclink::command

@@ -34,27 +34,24 @@ void PrintTable(const client::Arm& arm) {
 }
 
 void PrintJson(const client::Arm& arm) {
-  JsonWriter json;
-  json.Begin('{').Field("arm", arm.name).Field("server_version", arm.server_version).Key("links").Begin('[');
+  Json links = Json::array();
   for (const auto& link : arm.links) {
-    json.Begin('{')
-        .Field("link", link.name)
-        .Field("model", link.model.name)
-        .Field("source", client::Name(link.source))
-        .Field("source_description", link.source_description)
-        .Field("state", client::Name(link.status))
-        .Field("reason", link.status_reason)
-        .Field("rate_hz", link.rate_hz);
-    json.Field("latency_p50_ms", link.latency_p50_s * 1e3)
-        .Field("latency_p99_ms", link.latency_p99_s * 1e3)
-        .Field("contacts", link.contacts)
-        .Field("frames", link.frames)
-        .Field("frames_skipped", link.frames_skipped)
-        .Field("source_restarts", link.source_restarts)
-        .End('}');
+    links.push_back({{"link", link.name},
+                     {"model", link.model.name},
+                     {"source", client::Name(link.source)},
+                     {"source_description", link.source_description},
+                     {"state", client::Name(link.status)},
+                     {"reason", link.status_reason},
+                     {"rate_hz", link.rate_hz},
+                     {"latency_p50_ms", link.latency_p50_s * 1e3},
+                     {"latency_p99_ms", link.latency_p99_s * 1e3},
+                     {"contacts", link.contacts},
+                     {"frames", link.frames},
+                     {"frames_skipped", link.frames_skipped},
+                     {"source_restarts", link.source_restarts}});
   }
-  json.End(']').End('}');
-  fmt::print("{}\n", json.text());
+  const Json json = {{"arm", arm.name}, {"server_version", arm.server_version}, {"links", std::move(links)}};
+  fmt::print("{}\n", json.dump());
 }
 
 Result<void> Run(const Options& options) {

@@ -35,6 +35,11 @@ int main(int argc, char** argv) {
   taclink::command::Selected selected;
   taclink::command::AddList(app, selected);
   taclink::command::AddWatch(app, selected);
+  taclink::command::AddDetect(app, selected);
+  taclink::command::AddSolve(app, selected);
+  taclink::command::AddSimulate(app, selected);
+  taclink::command::AddSkin(app, selected);
+  taclink::command::AddShow(app, selected);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

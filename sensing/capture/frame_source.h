@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <chrono>
+#include <cstdint>
 #include <string>
 
 #include "sensing/core/frame.h"
@@ -14,6 +16,13 @@ struct SourceInfo {
   int width_px = 0;
   int height_px = 0;
   double frame_rate_hz = 0;
+};
+
+/// Pictures that were taken but not delivered, since the source was made.
+struct SourceCounters {
+  std::array<uint64_t, kCameraCount> damaged{};   ///< by camera: marked bad by the driver, or empty
+  std::array<uint64_t, kCameraCount> unpaired{};  ///< by camera: the other camera had none of that time
+  uint64_t skipped_pairs = 0;                     ///< newer ones were there when the caller asked
 };
 
 /// The seam between what makes pictures (cameras, files, a simulation, a log) and all that follows.
@@ -31,6 +40,7 @@ class FrameSource {
   virtual Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) = 0;
 
   virtual SourceInfo Info() const = 0;
+  virtual SourceCounters Counters() const { return {}; }
 };
 
 }  // namespace taclink

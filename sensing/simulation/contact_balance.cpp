@@ -50,26 +50,28 @@ ContactForces BalanceContacts(const ContactDemands& demands, const ContactMatrix
     balance.target[k] = std::min(depth, demands[k].most_depth_mm);
     result[k].limited = depth > demands[k].most_depth_mm;
   }
-  // Each pass settles at least one contact: one that would pull lets go, one that is too deep stops.
+  // Each pass settles at least one contact. One that is too deep stops before one that would pull lets go: it
+  // may only pull because of the other.
   for (Eigen::Index pass = 0; pass < 2 * n + 1; ++pass) {
     balance.Solve();
     const ContactVector depths = balance.Depths();
-    bool settled = true;
+    bool stopped = false, released = false;
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto k = static_cast<size_t>(i);
-      if (balance.by_depth[k] && balance.force(i) < 0) {
-        balance.by_depth[k] = false;
-        balance.force(i) = 0;
-        settled = false;
-      } else if (!balance.by_depth[k] && balance.force(i) > 0 &&
-                 depths(i) > demands[k].most_depth_mm + kToleranceMm) {
-        balance.by_depth[k] = true;
-        balance.target[k] = demands[k].most_depth_mm;
-        result[k].limited = true;
-        settled = false;
-      }
+      if (balance.by_depth[k] || balance.force(i) <= 0) continue;
+      if (depths(i) <= demands[k].most_depth_mm + kToleranceMm) continue;
+      balance.by_depth[k] = true;
+      balance.target[k] = demands[k].most_depth_mm;
+      result[k].limited = stopped = true;
     }
-    if (settled) break;
+    for (Eigen::Index i = 0; i < n && !stopped; ++i) {
+      const auto k = static_cast<size_t>(i);
+      if (!balance.by_depth[k] || balance.force(i) >= 0) continue;
+      balance.by_depth[k] = false;
+      balance.force(i) = 0;
+      released = true;
+    }
+    if (!stopped && !released) break;
   }
   for (Eigen::Index i = 0; i < n; ++i)
     result[static_cast<size_t>(i)].force_n = std::max(0.0, balance.force(i));

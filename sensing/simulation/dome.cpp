@@ -60,7 +60,8 @@ void DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat
   // In units of the radius from here on; floats, as this is most of a picture's cost.
   const Eigen::Matrix2f m = (sight.px_from_mm.inverse() / dome.radius_mm).cast<float>();
   const float u_by_x = m(0, 0), u_by_y = m(0, 1), w_by_x = m(1, 0), w_by_y = m(1, 1);
-  const float flat = static_cast<float>(1 / sight.facing);
+  const float facing = static_cast<float>(sight.facing);
+  const float px_by_u = 1 / std::hypot(u_by_x, u_by_y);
   const float soft = static_cast<float>(0.5 / half_width);
   const float light_norm = static_cast<float>(1 / std::hypot(1.0, kLightAside));
   const float ambient = static_cast<float>(kAmbient * dome.level);
@@ -72,14 +73,13 @@ void DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat
                 dy = static_cast<float>(y - sight.foot_px.y());
     float u = u_by_x * dx + u_by_y * dy, w = w_by_x * dx + w_by_y * dy;
     for (int x = x0; x < x1; ++x, u += u_by_x, w += w_by_x) {
-      const float stretch = u < 0 ? flat : 1.0F;
-      const float p = u * stretch;
-      const float q2 = p * p + w * w + 1e-6F;
-      // Signed distance to the edge, px: (1 - q) over q's gradient.
-      const float ps = p * stretch;
-      const float gx = ps * u_by_x + w * w_by_x, gy = ps * u_by_y + w * w_by_y;
-      const float q = std::sqrt(q2);
-      const float inside = (1 - q) * q / std::sqrt(gx * gx + gy * gy + 1e-12F);
+      // Signed distances, px, to the ball's outline, (1 - q) over the gradient of q, and to the base's lower
+      // edge.
+      const float q2 = u * u + w * w + 1e-6F;
+      const float gx = u * u_by_x + w * w_by_x, gy = u * u_by_y + w * w_by_y;
+      const float to_outline = (1 - std::sqrt(q2)) * std::sqrt(q2 / (gx * gx + gy * gy + 1e-12F));
+      const float to_base = (u + facing * std::sqrt(std::max(0.0F, 1 - w * w))) * px_by_u;
+      const float inside = std::min(to_outline, to_base);
       const float t = std::clamp(0.5F + inside * soft, 0.0F, 1.0F);
       const float cover = t * t * (3 - 2 * t);
       if (cover <= 0) continue;

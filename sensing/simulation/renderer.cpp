@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kJitterTableSize = 8192;   // a power of two
 constexpr size_t kNoiseOffsets = 1U << 17;  // frames start at one of so many places of the noise table
-constexpr double kMarkerLevel = 255;        // right before the lens, facing it
+constexpr double kMarkerLevel = 235;        // right before the lens, facing it
 constexpr double kHardlyDeformedMm = 0.5;   // shallower dents hide nothing
 constexpr double kGrazeMm = 0.3;  // a wall this close to the line of sight hides less than half a marker
 
@@ -51,7 +51,7 @@ std::vector<int> FarToNear(const std::vector<Vec3>& markers, const Vec3& camera_
 
 Renderer::Renderer(const LinkModel& model, const StereoRig& rig, const CameraEffects& effects, uint64_t seed)
     : dome_radius_mm_(model.markers.diameter_mm / 2),
-      light_reach_mm_(0.9 * model.length_mm),
+      light_reach_mm_(1.6 * model.length_mm),
       effects_(effects),
       seed_(seed) {
   const RadiusGrid wall = RestWall(model);

@@ -1,0 +1,115 @@
+#include "client/command/marker_csv.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <vector>
+
+#include "sensing/shape/inference.h"
+
+namespace taclink::command {
+namespace {
+
+constexpr double kInferredSigmaMm = 5;
+constexpr const char* kHeader = "path,ring,ux,uy,uz";
+
+std::vector<std::string> Fields(const std::string& line) {
+  std::vector<std::string> fields(1);
+  for (const char c : line) {
+    if (c == ',') {
+      fields.emplace_back();
+    } else if (c != ' ' && c != '\t' && c != '\r' && c != '"') {
+      fields.back() += c;
+    }
+  }
+  return fields;
+}
+
+template <typename T>
+bool ParseWhole(const std::string& text, T& value) {
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && stop == end;
+}
+
+struct Row {
+  int marker = 0;
+  bool seen = false;
+  Vec3 displacement_mm = Vec3::Zero();
+};
+
+// The message lacks file and line; the caller adds them.
+Result<Row> ParseRow(const std::string& line, const LinkModel& model) {
+  const auto fields = Fields(line);
+  const auto bad = [](const std::string& what) { return Error{ErrorCode::kInvalidArgument, what}; };
+  if (fields.size() != 5) return bad("expected 5 columns (" + std::string(kHeader) + ")");
+  int path = 0, ring = 0;
+  if (!ParseWhole(fields[0], path) || !ParseWhole(fields[1], ring))
+    return bad("path and ring must be whole numbers");
+  if (path < 1 || path > model.markers.paths || ring < 1 || ring > model.markers.rings()) {
+    return bad("no marker (" + fields[0] + ", " + fields[1] + "); model '" + model.name + "' has " +
+               std::to_string(model.markers.paths) + " paths and " + std::to_string(model.markers.rings()) +
+               " rings");
+  }
+  Row row{.marker = model.MarkerIndex(path - 1, ring - 1)};
+  if (fields[2].empty() && fields[3].empty() && fields[4].empty()) return row;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string& text = fields[static_cast<size_t>(2 + axis)];
+    if (!ParseWhole(text, row.displacement_mm[axis]) || !std::isfinite(row.displacement_mm[axis])) {
+      return bad("displacement '" + text +
+                 "' is not a finite number; leave all three empty for a missing marker");
+    }
+  }
+  row.seen = true;
+  return row;
+}
+
+}  // namespace
+
+Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model, double sigma_mm) {
+  std::ifstream in(path);
+  if (!in) return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
+  const auto count = static_cast<size_t>(model.markers.count());
+  SkinShape shape;
+  shape.positions_mm = model.RestMarkers();
+  shape.displacements_mm.assign(count, Vec3::Zero());
+  shape.covariances_mm2.assign(count, Mat3::Identity());
+  shape.sources.assign(count, MarkerSource::kInferred);
+  std::vector<int> first_line(count, 0);
+  std::string line;
+  int number = 0;
+  bool header_read = false;
+  const auto fail = [&](const std::string& what) {
+    return Error{ErrorCode::kInvalidArgument, path + ":" + std::to_string(number) + ": " + what};
+  };
+  const Vec3 variances = sigma_mm * sigma_mm * Vec3(1, 1, 9);
+  while (std::getline(in, line)) {
+    ++number;
+    if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
+    if (!header_read) {
+      header_read = true;
+      std::string header;
+      for (const auto& field : Fields(line)) header += (header.empty() ? "" : ",") + field;
+      if (header != kHeader) return fail("the header must be '" + std::string(kHeader) + "'");
+      continue;
+    }
+    const auto row = ParseRow(line, model);
+    if (!row) return fail(row.error().message);
+    const auto m = static_cast<size_t>(row->marker);
+    if (first_line[m] != 0)
+      return fail("this marker stands in line " + std::to_string(first_line[m]) + " already");
+    first_line[m] = number;
+    if (!row->seen) continue;
+    shape.displacements_mm[m] = row->displacement_mm;
+    shape.positions_mm[m] += row->displacement_mm;
+    shape.covariances_mm2[m] = variances.asDiagonal();
+    shape.sources[m] = MarkerSource::kBoth;
+  }
+  if (shape.seen() < 3) return Error{ErrorCode::kInvalidArgument, path + ": holds fewer than 3 markers"};
+  InferUnseen(model, kInferredSigmaMm, shape);
+  return shape;
+}
+
+}  // namespace taclink::command

@@ -1,0 +1,74 @@
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/command/commands.h"
+#include "client/command/json.h"
+#include "sensing/mechanics/skin_push.h"
+#include "sensing/model/model_file.h"
+
+namespace taclink::command {
+namespace {
+
+struct PushOptions {
+  std::string model;
+  std::vector<int> node;
+  double depth_mm = 0;
+  double pressure_kpa = 0;
+  double patch_diameter_mm = 5.5;
+  int refinement = 1;
+  std::string force_model = "linear";
+  bool json = false;
+};
+
+Result<void> Push(const PushOptions& options) {
+  const auto model = LoadLinkModel(options.model);
+  if (!model) return model.error();
+  const int path = options.node[0], ring = options.node[1];
+  if (path < 1 || path > model->markers.paths || ring < 1 || ring > model->markers.rings()) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "no node (" + std::to_string(path) + ", " + std::to_string(ring) + "); model '" +
+                     model->name + "' has paths 1 to " + std::to_string(model->markers.paths) +
+                     " and rings 1 to " + std::to_string(model->markers.rings())};
+  }
+  const auto result = PushSkin(*model, {.marker = model->MarkerIndex(path - 1, ring - 1),
+                                        .depth_mm = options.depth_mm,
+                                        .pressure_mpa = options.pressure_kpa * 1e-3,
+                                        .patch_diameter_mm = options.patch_diameter_mm,
+                                        .refinement = options.refinement});
+  if (!result) return result.error();
+  if (options.json) {
+    std::puts(Json({{"force_n", result->force_n}, {"inflation_mm", result->inflation_mm}}).dump().c_str());
+  } else {
+    std::printf("force %.4f N, inflation %.3f mm, nodes in contact %d\n", result->force_n,
+                result->inflation_mm, result->nodes_in_contact);
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddSkin(CLI::App& app, Selected& selected) {
+  auto options = std::make_shared<PushOptions>();
+  CLI::App* skin = app.add_subcommand("skin", "Evaluate a skin's design");
+  skin->require_subcommand(1);
+  CLI::App* push = skin->add_subcommand("push", "Push the simulated skin with a flat disc at a marker");
+  push->add_option("--model", options->model, "Link model: a shipped name or a YAML file")->required();
+  push->add_option("--node", options->node, "PATH,RING of the marker, from 1")
+      ->required()
+      ->delimiter(',')
+      ->expected(2);
+  push->add_option("--depth-mm", options->depth_mm, "Of the disc, from the uninflated radius")->required();
+  push->add_option("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin");
+  push->add_option("--patch-diameter-mm", options->patch_diameter_mm, "Of the disc")
+      ->check(CLI::NonNegativeNumber);
+  push->add_option("--refinement", options->refinement, "Elements per marker interval")
+      ->check(CLI::Range(1, 8));
+  push->add_option("--force-model", options->force_model, "Only linear so far")
+      ->check(CLI::IsMember({"linear"}));
+  push->add_flag("--json", options->json, "One JSON object");
+  push->callback([options, &selected] { selected = [options] { return Push(*options); }; });
+}
+
+}  // namespace taclink::command

@@ -1,0 +1,164 @@
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/command/commands.h"
+#include "client/command/json.h"
+#include "client/command/marker_csv.h"
+#include "sensing/camera/calibration.h"
+#include "sensing/capture/image_io.h"
+#include "sensing/model/model_file.h"
+#include "sensing/pipeline/link_pipeline.h"
+
+namespace taclink::command {
+namespace {
+
+struct SolveOptions {
+  std::string model;
+  std::string markers;
+  std::vector<std::string> rest, images;
+  std::string calibration;
+  double pressure_kpa = 0;
+  double sigma_mm = 0.05;
+  std::string force_model = "linear";
+  bool json = false;
+};
+
+Json ContactJson(const Contact& contact) {
+  return {{"center_mm", ToJson(contact.center_mm)},
+          {"normal", ToJson(contact.normal)},
+          {"force_n", ToJson(contact.force_n)},
+          {"force_sigma_n", contact.force_sigma_n ? ToJson(*contact.force_sigma_n) : Json(nullptr)},
+          {"normal_force_n", contact.normal_force_n},
+          {"area_mm2", contact.area_mm2}};
+}
+
+void PrintJson(const LinkModel& model, const LinkState& state) {
+  Json contacts = Json::array();
+  for (const auto& contact : state.contacts) contacts.push_back(ContactJson(contact));
+  const StageTimes& t = state.stage_ms;
+  const Json out = {
+      {"model", model.name},
+      {"force_model", Name(state.forces.model)},
+      {"markers", {{"seen", state.shape.seen()}, {"inferred", state.shape.CountOf(MarkerSource::kInferred)}}},
+      {"contacts", contacts},
+      {"total_force_n", ToJson(state.total_force_n)},
+      {"positions_mm", ToJson(state.shape.positions_mm)},
+      {"nodal_forces_n", ToJson(state.forces.forces_n)},
+      {"time_ms",
+       {{"detect", t.decode + t.detect},
+        {"register", t.register_},
+        {"reconstruct", t.reconstruct},
+        {"force", t.force}}}};
+  std::puts(out.dump().c_str());
+}
+
+void PrintText(const LinkModel& model, const LinkState& state) {
+  std::printf("%s: %d of %d markers seen, force model %s\n", model.name.c_str(), state.shape.seen(),
+              model.markers.count(), Name(state.forces.model));
+  if (state.contacts.empty()) std::puts("no contact");
+  for (const auto& c : state.contacts) {
+    std::printf("contact at (%.1f, %.1f, %.1f) mm: %.3f N inwards, force (%.3f, %.3f, %.3f) N, %.0f mm2\n",
+                c.center_mm.x(), c.center_mm.y(), c.center_mm.z(), c.normal_force_n, c.force_n.x(),
+                c.force_n.y(), c.force_n.z(), c.area_mm2);
+  }
+}
+
+Result<LinkState> SolveMarkers(const SolveOptions& options, const LinkModel& model) {
+  auto shape = ReadMarkerCsv(options.markers, model, options.sigma_mm);
+  if (!shape) return shape.error();
+  LinkState state;
+  state.shape = std::move(*shape);
+  LinearForceEstimator estimator(model);
+  ContactFinder finder(model);
+  const int64_t start = SystemClock().MonotonicNs();
+  estimator.Estimate(state.shape, options.pressure_kpa * 1e-3, state.forces);
+  finder.Find(state.shape, state.forces, state.contacts);
+  state.stage_ms.force = static_cast<double>(SystemClock().MonotonicNs() - start) * 1e-6;
+  for (const auto& contact : state.contacts) state.total_force_n += contact.force_n;
+  return state;
+}
+
+Result<void> ReadPair(const std::vector<std::string>& paths, StereoFrame& frame) {
+  for (size_t i = 0; i < kCameraCount; ++i) {
+    if (auto read = ReadRawImage(paths[i], frame.images[i]); !read) return read.error();
+  }
+  return {};
+}
+
+Result<LinkState> SolvePictures(const SolveOptions& options, const LinkModel& model) {
+  PipelineOptions pipeline_options;
+  pipeline_options.rest_frames = 1;
+  if (!options.calibration.empty()) {
+    auto rig = LoadCalibration(options.calibration);
+    if (!rig) return rig.error();
+    pipeline_options.rig = *rig;
+  }
+  LinkPipeline pipeline(model, pipeline_options);
+  StereoFrame frame;
+  LinkState state;
+  // Rest pictures are taken without pressure.
+  if (auto read = ReadPair(options.rest, frame); !read) return read.error();
+  frame.pressure_mpa = 0;
+  pipeline.Process(frame, state);
+  if (!pipeline.calibration()) {
+    return Error{ErrorCode::kInvalidArgument, "the rest pictures can't be used: " + state.status_reason};
+  }
+  if (auto read = ReadPair(options.images, frame); !read) return read.error();
+  frame.pressure_mpa = options.pressure_kpa * 1e-3;
+  frame.sequence = 1;
+  pipeline.Process(frame, state);
+  if (!state.measured()) {
+    return Error{ErrorCode::kInvalidArgument, "the pictures can't be solved: " + state.status_reason};
+  }
+  return state;
+}
+
+Result<void> Solve(const SolveOptions& options) {
+  const auto model = LoadLinkModel(options.model);
+  if (!model) return model.error();
+  const auto state = options.markers.empty() ? SolvePictures(options, *model) : SolveMarkers(options, *model);
+  if (!state) return state.error();
+  if (options.json) {
+    PrintJson(*model, *state);
+  } else {
+    PrintText(*model, *state);
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddSolve(CLI::App& app, Selected& selected) {
+  auto options = std::make_shared<SolveOptions>();
+  CLI::App* command =
+      app.add_subcommand("solve", "Contacts and forces from marker displacements or from pictures");
+  command->add_option("--model", options->model, "Link model: a shipped name or a YAML file")->required();
+  auto* markers = command->add_option("--markers", options->markers,
+                                      "CSV with columns path,ring,ux,uy,uz (from 1; mm, link frame)");
+  auto* rest = command->add_option("--rest", options->rest, "TOP and BOTTOM picture of the untouched skin")
+                   ->expected(2);
+  auto* images =
+      command->add_option("--images", options->images, "TOP and BOTTOM picture to solve")->expected(2);
+  command->add_option("--calibration", options->calibration, "Camera parameters; without, found from --rest")
+      ->needs(rest);
+  rest->needs(images)->excludes(markers);
+  images->needs(rest)->excludes(markers);
+  command->add_option("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin");
+  command
+      ->add_option("--sigma-mm", options->sigma_mm,
+                   "With --markers: their standard deviation in x and y; z: 3 times")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--force-model", options->force_model, "Only linear so far")
+      ->check(CLI::IsMember({"linear"}));
+  command->add_flag("--json", options->json, "One JSON object");
+  command->callback([options, markers, images, &selected] {
+    if (markers->count() == 0 && images->count() == 0) {
+      throw CLI::RequiredError("--markers, or --rest and --images");
+    }
+    selected = [options] { return Solve(*options); };
+  });
+}
+
+}  // namespace taclink::command

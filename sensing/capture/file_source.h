@@ -1,0 +1,25 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "sensing/capture/frame_source.h"
+#include "sensing/core/clock.h"
+
+namespace taclink {
+
+struct FileOptions {
+  std::string folder;
+  double frame_rate_hz = 30;
+  bool loop = true;  ///< begins again after the last pair; false: kEndOfData
+  bool paced =
+      true;  ///< at the frame rate, skipping what is late; false: every pair, as fast as they are asked for
+};
+
+/// Numbered picture pairs in a folder: top_000001.png and bottom_000001.png, also .jpg and .jpeg, any count
+/// of digits, in the order of their numbers. A number with only one picture gives a frame whose other image
+/// is not valid. All must have one size, which Start checks. PNG pictures come as kGray8, JPEG ones as kMjpeg
+/// bytes. The time of exposure is when a pair was due, by `clock`.
+std::unique_ptr<FrameSource> MakeFileSource(FileOptions options, Clock& clock);
+
+}  // namespace taclink

@@ -1,0 +1,191 @@
+#include "sensing/markers/path_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace taclink {
+namespace {
+
+// How far beyond the far clamped end, on the way to the axis, a path's control line goes on: a dent near that
+// end is seen inside it.
+constexpr double kBeyondEnd = 0.35;
+// A detection nearer to another path costs more.
+constexpr double kForeign = 2;
+
+// cos of the angle between two vectors is at least `least`, without the root of a division.
+bool WithinAngle(const Vec2& a, const Vec2& b, double least) {
+  return a.dot(b) >= least * std::sqrt(a.squaredNorm() * b.squaredNorm());
+}
+
+// Azimuth, link frame, at which a ray passes the cylinder of that radius about the link's axis.
+std::optional<double> AzimuthAtRadius(const SightRay& ray, double radius_mm) {
+  const Vec2 o = ray.origin.head<2>(), d = ray.direction.head<2>();
+  const double a = d.squaredNorm(), b = o.dot(d), c = o.squaredNorm() - radius_mm * radius_mm;
+  const double discriminant = b * b - a * c;
+  if (a < 1e-12 || discriminant < 0) return std::nullopt;
+  const Vec2 p = o + (-b + std::sqrt(discriminant)) / a * d;
+  return std::atan2(p.y(), p.x());
+}
+
+}  // namespace
+
+PathTracker::PathTracker(const LinkModel& model, const StereoRig& rig, PathTrackerOptions options)
+    : model_(model), options_(options), numbering_(model, options.numbering) {
+  const auto paths = static_cast<size_t>(model.markers.paths);
+  for (const CameraId id : kBothCameras) {
+    views_.push_back({Projector(rig[id]), {}, {}, {}});
+    FindEnds(id, views_.back());
+    chains_[Index(id)].resize(paths);
+    for (auto& chain : chains_[Index(id)]) chain.reserve(static_cast<size_t>(numbering_.max_chain()));
+    path_rays_[Index(id)].reserve(static_cast<size_t>(numbering_.max_chain()));
+  }
+  by_path_.resize(paths);
+  tracings_.resize(paths);
+  for (int j = 0; j < model.markers.rings(); ++j) {
+    mean_radius_mm_ += model.RestMarker(model.MarkerIndex(0, j)).head<2>().norm() / model.markers.rings();
+  }
+}
+
+void PathTracker::FindEnds(CameraId id, View& view) const {
+  const MarkerGrid& grid = model_.markers;
+  const double near_z = id == CameraId::kTop ? 0 : model_.length_mm;
+  const double far_z = model_.length_mm - near_z;
+  const auto axis = view.projector.Project(Vec3(0, 0, far_z));
+  for (int l = 0; l < grid.paths; ++l) {
+    const double angle = model_.PathAngle(l);
+    const auto end = view.projector.Project(model_.PointAtDepth(angle, far_z, grid.center_depth_mm));
+    const bool usable = axis && end;
+    view.usable.push_back(usable);
+    view.ends.push_back(usable ? Vec2(*end + kBeyondEnd * (*axis - *end)) : Vec2(Vec2::Zero()));
+    // The near end may be beyond what the lens model sees: then from a ring that it sees, one step back.
+    auto start = view.projector.Project(model_.PointAtDepth(angle, near_z, grid.center_depth_mm));
+    for (int i = 0; usable && !start && i < grid.rings(); ++i) {
+      const int ring = id == CameraId::kTop ? i : grid.rings() - 1 - i;
+      const auto pixel = view.projector.Project(model_.RestMarker(model_.MarkerIndex(l, ring)));
+      if (pixel) start = *pixel + 0.3 * (*pixel - *end);
+    }
+    view.starts.push_back(start.value_or(view.ends.back()));
+  }
+}
+
+void PathTracker::Label(const std::array<Detections, kCameraCount>& detections, LabelledMarkers& out) {
+  for (const CameraId id : kBothCameras) {
+    SortIntoPaths(id, detections[Index(id)]);
+    Trace(id);
+    out.cameras[Index(id)].assign(static_cast<size_t>(model_.markers.count()), MarkerObservation{});
+  }
+  for (int l = 0; l < model_.markers.paths; ++l) {
+    for (const CameraId id : kBothCameras) {
+      auto& chain = chains_[Index(id)][static_cast<size_t>(l)];
+      if (id == CameraId::kBottom) std::reverse(chain.begin(), chain.end());  // rising z
+      auto& rays = path_rays_[Index(id)];
+      rays.clear();
+      for (const int detection : chain) rays.push_back(rays_[Index(id)][static_cast<size_t>(detection)]);
+    }
+    numbering_.Number(path_rays_[0], path_rays_[1]);
+    for (const CameraId id : kBothCameras) {
+      for (int j = 0; j < model_.markers.rings(); ++j) {
+        const int place = numbering_.LabelOf(id, j);
+        if (place < 0) continue;
+        const auto detection =
+            static_cast<size_t>(chains_[Index(id)][static_cast<size_t>(l)][static_cast<size_t>(place)]);
+        const Detection& d = detections[Index(id)][detection];
+        out.cameras[Index(id)][static_cast<size_t>(model_.MarkerIndex(l, j))] = {true, d.center_px,
+                                                                                 d.sigma_px};
+      }
+    }
+  }
+}
+
+void PathTracker::SortIntoPaths(CameraId id, const Detections& detections) {
+  const Projector& projector = views_[Index(id)].projector;
+  candidates_.clear();
+  rays_[Index(id)].clear();
+  for (auto& list : by_path_) list.clear();
+  const int paths = model_.markers.paths;
+  for (const Detection& d : detections) {
+    Candidate candidate{.pixel = d.center_px};
+    const auto direction = projector.Ray(d.center_px);
+    rays_[Index(id)].push_back({projector.center_in_link(), direction.value_or(Vec3::UnitZ())});
+    const auto azimuth =
+        direction ? AzimuthAtRadius(rays_[Index(id)].back(), mean_radius_mm_) : std::optional<double>();
+    if (azimuth) {
+      const double place =
+          (*azimuth - model_.markers.first_path_angle_rad) / model_.markers.path_pitch_rad() + 2 * paths;
+      const auto nearest = static_cast<int>(std::lround(place));
+      candidate.path = nearest % paths;
+      candidate.offset = place - nearest;
+      by_path_[static_cast<size_t>(candidate.path)].push_back(static_cast<int>(candidates_.size()));
+    }
+    candidates_.push_back(candidate);
+  }
+}
+
+// Round by round: every path proposes its best next node, the cheapest proposal for a detection wins.
+void PathTracker::Trace(CameraId id) {
+  const View& view = views_[Index(id)];
+  auto& chains = chains_[Index(id)];
+  size_t active = 0;
+  for (size_t l = 0; l < tracings_.size(); ++l) {
+    chains[l].clear();
+    tracings_[l] = {.node = view.starts[l], .end = view.ends[l], .active = view.usable[l]};
+    active += view.usable[l] ? 1 : 0;
+  }
+  owners_.resize(candidates_.size());
+  while (active > 0) {
+    std::fill(owners_.begin(), owners_.end(), -1);
+    for (size_t l = 0; l < tracings_.size(); ++l) {
+      Tracing& tracing = tracings_[l];
+      if (!tracing.active) continue;
+      FindBest(static_cast<int>(l), tracing);
+      if (tracing.best < 0) {
+        tracing.active = false;
+        --active;
+        continue;
+      }
+      int& owner = owners_[static_cast<size_t>(tracing.best)];
+      if (owner < 0 || tracing.cost < tracings_[static_cast<size_t>(owner)].cost) owner = static_cast<int>(l);
+    }
+    for (size_t c = 0; c < owners_.size(); ++c) {
+      if (owners_[c] < 0) continue;
+      const auto l = static_cast<size_t>(owners_[c]);
+      candidates_[c].taken = true;
+      chains[l].push_back(static_cast<int>(c));
+      tracings_[l].node = candidates_[c].pixel;
+      if (static_cast<int>(chains[l].size()) == numbering_.max_chain()) {
+        tracings_[l].active = false;
+        --active;
+      }
+    }
+  }
+}
+
+// (4.25) to (4.29).
+void PathTracker::FindBest(int path, Tracing& tracing) const {
+  tracing.best = -1;
+  tracing.cost = std::numeric_limits<double>::infinity();
+  const Vec2 line = tracing.end - tracing.node;
+  const double length = line.norm();
+  if (length < 1e-9) return;
+  const double cos_alpha = std::cos(options_.alpha_rad), cos_beta = std::cos(options_.beta_rad);
+  const int paths = model_.markers.paths;
+  for (int neighbour = -1; neighbour <= 1; ++neighbour) {
+    for (const int c : by_path_[static_cast<size_t>((path + neighbour + paths) % paths)]) {
+      const Candidate& candidate = candidates_[static_cast<size_t>(c)];
+      if (candidate.taken || std::abs(candidate.offset + neighbour) > options_.sector) continue;
+      const Vec2 from_node = candidate.pixel - tracing.node, from_end = candidate.pixel - tracing.end;
+      if (!WithinAngle(from_node, line, cos_alpha) || !WithinAngle(from_end, -line, cos_beta)) continue;
+      const double closeness = from_node.norm();
+      const double smoothness = std::abs(from_node.x() * line.y() - from_node.y() * line.x()) / length;
+      const double cost = ((1 - options_.lambda) * closeness + options_.lambda * smoothness) *
+                          (neighbour == 0 ? 1 : kForeign);
+      if (cost < tracing.cost) {
+        tracing.cost = cost;
+        tracing.best = c;
+      }
+    }
+  }
+}
+
+}  // namespace taclink

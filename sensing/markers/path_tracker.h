@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "sensing/camera/projection.h"
+#include "sensing/core/link_model.h"
+#include "sensing/core/markers.h"
+#include "sensing/markers/ring_numbering.h"
+
+namespace taclink {
+
+struct PathTrackerOptions {
+  double lambda = 0.5;                ///< weight of smoothness against closeness, (4.27)
+  double alpha_rad = RadFromDeg(30);  ///< search angle at the node before, (4.29)
+  double beta_rad = RadFromDeg(30);   ///< search angle at the far end, (4.29)
+  /// A detection further than this from a path's angle is none of it; in path pitches.
+  double sector = 0.6;
+  RingNumberingOptions numbering;
+};
+
+/// Detections to labels, for any shape of the skin, by a search from scratch: (4.25) to (4.29), improved.
+///
+/// 1. Trace. In each picture all paths grow at once from the clamped end near the camera towards the far one,
+///    a node at a time by (4.27); a detection that two paths want goes to the cheaper one. This gives each
+///    path's detections in their order, which is also the order of the rings: a camera on the axis sees no
+///    two points of a path in reverse order.
+/// 2. Number. Which ring each of them is takes both pictures, see RingNumbering.
+///
+/// Constant after construction but for scratch memory: one thread.
+class PathTracker {
+ public:
+  PathTracker(const LinkModel& model, const StereoRig& rig, PathTrackerOptions options = {});
+
+  /// What can't be labelled safely is left unseen. Clipped detections are labelled too, with their large
+  /// sigma.
+  void Label(const std::array<Detections, kCameraCount>& detections, LabelledMarkers& out);
+
+ private:
+  struct Candidate {
+    Vec2 pixel;
+    int path = 0;       // the nearest
+    double offset = 0;  // angle from it, in pitches
+    bool taken = false;
+  };
+  struct Tracing {  // of a path
+    Vec2 node, end;
+    int best = -1;  // candidate
+    double cost = 0;
+    bool active = false;
+  };
+  struct View {  // constant after construction
+    Projector projector;
+    std::vector<Vec2> starts, ends;  // by path: pixels of the clamped ends, (4.7) and (4.8)
+    std::vector<bool> usable;
+  };
+
+  void FindEnds(CameraId id, View& view) const;
+  void SortIntoPaths(CameraId id, const Detections& detections);
+  void Trace(CameraId id);
+  void FindBest(int path, Tracing& tracing) const;
+
+  const LinkModel model_;
+  const PathTrackerOptions options_;
+  std::vector<View> views_;  // by camera
+  std::vector<Candidate> candidates_;
+  std::vector<std::vector<int>> by_path_;  // candidates, by nearest path
+  std::vector<Tracing> tracings_;
+  std::array<std::vector<std::vector<int>>, kCameraCount> chains_;  // detections, by path, near to far
+  std::array<std::vector<SightRay>, kCameraCount> rays_;            // by detection
+  std::array<std::vector<SightRay>, kCameraCount> path_rays_;       // of one path's chains
+  std::vector<int> owners_;                                         // path, by candidate
+  double mean_radius_mm_ = 0;
+  RingNumbering numbering_;
+};
+
+}  // namespace taclink

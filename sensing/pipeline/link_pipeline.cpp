@@ -1,0 +1,188 @@
+#include "sensing/pipeline/link_pipeline.h"
+
+#include <algorithm>
+#include <array>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "sensing/capture/decode.h"
+#include "sensing/markers/detector.h"
+#include "sensing/markers/path_tracker.h"
+#include "sensing/pipeline/rest_pose.h"
+#include "sensing/shape/reconstructor.h"
+
+namespace taclink {
+namespace {
+
+// Below these fractions of seen markers a link is called degraded, or lost.
+constexpr double kDegradedFraction = 0.8;
+constexpr double kLostFraction = 0.4;
+
+void SetStatus(LinkState& state, LinkStatus status, std::string reason) {
+  state.status = status;
+  state.status_reason = std::move(reason);
+}
+
+void ClearMeasurement(LinkState& state) {
+  state.shape.positions_mm.clear();
+  state.shape.displacements_mm.clear();
+  state.shape.covariances_mm2.clear();
+  state.shape.sources.clear();
+  state.forces.forces_n.clear();
+  state.forces.sigmas_n.clear();
+  state.forces.loaded.clear();
+  state.contacts.clear();
+  state.total_force_n.setZero();
+}
+
+}  // namespace
+
+struct LinkPipeline::Stages {
+  Stages(const LinkModel& link_model, const PipelineOptions& pipeline_options, Clock& pipeline_clock)
+      : model(link_model),
+        options(pipeline_options),
+        clock(pipeline_clock),
+        rest(link_model, pipeline_options.rig, pipeline_options.rest_frames),
+        estimator(link_model, pipeline_options.force),
+        finder(link_model, pipeline_options.contact) {}
+
+  const LinkModel model;
+  const PipelineOptions options;
+  Clock& clock;
+
+  std::array<GrayDecoder, kCameraCount> decoders;
+  std::array<cv::Mat, kCameraCount> gray;
+  MarkerDetector detector;
+  std::array<Detections, kCameraCount> detections;
+  RestPose rest;
+  // Made when the rest pose is known.
+  std::optional<PathTracker> tracker;
+  std::optional<ShapeReconstructor> reconstructor;
+  int64_t baseline_ns = 0;
+  double baseline_pressure_mpa = 0;
+
+  LabelledMarkers labels;
+  LinearForceEstimator estimator;
+  ContactFinder finder;
+
+  std::string camera_trouble;  // of the frame in work
+
+  double MsSince(int64_t start_ns) const {
+    return static_cast<double>(clock.MonotonicNs() - start_ns) * 1e-6;
+  }
+
+  void Decode(const StereoFrame& frame) {
+    camera_trouble.clear();
+    for (const CameraId id : kBothCameras) {
+      const auto i = Index(id);
+      gray[i].release();
+      if (!frame.images[i].valid) {
+        camera_trouble = std::string("no picture from the ") + Name(id) + " camera";
+        continue;
+      }
+      if (auto decoded = decoders[i].Decode(frame.images[i], gray[i]); !decoded) {
+        gray[i].release();
+        camera_trouble = std::string(Name(id)) + " camera: " + decoded.error().message;
+      }
+    }
+  }
+
+  void Detect(LinkState& state) {
+    for (size_t i = 0; i < kCameraCount; ++i) {
+      detections[i].clear();
+      if (!gray[i].empty()) detector.Detect(gray[i], detections[i]);
+      state.cameras[i].detections = static_cast<int>(detections[i].size());
+    }
+  }
+
+  // A pair before the baseline is known.
+  void TakeRest(double pressure_mpa, LinkState& state) {
+    ClearMeasurement(state);
+    if (!camera_trouble.empty()) return SetStatus(state, LinkStatus::kCalibrating, camera_trouble);
+    const auto complete = rest.Add(detections);
+    if (!complete) return SetStatus(state, LinkStatus::kCalibrating, complete.error().message);
+    SetStatus(state, LinkStatus::kCalibrating, "taking the rest shape; do not touch the skin");
+    if (!*complete) return;
+    tracker.emplace(model, rest.calibration()->rig);
+    ShapeOptions shape_options;
+    shape_options.camera_sigma_px = std::max(shape_options.camera_sigma_px, rest.noise_px());
+    reconstructor.emplace(model, rest.calibration()->rig, shape_options);
+    SkinShape baseline;
+    reconstructor->Reconstruct(rest.markers(), baseline);
+    reconstructor->SetBaseline(baseline);
+    baseline_ns = clock.MonotonicNs();
+    baseline_pressure_mpa = pressure_mpa;
+  }
+
+  void Judge(LinkState& state) const {
+    const int seen = state.shape.seen(), all = model.markers.count();
+    const std::string count = std::to_string(seen) + " of " + std::to_string(all) + " markers seen";
+    if (seen < kLostFraction * all) {
+      SetStatus(state, LinkStatus::kLost, count + (camera_trouble.empty() ? "" : "; " + camera_trouble));
+      ClearMeasurement(state);
+    } else if (!camera_trouble.empty()) {
+      SetStatus(state, LinkStatus::kDegraded, camera_trouble);
+    } else if (seen < kDegradedFraction * all) {
+      SetStatus(state, LinkStatus::kDegraded, count);
+    } else if (!state.forces.converged) {
+      SetStatus(state, LinkStatus::kDegraded, "more loads than the force model takes");
+    } else {
+      SetStatus(state, LinkStatus::kOk, "");
+    }
+  }
+
+  void Register(LinkState& state) {
+    tracker->Label(detections, labels);
+    for (size_t i = 0; i < kCameraCount; ++i) {
+      state.cameras[i].labelled = 0;
+      for (const auto& marker : labels.cameras[i]) state.cameras[i].labelled += marker.seen ? 1 : 0;
+    }
+  }
+};
+
+LinkPipeline::LinkPipeline(const LinkModel& model, const PipelineOptions& options, Clock& clock)
+    : stages_(std::make_unique<Stages>(model, options, clock)) {}
+LinkPipeline::~LinkPipeline() = default;
+LinkPipeline::LinkPipeline(LinkPipeline&&) noexcept = default;
+
+const LinkModel& LinkPipeline::model() const {
+  return stages_->model;
+}
+const std::optional<CalibrationSummary>& LinkPipeline::calibration() const {
+  return stages_->rest.calibration();
+}
+
+void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
+  Stages& s = *stages_;
+  state.sequence = frame.sequence;
+  state.times = frame.times;
+  state.pressure_mpa = frame.pressure_mpa;
+  state.stage_ms = {};
+  const double pressure_mpa = frame.pressure_mpa.value_or(s.options.pressure_mpa);
+
+  const auto timed = [&s](double& stage_ms, auto&& stage) {
+    const int64_t start = s.clock.MonotonicNs();
+    stage();
+    stage_ms = s.MsSince(start);
+  };
+  timed(state.stage_ms.decode, [&] { s.Decode(frame); });
+  timed(state.stage_ms.detect, [&] { s.Detect(state); });
+  if (!s.reconstructor) {
+    s.TakeRest(pressure_mpa, state);
+    return;
+  }
+  timed(state.stage_ms.register_, [&] { s.Register(state); });
+  state.times.tracked_ns = s.clock.MonotonicNs();
+  timed(state.stage_ms.reconstruct, [&] { s.reconstructor->Reconstruct(s.labels, state.shape); });
+  timed(state.stage_ms.force, [&] {
+    s.estimator.Estimate(state.shape, pressure_mpa - s.baseline_pressure_mpa, state.forces);
+    s.finder.Find(state.shape, state.forces, state.contacts);
+  });
+  state.total_force_n.setZero();
+  for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
+  state.baseline_age_s = s.MsSince(s.baseline_ns) * 1e-3;
+  s.Judge(state);
+  state.times.solved_ns = s.clock.MonotonicNs();
+}
+
+}  // namespace taclink

@@ -1,0 +1,128 @@
+#include "sensing/pipeline/rest_pose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "sensing/markers/rest_labels.h"
+
+namespace taclink {
+namespace {
+
+constexpr double kLeastSeenFraction = 0.5;  // in each picture
+
+double Median(std::vector<double>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+RestPose::RestPose(const LinkModel& model, const std::optional<StereoRig>& rig, int frames)
+    : model_(model), rig_(rig), frames_(frames) {
+  StartAgain();
+}
+
+void RestPose::StartAgain() {
+  taken_ = 0;
+  tracker_.reset();
+  const auto count = static_cast<size_t>(model_.markers.count());
+  for (size_t c = 0; c < kCameraCount; ++c) {
+    mean_.cameras[c].assign(count, {});
+    squares_[c].assign(count, 0.0);
+    counts_[c].assign(count, 0);
+  }
+}
+
+Result<bool> RestPose::Add(const std::array<Detections, kCameraCount>& detections) {
+  Result<void> good;
+  if (!tracker_) {
+    good = Begin(detections);
+  } else {
+    tracker_->Label(detections, labels_);
+  }
+  if (good) good = CheckCount();
+  if (!good) {
+    StartAgain();
+    return good.error();
+  }
+  Accumulate();
+  if (++taken_ < frames_) return false;
+  return Finish();
+}
+
+// Labels the first pair, and makes the tracker that labels the others.
+Result<void> RestPose::Begin(const std::array<Detections, kCameraCount>& detections) {
+  if (rig_) {
+    tracker_.emplace(model_, *rig_);
+    tracker_->Label(detections, labels_);
+    return {};
+  }
+  auto labels = LabelRestPair(model_, detections);
+  if (!labels) return labels.error();
+  labels_ = std::move(*labels);
+  const auto first = CalibrateFromRest(model_, labels_);
+  if (!first) return first.error();
+  tracker_.emplace(model_, first->rig);
+  return {};
+}
+
+Result<void> RestPose::CheckCount() const {
+  for (const CameraId id : kBothCameras) {
+    int seen = 0;
+    for (const auto& marker : labels_.cameras[Index(id)]) seen += marker.seen ? 1 : 0;
+    if (seen < kLeastSeenFraction * model_.markers.count()) {
+      return Error{
+          ErrorCode::kInvalidArgument,
+          std::string(Name(id)) + " camera: only " + std::to_string(seen) + " of " +
+              std::to_string(model_.markers.count()) +
+              " markers recognised; check model, light and focus, and that nothing touches the skin"};
+    }
+  }
+  return {};
+}
+
+void RestPose::Accumulate() {
+  for (size_t c = 0; c < kCameraCount; ++c) {
+    for (size_t m = 0; m < labels_.cameras[c].size(); ++m) {
+      const MarkerObservation& one = labels_.cameras[c][m];
+      if (!one.seen) continue;
+      mean_.cameras[c][m].center_px += one.center_px;
+      mean_.cameras[c][m].sigma_px += one.sigma_px;
+      squares_[c][m] += one.center_px.squaredNorm();
+      ++counts_[c][m];
+    }
+  }
+}
+
+Result<bool> RestPose::Finish() {
+  std::vector<double> variances;
+  for (size_t c = 0; c < kCameraCount; ++c) {
+    for (size_t m = 0; m < counts_[c].size(); ++m) {
+      MarkerObservation& mean = mean_.cameras[c][m];
+      const int n = counts_[c][m];
+      mean.seen = 2 * n > taken_;
+      if (!mean.seen) continue;
+      mean.center_px /= n;
+      mean.sigma_px /= n * std::sqrt(n);
+      if (n > 1) variances.push_back((squares_[c][m] - n * mean.center_px.squaredNorm()) / (2.0 * (n - 1)));
+    }
+  }
+  noise_px_ = std::sqrt(std::max(0.0, Median(variances)));
+  if (rig_) {
+    calibration_ = CalibrationSummary{.rig = *rig_};
+    return true;
+  }
+  auto calibrated = CalibrateFromRest(model_, mean_);
+  if (!calibrated) {
+    StartAgain();
+    return calibrated.error();
+  }
+  calibration_ = *calibrated;
+  if (variances.empty()) noise_px_ = calibrated->rms_px;
+  return true;
+}
+
+}  // namespace taclink

@@ -1,0 +1,168 @@
+// Every stage from two pictures in memory to contacts, the whole way, and the simulation that makes the
+// pictures. One core. "touched": 0.2 N at one marker; "rest": nothing moves.
+#include <benchmark/benchmark.h>
+
+#include <array>
+#include <cstdlib>
+#include <opencv2/core.hpp>
+
+#include "sensing/capture/decode.h"
+#include "sensing/contact/contact_finder.h"
+#include "sensing/force/linear_estimator.h"
+#include "sensing/markers/detector.h"
+#include "sensing/markers/path_tracker.h"
+#include "sensing/model/model_file.h"
+#include "sensing/pipeline/link_pipeline.h"
+#include "sensing/shape/reconstructor.h"
+#include "sensing/simulation/renderer.h"
+#include "sensing/simulation/simulated_skin.h"
+
+namespace taclink {
+namespace {
+
+constexpr double kRestS = 0, kTouchedS = 3;
+
+// One link with its pictures at rest and touched.
+struct Bench {
+  explicit Bench(const std::string& model_name)
+      : model(LoadLinkModel(model_name).value()),
+        scene(LoadScene("press").value()),
+        skin(SimulatedSkin::Make(model, scene).value()),
+        renderer(model, model.nominal_rig, scene.camera, 1) {
+    cv::setNumThreads(1);
+    Take(kRestS, rest);
+    Take(kTouchedS, touched);
+  }
+
+  void Take(double time_s, StereoFrame& frame) {
+    skin->Evaluate(time_s, truth);
+    for (const CameraId id : kBothCameras) {
+      renderer.Render(truth, id, gray);
+      PackYuyv(gray, renderer.chroma(id), frame.images[Index(id)]);
+    }
+    frame.pressure_mpa = 0;
+  }
+
+  LinkPipeline CalibratedPipeline() const {
+    PipelineOptions options;
+    options.rest_frames = 1;
+    LinkPipeline pipeline(model, options);
+    LinkState state;
+    pipeline.Process(rest, state);
+    if (!pipeline.calibration()) std::abort();
+    return pipeline;
+  }
+
+  LinkModel model;
+  Scene scene;
+  std::unique_ptr<SimulatedSkin> skin;
+  Renderer renderer;
+  SkinTruth truth;
+  cv::Mat gray;
+  StereoFrame rest, touched;
+};
+
+Bench& For(const benchmark::State& state) {
+  static Bench cylinder("cylinder"), barrel("barrel");
+  return state.range(0) == 0 ? cylinder : barrel;
+}
+
+// What one stage hands to the next, for the touched pictures.
+struct Stages {
+  explicit Stages(const Bench& bench)
+      : pipeline(bench.CalibratedPipeline()),
+        tracker(bench.model, pipeline.calibration()->rig),
+        reconstructor(bench.model, pipeline.calibration()->rig) {
+    for (const StereoFrame* frame : {&bench.rest, &bench.touched}) {
+      for (size_t i = 0; i < kCameraCount; ++i) {
+        if (!decoder.Decode(frame->images[i], gray[i])) std::abort();
+        detector.Detect(gray[i], detections[i]);
+      }
+      tracker.Label(detections, labels);
+      reconstructor.Reconstruct(labels, shape);
+      if (frame == &bench.rest) reconstructor.SetBaseline(shape);
+    }
+  }
+
+  LinkPipeline pipeline;
+  GrayDecoder decoder;
+  MarkerDetector detector;
+  std::array<cv::Mat, kCameraCount> gray;
+  std::array<Detections, kCameraCount> detections;
+  PathTracker tracker;
+  LabelledMarkers labels;
+  ShapeReconstructor reconstructor;
+  SkinShape shape;
+};
+
+void Decode(benchmark::State& state) {
+  Bench& bench = For(state);
+  Stages s(bench);
+  for (auto _ : state) {
+    for (size_t i = 0; i < kCameraCount; ++i) {
+      if (!s.decoder.Decode(bench.touched.images[i], s.gray[i])) std::abort();
+    }
+  }
+}
+
+void Detect(benchmark::State& state) {
+  Stages s(For(state));
+  for (auto _ : state) {
+    for (size_t i = 0; i < kCameraCount; ++i) s.detector.Detect(s.gray[i], s.detections[i]);
+  }
+}
+
+void Register(benchmark::State& state) {
+  Stages s(For(state));
+  for (auto _ : state) s.tracker.Label(s.detections, s.labels);
+}
+
+void Reconstruct(benchmark::State& state) {
+  Stages s(For(state));
+  for (auto _ : state) s.reconstructor.Reconstruct(s.labels, s.shape);
+}
+
+void ForceAndContacts(benchmark::State& state) {
+  Bench& bench = For(state);
+  Stages s(bench);
+  LinearForceEstimator estimator(bench.model);
+  ContactFinder finder(bench.model);
+  NodalForces forces;
+  std::vector<Contact> contacts;
+  for (auto _ : state) {
+    estimator.Estimate(s.shape, 0, forces);
+    finder.Find(s.shape, forces, contacts);
+  }
+  state.counters["contacts"] = static_cast<double>(contacts.size());
+}
+
+void Whole(benchmark::State& state, StereoFrame Bench::* frame) {
+  Bench& bench = For(state);
+  LinkPipeline pipeline = bench.CalibratedPipeline();
+  LinkState result;
+  for (auto _ : state) pipeline.Process(bench.*frame, result);
+  state.counters["contacts"] = static_cast<double>(result.contacts.size());
+  state.counters["seen"] = result.shape.seen();
+}
+
+void Simulate(benchmark::State& state) {
+  Bench& bench = For(state);
+  StereoFrame frame;
+  for (auto _ : state) bench.Take(kTouchedS, frame);
+}
+
+void BothModels(benchmark::internal::Benchmark* benchmark) {
+  benchmark->Arg(0)->Arg(1)->ArgName("barrel")->Unit(benchmark::kMillisecond);
+}
+
+BENCHMARK(Decode)->Apply(BothModels);
+BENCHMARK(Detect)->Apply(BothModels);
+BENCHMARK(Register)->Apply(BothModels);
+BENCHMARK(Reconstruct)->Apply(BothModels);
+BENCHMARK(ForceAndContacts)->Apply(BothModels);
+BENCHMARK_CAPTURE(Whole, rest, &Bench::rest)->Apply(BothModels);
+BENCHMARK_CAPTURE(Whole, touched, &Bench::touched)->Apply(BothModels);
+BENCHMARK(Simulate)->Apply(BothModels);
+
+}  // namespace
+}  // namespace taclink

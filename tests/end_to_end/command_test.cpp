@@ -1,0 +1,88 @@
+// What the command says and how it exits, for good and for bad input.
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "tests/end_to_end/support.h"
+
+namespace taclink::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+using CommandTest = ScratchFolder;
+
+void ExpectRefused(const std::vector<std::string>& arguments, int exit_code, const std::string& hint) {
+  const Finished run = Taclink(arguments);
+  std::string shown;
+  for (const auto& word : arguments) shown += word + " ";
+  EXPECT_EQ(run.exit_code, exit_code) << shown << run.err;
+  EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << shown << run.err;
+  EXPECT_THAT(run.err, HasSubstr(hint)) << shown;
+  EXPECT_EQ(run.out, "") << shown;
+}
+
+TEST_F(CommandTest, BadInputGivesOneLineAndAnExitCode) {
+  ExpectRefused({}, 2, "subcommand");
+  ExpectRefused({"dance"}, 2, "dance");
+  ExpectRefused({"solve"}, 2, "--model");
+  ExpectRefused({"solve", "--model", "cylinder"}, 2, "--markers");
+  ExpectRefused({"solve", "--model", "cone", "--markers", "m.csv"}, 1, "shipped model");
+  ExpectRefused({"solve", "--model", "cylinder", "--markers", Path("none.csv")}, 1, "none.csv");
+  ExpectRefused({"solve", "--model", "cylinder", "--rest", "a.png", "b.png"}, 2, "--images");
+  ExpectRefused({"detect", Path("none.png")}, 1, "none.png");
+  ExpectRefused({"detect", Write("text.png", "this is no picture")}, 1, "text.png");
+  ExpectRefused({"skin", "push", "--model", "cylinder", "--node", "25,5", "--depth-mm", "5"}, 1,
+                "paths 1 to 24");
+  ExpectRefused({"skin", "push", "--model", "cylinder", "--node", "7,5", "--depth-mm", "30"}, 1, "tube");
+  ExpectRefused({"skin", "push", "--model", "cylinder", "--node", "7", "--depth-mm", "5"}, 2, "--node");
+  ExpectRefused({"simulate", "--scene", Path("none.yaml"), "--out", Path("out")}, 1, "none.yaml");
+  ExpectRefused({"list", "--server", "127.0.0.1:1"}, 1, "127.0.0.1:1");
+}
+
+TEST_F(CommandTest, BadMarkerFilesAreNamedWithTheirLine) {
+  const auto refused = [&](const std::string& csv, const std::string& hint) {
+    ExpectRefused({"solve", "--model", "cylinder", "--markers", Write("m.csv", csv)}, 1, hint);
+  };
+  refused("", "fewer than 3");
+  refused("path,ring,x,y,z\n1,1,0,0,0\n", "m.csv:1: the header must be");
+  refused("path,ring,ux,uy,uz\n1,1,0,0\n", "m.csv:2: expected 5 columns");
+  refused("path,ring,ux,uy,uz\n25,1,0,0,0\n", "m.csv:2: no marker (25, 1)");
+  refused("path,ring,ux,uy,uz\n1,1,nan,0,0\n", "m.csv:2: displacement 'nan'");
+  refused("path,ring,ux,uy,uz\n1,1,0,0,0\n1,1,0,0,0\n", "line 2 already");
+}
+
+TEST_F(CommandTest, HelpAndVersionAreNoErrors) {
+  EXPECT_EQ(Taclink({"--help"}).exit_code, 0);
+  EXPECT_THAT(Taclink({"solve", "--help"}).out, AllOf(HasSubstr("--markers"), HasSubstr("--json")));
+  EXPECT_EQ(Taclink({"--version"}).exit_code, 0);
+}
+
+TEST_F(CommandTest, DetectFindsTheMarkersOfARealPicture) {
+  const Finished run =
+      Taclink({"detect", TACLINK_TEST_DATA "/barrel_real_bottom.jpg", "--json", "--draw", Path("drawn.png")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto markers = json::parse(run.out).at("markers");
+  EXPECT_GE(markers.size(), 230u);
+  EXPECT_LE(markers.size(), 260u);
+  for (const auto& marker : markers) {
+    EXPECT_GT(std::hypot(marker.at("x").get<double>() - 326, marker.at("y").get<double>() - 246), 29);
+    EXPECT_GT(marker.at("sigma_px").get<double>(), 0);
+    EXPECT_GT(marker.at("width").get<double>(), 0);
+  }
+  EXPECT_GT(std::filesystem::file_size(Path("drawn.png")), 10000u);
+}
+
+TEST_F(CommandTest, SkinPushAnswersWithForceAndInflation) {
+  const Finished run = Taclink({"skin", "push", "--model", "cylinder", "--node", "7,5", "--depth-mm", "10",
+                                "--pressure-kpa", "0.5", "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json answer = json::parse(run.out);
+  EXPECT_NEAR(answer.at("force_n").get<double>(), 0.30, 0.02);  // the linear column of the probe table
+  EXPECT_NEAR(answer.at("inflation_mm").get<double>(), 1.5, 0.1);
+}
+
+}  // namespace
+}  // namespace taclink::testing

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "sensing/core/geometry.h"
+#include "tests/support/process.h"
+
+namespace taclink::testing {
+
+using nlohmann::json;
+
+inline Finished Taclink(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), TACLINK);
+  return Run(arguments);
+}
+
+inline Vec3 ToVec3(const json& list) {
+  return {list.at(0), list.at(1), list.at(2)};
+}
+
+/// A folder of this test's own, gone with it.
+class ScratchFolder : public ::testing::Test {
+ protected:
+  ScratchFolder() {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    std::string name =
+        std::string(test->test_suite_name()) + "." + test->name() + "." + std::to_string(getpid());
+    for (char& c : name) c = c == '/' ? '_' : c;
+    folder_ = std::filesystem::temp_directory_path() / name;
+    std::filesystem::create_directories(folder_);
+  }
+  ~ScratchFolder() override { std::filesystem::remove_all(folder_); }
+
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string Write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return Path(name);
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+}  // namespace taclink::testing

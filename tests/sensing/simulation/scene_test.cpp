@@ -1,0 +1,95 @@
+#include "sensing/simulation/scene.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/sensing/simulation/scene_text.h"
+
+namespace taclink {
+namespace {
+
+using testing::HasSubstr;
+
+std::string Message(const std::string& more) {
+  const auto scene = ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\n" + more);
+  return scene.ok() ? "accepted" : scene.error().message;
+}
+
+TEST(Scene, ShippedOnesBeginUntouchedAndFitBothEnds) {
+  EXPECT_THAT(ShippedSceneNames(),
+              testing::UnorderedElementsAre("rest", "press", "two_touches", "stroke", "inflate"));
+  for (const std::string& name : ShippedSceneNames()) {
+    SCOPED_TRACE(name);
+    const auto scene = LoadScene(name);
+    ASSERT_TRUE(scene.ok()) << scene.error().message;
+    EXPECT_EQ(scene->name, name);
+    EXPECT_TRUE(scene->loop);
+    for (double t = 0; t <= 1; t += 0.1) EXPECT_EQ(scene->PressureKpa(t), 0);
+    EXPECT_EQ(scene->PressureKpa(scene->duration_s), 0);
+    for (const SceneContact& contact : scene->contacts) EXPECT_GE(contact.begin_s, 1);
+    EXPECT_TRUE(SimulatedSkin::Make(Model(scene->model), *scene).ok());
+  }
+}
+
+TEST(Scene, ReadsEveryField) {
+  const Scene scene = SceneWith(
+      "model: barrel\nframe_rate_hz: 60\nloop: false\nseed: 7\n"
+      "pressure_keyframes: [{time_s: 1, kpa: 0}, {time_s: 3, kpa: 1}]\n"
+      "contacts:\n"
+      "  - {at: {path: 2, ring: 3}, force_n: 0.5, begin_s: 1, end_s: 3}\n"
+      "  - {at: {angle_deg: 90, z_mm: 50}, move_to: {angle_deg: 180, z_mm: 60}, patch_diameter_mm: 9,\n"
+      "     depth_mm: 4, begin_s: 0, end_s: 4, ramp_s: 1}\n"
+      "camera: {marker_jitter_px: 0.3, sensor_noise_levels: 1, blur_px: 0.5, exposure: 2, glow: 0, "
+      "vignetting: 0}\n");
+  EXPECT_EQ(scene.model, "barrel");
+  EXPECT_EQ(scene.frame_rate_hz, 60);
+  EXPECT_FALSE(scene.loop);
+  EXPECT_EQ(scene.seed, 7U);
+  EXPECT_NEAR(scene.PressureKpa(0), 0, 1e-12);
+  EXPECT_NEAR(scene.PressureKpa(2.5), 0.75, 1e-12);
+  EXPECT_NEAR(scene.PressureKpa(4), 1, 1e-12);
+  ASSERT_EQ(scene.contacts.size(), 2U);
+  EXPECT_EQ(scene.contacts[0].at.path, 2);
+  EXPECT_EQ(scene.contacts[0].at.ring, 3);
+  EXPECT_EQ(scene.contacts[0].patch_diameter_mm, 5.5);
+  EXPECT_EQ(scene.contacts[0].force_n, 0.5);
+  EXPECT_FALSE(scene.contacts[0].move_to.has_value());
+  EXPECT_EQ(scene.contacts[1].depth_mm, 4);
+  EXPECT_NEAR(scene.contacts[1].move_to->angle_rad, kPi, 1e-12);
+  EXPECT_EQ(scene.camera.marker_jitter_px, 0.3);
+  EXPECT_EQ(scene.camera.glow, 0);
+}
+
+TEST(Scene, BadInputIsNamedWithFileAndLine) {
+  const std::string at = "contacts:\n  - {at: {path: 1, ring: 1}, ";
+  EXPECT_THAT(Message("colour: red\n"), HasSubstr("s.yaml:4: 'colour' is not a known key"));
+  EXPECT_THAT(Message("frame_rate_hz: fast\n"), HasSubstr("s.yaml:4: 'frame_rate_hz' must be a number"));
+  EXPECT_THAT(Message(at + "begin_s: 1, end_s: 2}\n"), HasSubstr("s.yaml:5: 'contacts[0].force_n'"));
+  EXPECT_THAT(Message(at + "force_n: 1, depth_mm: 1, begin_s: 1, end_s: 2}\n"), HasSubstr("exactly one"));
+  EXPECT_THAT(Message(at + "force_n: 1, begin_s: 3, end_s: 2}\n"), HasSubstr("must be after begin_s"));
+  EXPECT_THAT(Message(at + "force_n: 1, begin_s: 1, end_s: 2, ramp_s: 0.6}\n"), HasSubstr("fit twice"));
+  EXPECT_THAT(Message(at + "force_n: -1, begin_s: 1, end_s: 2}\n"), HasSubstr("at least 0"));
+  EXPECT_THAT(Message(at + "force_n: 1, begin_s: 1, end_s: 9}\n"), HasSubstr("at most 4"));
+  EXPECT_THAT(Message("contacts:\n  - {at: {path: 1}, force_n: 1, begin_s: 1, end_s: 2}\n"),
+              HasSubstr("'contacts[0].at.ring' is missing"));
+  EXPECT_THAT(Message("pressure_kpa: 1\npressure_keyframes: [{time_s: 0, kpa: 0}]\n"),
+              HasSubstr("give only one"));
+  EXPECT_THAT(Message("pressure_keyframes: [{time_s: 1, kpa: 0}, {time_s: 1, kpa: 0}]\n"),
+              HasSubstr("must rise"));
+  EXPECT_THAT(Message("camera: {blur_px: -1}\n"), HasSubstr("camera.blur_px"));
+  EXPECT_EQ(LoadScene("no-such-scene").error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(LoadScene("no-such-scene").error().message, HasSubstr("two_touches"));
+}
+
+TEST(Scene, AContactBesideTheModelIsNamedWithItsLine) {
+  const auto message = [](const std::string& at) {
+    const Scene scene = SceneWith("contacts:\n  - {at: " + at + ", force_n: 1, begin_s: 1, end_s: 2}\n");
+    return SimulatedSkin::Make(Model("cylinder"), scene).error().message;
+  };
+  EXPECT_THAT(message("{path: 25, ring: 1}"),
+              HasSubstr("s.yaml:5: marker (25, 1) is not on model 'cylinder'"));
+  EXPECT_THAT(message("{angle_deg: 0, z_mm: 300}"), HasSubstr("s.yaml:5: 'z_mm' must lie between"));
+}
+
+}  // namespace
+}  // namespace taclink

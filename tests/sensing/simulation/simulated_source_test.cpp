@@ -1,0 +1,108 @@
+#include "sensing/simulation/simulated_source.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/sensing/simulation/scene_text.h"
+
+namespace taclink {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr int64_t kMs = 1'000'000;
+
+class FakeClock final : public Clock {
+ public:
+  int64_t MonotonicNs() const override { return now_ns; }
+  int64_t UtcNs() const override { return now_ns + 1'000'000'000'000; }
+  void SleepUntilMonotonicNs(int64_t time_ns) override { now_ns = std::max(now_ns, time_ns); }
+
+  int64_t now_ns = 5000 * kMs;
+};
+
+class SimulatedSourceTest : public testing::Test {
+ protected:
+  std::unique_ptr<SimulatedSource> Source(const std::string& more) {
+    auto source = SimulatedSource::Make(Model("cylinder"), SceneWith("frame_rate_hz: 100\n" + more), clock_);
+    EXPECT_TRUE(source.ok());
+    return std::move(*source);
+  }
+  FakeClock clock_;
+  StereoFrame frame_;
+};
+
+TEST_F(SimulatedSourceTest, DeliversAtTheScenesRate) {
+  const auto source = Source("pressure_kpa: 0.5\n");
+  EXPECT_EQ(source->Next(frame_, milliseconds(20)).error().code, ErrorCode::kUnavailable);
+  ASSERT_TRUE(source->Start().ok());
+  EXPECT_EQ(source->Info().frame_rate_hz, 100);
+  EXPECT_EQ(source->Info().width_px, 640);
+  const int64_t start = clock_.now_ns;
+  for (int k = 0; k < 5; ++k) {
+    ASSERT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+    EXPECT_EQ(frame_.sequence, static_cast<uint64_t>(k));
+    EXPECT_EQ(clock_.now_ns, start + k * 10 * kMs);
+    EXPECT_EQ(frame_.times.exposure_monotonic_ns, clock_.now_ns);
+    EXPECT_EQ(frame_.times.exposure_utc_ns, clock_.UtcNs());
+    EXPECT_EQ(frame_.times.received_ns, clock_.now_ns);
+    EXPECT_EQ(source->truth().frame, frame_.sequence);
+    ASSERT_TRUE(frame_.pressure_mpa.has_value());
+    EXPECT_DOUBLE_EQ(*frame_.pressure_mpa, 0.5e-3);
+    for (const RawImage& image : frame_.images) {
+      EXPECT_TRUE(image.valid);
+      EXPECT_EQ(image.format, PixelFormat::kYuyv);
+      EXPECT_EQ(image.bytes.size(), 640U * 480 * 2);
+    }
+  }
+}
+
+TEST_F(SimulatedSourceTest, SkipsToTheNewestWhenLate) {
+  const auto source = Source("");
+  ASSERT_TRUE(source->Start().ok());
+  ASSERT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+  clock_.now_ns += 57 * kMs;
+  ASSERT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+  EXPECT_EQ(frame_.sequence, 5U);
+  EXPECT_EQ(frame_.times.received_ns - frame_.times.exposure_monotonic_ns, 7 * kMs);
+  ASSERT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+  EXPECT_EQ(frame_.sequence, 6U);
+  clock_.now_ns += 3'600'000 * kMs;
+  ASSERT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+  EXPECT_EQ(frame_.sequence, 360'006U);
+}
+
+TEST_F(SimulatedSourceTest, TimesOutAndComesBack) {
+  const auto source = Source("");
+  ASSERT_TRUE(source->Start().ok());
+  ASSERT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+  const int64_t before = clock_.now_ns;
+  EXPECT_EQ(source->Next(frame_, milliseconds(4)).error().code, ErrorCode::kTimeout);
+  EXPECT_EQ(clock_.now_ns, before + 4 * kMs);
+  ASSERT_TRUE(source->Next(frame_, milliseconds(6)).ok());
+  EXPECT_EQ(frame_.sequence, 1U);
+}
+
+TEST_F(SimulatedSourceTest, EndsWhereTheSceneDoes) {
+  const auto source = Source("loop: false\n");
+  ASSERT_TRUE(source->Start().ok());
+  clock_.now_ns += 3999 * kMs;
+  ASSERT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+  EXPECT_EQ(frame_.sequence, 399U);
+  ASSERT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+  EXPECT_EQ(source->Next(frame_, milliseconds(20)).error().code, ErrorCode::kEndOfData);
+  ASSERT_TRUE(source->Start().ok());
+  EXPECT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+}
+
+TEST_F(SimulatedSourceTest, ReusesTheFramesBuffers) {
+  const auto source = MakeSimulatedSource(Model("cylinder"), LoadScene("stroke").value(), clock_);
+  ASSERT_TRUE(source.ok());
+  ASSERT_TRUE((*source)->Start().ok());
+  ASSERT_TRUE((*source)->Next(frame_, milliseconds(50)).ok());
+  const uint8_t* buffer = frame_.images[0].bytes.data();
+  for (int k = 0; k < 60; ++k) ASSERT_TRUE((*source)->Next(frame_, milliseconds(50)).ok());
+  EXPECT_EQ(frame_.images[0].bytes.data(), buffer);
+}
+
+}  // namespace
+}  // namespace taclink
