@@ -50,7 +50,7 @@ class LinkWorker {
   void Solve(const std::stop_token& stop);
   void SolveOne(const StereoFrame& frame);
   void PublishStatusIfDue();
-  void Publish(std::unique_ptr<LinkState> state);
+  void Stamp(LinkState& state);
 
   // Constant after construction.
   const size_t link_;
