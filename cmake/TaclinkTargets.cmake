@@ -8,7 +8,9 @@ add_library(taclink_flags INTERFACE)
 target_compile_options(taclink_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -Werror)
 target_include_directories(taclink_flags INTERFACE "${PROJECT_SOURCE_DIR}")
 if(TACLINK_SANITIZER)
-  target_compile_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER} -fno-sanitize-recover=all)
+  # GCC warns of uninitialised values that are not there once the sanitizers change the code.
+  target_compile_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER} -fno-sanitize-recover=all
+                                                 -Wno-maybe-uninitialized)
   target_link_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER})
 endif()
 
@@ -19,7 +21,7 @@ function(taclink_library name)
   target_link_libraries(${name} PUBLIC taclink_flags ${arg_LINKS})
 endfunction()
 
-# taclink_test(NAME SOURCES ... LINKS ... [LABELS ...] [WITHOUT_MAIN]): one GoogleTest program, its cases known to ctest.
+# taclink_test(NAME SOURCES ... LINKS ... [LABELS ...]): one GoogleTest program, its cases known to ctest.
 function(taclink_test name)
   cmake_parse_arguments(arg "" "" "SOURCES;LINKS;LABELS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
@@ -28,7 +30,7 @@ function(taclink_test name)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 300 LABELS "${arg_LABELS}")
 endfunction()
 
-# taclink_embed(TARGET HEADER FUNCTION FILES ...): text files become `std::span<const EmbeddedFile> FUNCTION()`.
+# taclink_embed(TARGET FUNCTION NAME FILES ...): text files become `std::span<const EmbeddedFile> FUNCTION()`.
 function(taclink_embed target)
   cmake_parse_arguments(arg "" "FUNCTION" "FILES" ${ARGN})
   set(output "${CMAKE_CURRENT_BINARY_DIR}/${arg_FUNCTION}.cpp")

@@ -44,7 +44,11 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);
-    return Complain(std::string(e.what()) + "; see taclink --help", kUsage);
+    // CLI11 only says that a subcommand is missing.
+    const bool unknown = argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty();
+    return Complain(unknown ? "no command '" + std::string(argv[1]) + "'; see taclink --help"
+                            : std::string(e.what()) + "; see taclink --help",
+                    kUsage);
   }
   try {
     const auto result = selected();

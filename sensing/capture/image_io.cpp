@@ -8,8 +8,10 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 #include <span>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -181,6 +183,7 @@ Result<void> WritePng(const std::string& path, const cv::Mat& picture) {
   image.width = static_cast<png_uint_32>(picture.cols);
   image.height = static_cast<png_uint_32>(picture.rows);
   image.format = picture.channels() == 1 ? PNG_FORMAT_GRAY : PNG_FORMAT_BGR;
+  image.flags = PNG_IMAGE_FLAG_FAST;  // camera noise hardly compresses anyway
   File file(std::fopen(path.c_str(), "wbe"));
   if (!file) return Error{ErrorCode::kUnavailable, path + ": can't be written: " + std::strerror(errno)};
   const bool encoded = png_image_write_to_stdio(&image, file.get(), 0, picture.data,
@@ -188,7 +191,8 @@ Result<void> WritePng(const std::string& path, const cv::Mat& picture) {
   errno = 0;
   const bool closed = std::fclose(file.release()) == 0;
   if (encoded && closed) return {};
-  std::remove(path.c_str());
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);
   return Error{ErrorCode::kUnavailable,
                path + ": can't be written: " + (encoded ? std::strerror(errno) : image.message)};
 }

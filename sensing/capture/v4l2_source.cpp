@@ -249,7 +249,7 @@ Error V4l2Source::NothingYet(std::chrono::milliseconds timeout) const {
     silent += (silent.empty() ? "" : " and ") + options_.devices[Index(id)];
   }
   return {ErrorCode::kTimeout, "no pair of pictures within " + std::to_string(timeout.count()) + " ms" +
-                                   (silent.empty() ? "" : "; nothing at all from " + silent)};
+                                   (silent.empty() ? "" : "; nothing from " + silent)};
 }
 
 SourceInfo V4l2Source::Info() const {

@@ -16,9 +16,9 @@ struct V4l2Options {
   int height_px = 480;
   double frame_rate_hz = 30;
   PixelFormat format = PixelFormat::kYuyv;
-  std::optional<int> exposure_100us;  ///< exposure time, 0.1 ms; none: the camera's own automatic
-  std::optional<int> gain;            ///< camera's own units; none: the camera's own automatic
-  int buffers = 4;                    ///< pictures each driver can hold, 4 to 32
+  std::optional<int> exposure_100us = {};  ///< exposure time, 0.1 ms; none: the camera's own automatic
+  std::optional<int> gain = {};            ///< camera's own units; none: the camera's own automatic
+  int buffers = 4;                         ///< pictures each driver can hold, 4 to 32
 };
 
 /// Two cameras under Linux' V4L2, both waited for with one poll and paired by their drivers' timestamps

@@ -10,7 +10,7 @@
 namespace taclink {
 
 struct ContactOptions {
-  double min_force_n = 0.02;    ///< weaker contacts are not reported
+  double min_force_n = 0.03;    ///< weaker contacts are not reported
   double same_contact_mm = 30;  ///< a contact keeps its id if its centre moved less between frames
 };
 

@@ -13,7 +13,7 @@ struct LinearEstimatorOptions {
   /// A load is believed if it explains the displacements by this many standard deviations.
   double significance = 4.5;
   /// What the linear model itself gets wrong, as a fraction of each marker's displacement; adds to its noise.
-  double model_error = 0.02;
+  double model_error = 0.05;
   /// Smallest standard deviation given to a marker, mm; detections correlate, so covariances alone are too
   /// proud.
   double noise_floor_mm = 0.03;

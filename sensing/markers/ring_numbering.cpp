@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace taclink {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr int kSpare = 4;  // detections of a path beyond its rings that are looked at
+constexpr int kMaxLag = 5;  // rings in a row that may be missing and still be aligned
+constexpr int kSpare = 4;   // detections of a path beyond its rings that are looked at
 
 double Square(double x) {
   return x * x;
@@ -38,6 +40,7 @@ RingNumbering::RingNumbering(const LinkModel& model, RingNumberingOptions option
   for (auto& labels : labels_) labels.assign(static_cast<size_t>(rings_), -1);
   bends_mm_.resize(static_cast<size_t>(rings_));
   known_.resize(static_cast<size_t>(rings_));
+  doubtful_.resize(static_cast<size_t>(rings_));
 }
 
 RingNumbering::State& RingNumbering::At(int ring, int top, int bottom) {
@@ -54,17 +57,24 @@ void RingNumbering::Number(std::span<const SightRay> top, std::span<const SightR
   if (!AlignPlainly()) {
     Align();
     ReadBack();
+    FindBends();
+    DropAmbiguousPairs();
+    for (int round = 0; round < 2; ++round) {  // what goes takes its neighbours' support away
+      CheckSingles();
+      DropUnsupported();
+    }
   }
-  std::fill(known_.begin(), known_.end(), false);
-  for (int j = 0; j < rings_; ++j) {
-    const auto k = static_cast<size_t>(j);
-    if (labels_[0][k] < 0 || labels_[1][k] < 0) continue;
-    bends_mm_[k] = PairOf(labels_[0][k], labels_[1][k]).radius_mm - ring_radius_mm_[k];
-    known_[k] = true;
-  }
-  for (const CameraId id : kBothCameras) CheckSingles(id);
+  CheckSingles();
   if (skipped > 0) {
     for (int& label : labels_[Index(CameraId::kBottom)]) label += label >= 0 ? static_cast<int>(skipped) : 0;
+  }
+}
+
+void RingNumbering::FindBends() {
+  for (int j = 0; j < rings_; ++j) {
+    const auto k = static_cast<size_t>(j);
+    known_[k] = labels_[0][k] >= 0 && labels_[1][k] >= 0;
+    if (known_[k]) bends_mm_[k] = PairOf(labels_[0][k], labels_[1][k]).radius_mm - ring_radius_mm_[k];
   }
 }
 
@@ -72,21 +82,100 @@ void RingNumbering::MeetAll() {
   for (size_t t = 0; t < chains_[0].size(); ++t) {
     for (size_t b = 0; b < chains_[1].size(); ++b) {
       Pair& pair = pairs_[t * static_cast<size_t>(max_chain_) + b];
+      pair.ring = -1;
       const auto meeting = MeetRays(chains_[0][t], chains_[1][b]);
-      pair.possible = meeting && meeting->gap_mm <= options_.max_ray_gap_mm;
-      if (!pair.possible) continue;
+      if (!meeting || meeting->gap_mm > options_.max_ray_gap_mm) continue;
       pair.z_mm = meeting->point_mm.z();
       pair.radius_mm = meeting->point_mm.head<2>().norm();
       pair.gap_mm = meeting->gap_mm;
+      pair.ring = RingAt(pair.z_mm, pair.radius_mm);
     }
   }
 }
 
-bool RingNumbering::PairFits(const Pair& pair, int ring) const {
+// The one ring that a triangulated point may be on; -1: none.
+int RingNumbering::RingAt(double z_mm, double radius_mm) const {
+  const auto after = std::lower_bound(ring_z_mm_.begin(), ring_z_mm_.end(), z_mm);
+  auto k = static_cast<size_t>(after - ring_z_mm_.begin());
+  if (k == ring_z_mm_.size() || (k > 0 && z_mm - ring_z_mm_[k - 1] < ring_z_mm_[k] - z_mm)) --k;
+  const bool fits = std::abs(z_mm - ring_z_mm_[k]) <= options_.max_z_error * ring_pitch_mm_[k] &&
+                    radius_mm >= tube_radius_mm_ - 1 &&
+                    radius_mm <= ring_radius_mm_[k] + options_.max_outward_mm;
+  return fits ? static_cast<int>(k) : -1;
+}
+
+double RingNumbering::PairCost(const Pair& pair, int ring) const {
   const auto k = static_cast<size_t>(ring);
-  return pair.possible && std::abs(pair.z_mm - ring_z_mm_[k]) <= options_.max_z_error * ring_pitch_mm_[k] &&
-         pair.radius_mm >= tube_radius_mm_ - 1 &&
-         pair.radius_mm <= ring_radius_mm_[k] + options_.max_outward_mm;
+  const double off_z = (pair.z_mm - ring_z_mm_[k]) / (options_.sigma_z * ring_pitch_mm_[k]);
+  return Square(off_z) + Square(pair.gap_mm / options_.sigma_gap_mm);
+}
+
+// Capped in the displacement: a dent may be as deep as it likes.
+double RingNumbering::RivalCost(const Pair& pair, int ring) const {
+  const double bend = pair.radius_mm - ring_radius_mm_[static_cast<size_t>(ring)];
+  return PairCost(pair, ring) +
+         std::min(Square((bend - ExpectedBend(ring)) / options_.sigma_rival_mm), options_.max_rival_cost);
+}
+
+// A detection that meets one of the other camera's almost as well on some ring may be that ring's; so may
+// another pair on the same ring.
+void RingNumbering::DropAmbiguousPairs() {
+  const auto tops = static_cast<int>(chains_[0].size()), bottoms = static_cast<int>(chains_[1].size());
+  std::fill(doubtful_.begin(), doubtful_.end(), uint8_t{0});
+  for (int j = 0; j < rings_; ++j) {
+    const auto k = static_cast<size_t>(j);
+    const int t = labels_[0][k], b = labels_[1][k];
+    if (t < 0 || b < 0) continue;
+    const double limit = RivalCost(PairOf(t, b), j) + options_.min_margin;
+    for (int t2 = 0; t2 < tops; ++t2) {
+      for (int b2 = 0; b2 < bottoms; ++b2) {
+        const Pair& pair = PairOf(t2, b2);
+        const bool rival = (t2 == t) != (b2 == b) || (pair.ring == j && t2 != t);
+        if (!rival || pair.ring < 0 || RivalCost(pair, pair.ring) >= limit) continue;
+        if (b2 != b) doubtful_[k] |= 1;
+        if (t2 != t) doubtful_[k] |= 2;
+      }
+    }
+  }
+  for (size_t k = 0; k < doubtful_.size(); ++k) {
+    if ((doubtful_[k] & 1) != 0) labels_[0][k] = -1;
+    if ((doubtful_[k] & 2) != 0) labels_[1][k] = -1;
+  }
+}
+
+bool RingNumbering::HasNeighbour(CameraId id, int ring) const {
+  const int place = LabelOf(id, ring);
+  for (const int step : {-1, 1}) {
+    const int next = ring + step;
+    if (next >= 0 && next < rings_ && LabelOf(id, next) >= 0 && LabelOf(id, next) == place + step)
+      return true;
+  }
+  return false;
+}
+
+// A chance meeting of two rays must not be alone. Next to rings that nothing is known of the far camera's
+// label goes, in the middle of such rings both; and so does every label without a neighbour on the skin that
+// is its neighbour in the chain, too.
+void RingNumbering::DropUnsupported() {
+  const auto unresolved = [&](int ring) {
+    return ring >= 0 && ring < rings_ && labels_[0][static_cast<size_t>(ring)] < 0 &&
+           labels_[1][static_cast<size_t>(ring)] < 0;
+  };
+  for (int j = 0; j < rings_; ++j) doubtful_[static_cast<size_t>(j)] = 0;
+  for (int j = 0; j < rings_; ++j) {
+    const auto k = static_cast<size_t>(j);
+    if (labels_[0][k] < 0 || labels_[1][k] < 0) continue;
+    const bool before = unresolved(j - 1), after = unresolved(j + 1);
+    const bool top_is_far = ring_z_mm_[k] > 0.5 * length_mm_;
+    if (before && after) doubtful_[k] = 3;
+    if (before != after) doubtful_[k] = top_is_far ? 1 : 2;
+    if (!HasNeighbour(CameraId::kTop, j)) doubtful_[k] |= 1;
+    if (!HasNeighbour(CameraId::kBottom, j)) doubtful_[k] |= 2;
+  }
+  for (size_t k = 0; k < doubtful_.size(); ++k) {
+    if ((doubtful_[k] & 1) != 0) labels_[0][k] = -1;
+    if ((doubtful_[k] & 2) != 0) labels_[1][k] = -1;
+  }
 }
 
 std::optional<double> RingNumbering::Bend(CameraId id, int place, int ring) const {
@@ -100,21 +189,14 @@ std::optional<double> RingNumbering::Bend(CameraId id, int place, int ring) cons
   return radius - ring_radius_mm_[k];
 }
 
-// As the thesis numbers: by counting from each camera's end. Holds nearly always; true if every ring that
-// both cameras count agrees, and only far rings are missing.
+// As the thesis numbers, by counting; believed if nothing is missing and every ring agrees.
 bool RingNumbering::AlignPlainly() {
-  const auto tops = static_cast<int>(chains_[0].size()), bottoms = static_cast<int>(chains_[1].size());
-  if (tops > rings_ || bottoms > rings_ || tops + bottoms < rings_ + 2) return false;
-  const int first = rings_ - bottoms;  // ring of the bottom chain's first
-  if (first < 0) return false;
-  for (int j = first; j < tops; ++j) {
-    const Pair& pair = PairOf(j, j - first);
-    const auto k = static_cast<size_t>(j);
-    const bool close = std::abs(pair.z_mm - ring_z_mm_[k]) <= options_.plain_z_error * ring_pitch_mm_[k];
-    if (!PairFits(pair, j) || !close) return false;
+  const auto full = static_cast<size_t>(rings_);
+  if (chains_[0].size() != full || chains_[1].size() != full) return false;
+  for (int j = 0; j < rings_; ++j) {
+    if (PairOf(j, j).ring != j) return false;
   }
-  for (int j = 0; j < tops; ++j) labels_[0][static_cast<size_t>(j)] = j;
-  for (int j = first; j < rings_; ++j) labels_[1][static_cast<size_t>(j)] = j - first;
+  for (auto& labels : labels_) std::iota(labels.begin(), labels.end(), 0);
   return true;
 }
 
@@ -126,9 +208,10 @@ void RingNumbering::Align() {
     }
   }
   At(0, 0, 0) = {};
+  const auto lag_top = std::max(kMaxLag, rings_ - tops), lag_bottom = std::max(kMaxLag, rings_ - bottoms);
   for (int j = 0; j <= rings_; ++j) {
-    for (int t = 0; t <= tops; ++t) {
-      for (int b = 0; b <= bottoms; ++b) {
+    for (int t = std::max(0, j - lag_top); t <= std::min(tops, j + kSpare); ++t) {
+      for (int b = std::max(0, j - lag_bottom); b <= std::min(bottoms, j + kSpare); ++b) {
         if (At(j, t, b).cost < kInfinite) Relax(j, t, b);
       }
     }
@@ -162,11 +245,9 @@ void RingNumbering::Relax(int ring, int top, int bottom) {
   }
   if (has_top && has_bottom) {
     const Pair& pair = PairOf(top, bottom);
-    if (!PairFits(pair, ring)) return;
+    if (pair.ring != ring) return;
     const double bend = pair.radius_mm - ring_radius_mm_[k];
-    const double off_z = (pair.z_mm - ring_z_mm_[k]) / (options_.sigma_z * ring_pitch_mm_[k]);
-    const double cost = Square(off_z) + Square(pair.gap_mm / options_.sigma_gap_mm) + bending(bend);
-    Offer(ring + 1, top + 1, bottom + 1, from.cost + cost, bend, kPair);
+    Offer(ring + 1, top + 1, bottom + 1, from.cost + PairCost(pair, ring) + bending(bend), bend, kPair);
   }
 }
 
@@ -207,8 +288,17 @@ double RingNumbering::ExpectedBend(int ring) const {
   return bend0 + (bend1 - bend0) * (ring_z_mm_[static_cast<size_t>(ring)] - z0) / (z1 - z0);
 }
 
+// Without the other camera only the order tells rings apart: the neighbour in the chain towards the camera
+// must be that on the skin, and the radial displacement must suit this ring better than the next ones.
 bool RingNumbering::SingleHolds(CameraId id, int ring, double expected_mm) const {
-  const int place = labels_[Index(id)][static_cast<size_t>(ring)];
+  const auto& labels = labels_[Index(id)];
+  const int place = labels[static_cast<size_t>(ring)];
+  const int step = id == CameraId::kTop ? -1 : 1;  // towards the camera
+  const int next_place = place + step, next_ring = ring + step;
+  const bool last_ring = next_ring < 0 || next_ring >= rings_;
+  const bool last_place = next_place < 0 || next_place >= static_cast<int>(chains_[Index(id)].size());
+  if (last_ring != last_place) return false;
+  if (!last_ring && labels[static_cast<size_t>(next_ring)] != next_place) return false;
   const auto bend = Bend(id, place, ring);
   if (!bend) return false;
   for (const int other : {ring - 1, ring + 1}) {
@@ -222,12 +312,13 @@ bool RingNumbering::SingleHolds(CameraId id, int ring, double expected_mm) const
 
 // Near rings first: there the next ring is far away in the picture, and each one that holds supports the
 // next.
-void RingNumbering::CheckSingles(CameraId id) {
-  const auto other = 1 - Index(id);
-  for (int i = 0; i < rings_; ++i) {
-    const int ring = id == CameraId::kTop ? i : rings_ - 1 - i;
+void RingNumbering::CheckSingles() {
+  FindBends();
+  for (int i = 0; i < kCameraCount * rings_; ++i) {
+    const CameraId id = i < rings_ ? CameraId::kTop : CameraId::kBottom;
+    const int ring = id == CameraId::kTop ? i : kCameraCount * rings_ - 1 - i;
     const auto k = static_cast<size_t>(ring);
-    if (labels_[Index(id)][k] < 0 || labels_[other][k] >= 0) continue;
+    if (labels_[Index(id)][k] < 0 || labels_[1 - Index(id)][k] >= 0) continue;
     if (!SingleHolds(id, ring, ExpectedBend(ring))) {
       labels_[Index(id)][k] = -1;
       continue;

@@ -13,17 +13,19 @@ namespace taclink {
 
 struct RingNumberingOptions {
   /// A triangulated marker is off its ring's z by at most this, in ring pitches.
-  double max_z_error = 0.25;
-  /// Counting alone is believed if every triangulated marker is within this, in ring pitches.
-  double plain_z_error = 0.15;
-  double max_ray_gap_mm = 2.5;  ///< between the two cameras' rays to one marker
+  double max_z_error = 0.15;
+  double max_ray_gap_mm = 1.2;  ///< between the two cameras' rays to one marker
   double max_outward_mm = 15;   ///< beyond the radius at rest
   /// A label that only one camera supports holds if its radial displacement is off the neighbours' line by
   /// at most this part of what the next ring's label would be off.
   double max_single_error = 0.35;
+  /// A pair of detections holds if no other pairing of either is as cheap but for this.
+  double min_margin = 2.5;
+  double sigma_rival_mm = 2.5;  ///< of the radial displacement off the neighbours' line, for that
+  double max_rival_cost = 4;    ///< of the displacement, for that
   // Weights of the alignment: standard deviations, and costs in squared ones.
-  double sigma_z = 0.12;  ///< ring pitches
-  double sigma_gap_mm = 1.0;
+  double sigma_z = 0.06;  ///< ring pitches
+  double sigma_gap_mm = 0.6;
   double sigma_bend_mm = 6;  ///< radial displacement from ring to ring
   double miss_cost = 5;      ///< a camera does not see a ring
   double false_cost = 6;     ///< a detection is no marker
@@ -57,7 +59,7 @@ class RingNumbering {
   };
   struct Pair {
     double z_mm = 0, radius_mm = 0, gap_mm = 0;
-    bool possible = false;
+    int ring = -1;  // on which it may be; -1: none
   };
 
   State& At(int ring, int top, int bottom);
@@ -65,13 +67,19 @@ class RingNumbering {
     return pairs_[static_cast<size_t>(top * max_chain_ + bottom)];
   }
   void MeetAll();
-  bool PairFits(const Pair& pair, int ring) const;
+  int RingAt(double z_mm, double radius_mm) const;
+  double PairCost(const Pair& pair, int ring) const;
   bool AlignPlainly();
   void Align();
   void Relax(int ring, int top, int bottom);
   void Offer(int ring, int top, int bottom, double cost, double bend_mm, Move move);
   void ReadBack();
-  void CheckSingles(CameraId id);
+  void FindBends();
+  double RivalCost(const Pair& pair, int ring) const;
+  void DropAmbiguousPairs();
+  void DropUnsupported();
+  bool HasNeighbour(CameraId id, int ring) const;
+  void CheckSingles();
   bool SingleHolds(CameraId id, int ring, double expected_mm) const;
   /// Radial displacement of a chain's detection if it is on that ring; None: not possible there.
   std::optional<double> Bend(CameraId id, int place, int ring) const;
@@ -89,6 +97,7 @@ class RingNumbering {
   std::array<std::vector<int>, kCameraCount> labels_;
   std::vector<double> bends_mm_;  // by ring, where known_
   std::vector<bool> known_;
+  std::vector<uint8_t> doubtful_;  // by ring; 1: the top label, 2: the bottom one
 };
 
 }  // namespace taclink

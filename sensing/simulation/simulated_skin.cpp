@@ -61,6 +61,7 @@ Result<std::unique_ptr<SimulatedSkin>> SimulatedSkin::Make(const LinkModel& mode
     return Error{ErrorCode::kInvalidArgument,
                  "scene '" + scene.name + "': too many contacts, or no pressure"};
   std::vector<SkinContact> contacts;
+  contacts.reserve(scene.contacts.size());
   for (const SceneContact& plan : scene.contacts) {
     const auto from = Locate(model, plan.at, plan.where);
     if (!from) return from.error();
@@ -105,6 +106,7 @@ SimulatedSkin::SimulatedSkin(const LinkModel& model, const Scene& scene, std::ve
 void SimulatedSkin::LearnResponses(SkinContact& contact, double diameter_mm) {
   if (!contact.moves) {
     std::vector<NodalLoad> loads;
+    loads.reserve(contact.patch.size());
     for (const NodeWeight& w : contact.patch)
       loads.push_back({w.node, -w.weight / contact.radial_share * radial_[static_cast<size_t>(w.node)]});
     contact.response = Flat(shell_.Solve(loads));
@@ -219,7 +221,7 @@ double SimulatedSkin::InwardDepth(const State& state, const SkinContact& contact
 
 Vec3 SimulatedSkin::Director(int node) const {
   const Vec3& rest = mesh().normals[static_cast<size_t>(node)];
-  const Vec3 rotation = state_.segment<3>(3 * (mesh().node_count() + node));
+  const Vec3 rotation = state_.segment<3>(Eigen::Index{3} * (mesh().node_count() + node));
   return rest + rotation.cross(rest);
 }
 

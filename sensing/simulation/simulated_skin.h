@@ -55,7 +55,7 @@ class SimulatedSkin {
   void WriteMarkers(SkinTruth& truth) const;
   void WriteContact(size_t index, ContactForce force, SkinTruth& truth) const;
 
-  Vec3 Shift(const State& state, int node) const { return state.segment<3>(3 * node); }
+  Vec3 Shift(const State& state, int node) const { return state.segment<3>(Eigen::Index{3} * node); }
   Vec3 Director(int node) const;
   double InwardDepth(const State& state, const SkinContact& contact) const;
 

@@ -7,8 +7,9 @@
 namespace taclink {
 namespace {
 
-std::string Line(const YAML::Node& node) {
-  return std::to_string(node.Mark().line + 1);
+// Lines count from 1; nodes that are not from the file have none.
+int LineOf(const YAML::Node& node, int otherwise) {
+  return node.IsDefined() && node.Mark().line >= 0 ? node.Mark().line + 1 : otherwise;
 }
 
 std::string Quoted(const std::vector<std::string_view>& choices) {
@@ -25,8 +26,8 @@ std::string Shown(double value) {
 
 }  // namespace
 
-YamlMap::YamlMap(std::shared_ptr<Context> context, YAML::Node node, std::string path)
-    : context_(std::move(context)), node_(std::move(node)), path_(std::move(path)) {}
+YamlMap::YamlMap(std::shared_ptr<Context> context, YAML::Node node, std::string path, int line)
+    : context_(std::move(context)), node_(std::move(node)), path_(std::move(path)), line_(LineOf(node_, line)) {}
 
 bool YamlMap::Has(const std::string& key) const {
   return node_.IsMap() && node_[key].IsDefined();
@@ -38,15 +39,19 @@ YAML::Node YamlMap::Find(const std::string& key, bool required) {
     YAML::Node found = node_[key];
     if (found.IsDefined()) return found;
   }
-  if (required) FailAt(node_, key, "is missing");
+  if (required && !context_->error) {
+    FailAt(node_, key, "is missing");
+    context_->only_missing = true;
+  }
   return YAML::Node(YAML::NodeType::Undefined);
 }
 
 void YamlMap::FailAt(const YAML::Node& node, const std::string& key, const std::string& what) {
-  if (context_->error) return;
-  const std::string line = node.IsDefined() ? Line(node) : "1";
+  if (context_->error && !context_->only_missing) return;
   context_->error =
-      Error{ErrorCode::kInvalidArgument, context_->file + ":" + line + ": '" + path_ + key + "' " + what};
+      Error{ErrorCode::kInvalidArgument, context_->file + ":" + std::to_string(LineOf(node, line_)) + ": '" +
+                                             path_ + key + "' " + what};
+  context_->only_missing = false;
 }
 
 void YamlMap::Fail(const std::string& key, const std::string& what) {
@@ -54,7 +59,7 @@ void YamlMap::Fail(const std::string& key, const std::string& what) {
 }
 
 std::string YamlMap::Where() const {
-  return context_->file + ":" + Line(node_);
+  return context_->file + ":" + std::to_string(line_);
 }
 
 template <typename T>
@@ -167,7 +172,7 @@ YamlMap YamlMap::Map(const std::string& key) {
     FailAt(node, key, "must be a mapping (key: value)");
     node = YAML::Node(YAML::NodeType::Map);
   }
-  return {context_, node, path_ + key + "."};
+  return {context_, node, path_ + key + ".", line_};
 }
 
 std::vector<YamlMap> YamlMap::Maps(const std::string& key) {
@@ -180,7 +185,7 @@ std::vector<YamlMap> YamlMap::Maps(const std::string& key) {
   }
   for (const auto& item : node) {
     if (item.IsMap()) {
-      maps.push_back(YamlMap(context_, item, path_ + key + "[" + std::to_string(maps.size()) + "]."));
+      maps.push_back(YamlMap(context_, item, path_ + key + "[" + std::to_string(maps.size()) + "].", line_));
     } else {
       FailAt(item, key, "must be a list of mappings (key: value)");
     }
@@ -216,7 +221,7 @@ Result<YamlFile> YamlFile::Parse(const std::string& name, std::string_view conte
     }
     auto context = std::make_shared<YamlMap::Context>();
     context->file = name;
-    return YamlFile(YamlMap(std::move(context), node, ""));
+    return YamlFile(YamlMap(std::move(context), node, "", 1));
   } catch (const YAML::Exception& e) {
     return Error{ErrorCode::kInvalidArgument, name + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg};
   }

@@ -61,8 +61,9 @@ class YamlMap {
   struct Context {
     std::string file;
     std::optional<Error> error;
+    bool only_missing = false;  // the error is a missing key: a misspelt one explains more
   };
-  YamlMap(std::shared_ptr<Context> context, YAML::Node node, std::string path);
+  YamlMap(std::shared_ptr<Context> context, YAML::Node node, std::string path, int line);
 
   YAML::Node Find(const std::string& key, bool required);
   template <typename T>
@@ -73,6 +74,7 @@ class YamlMap {
   std::shared_ptr<Context> context_;
   YAML::Node node_;
   std::string path_;
+  int line_;  // of the mapping, or of the one it is missing from
   std::set<std::string> asked_;
 };
 

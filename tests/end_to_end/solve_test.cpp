@@ -45,9 +45,10 @@ class SolveTest : public ScratchFolder, public ::testing::WithParamInterface<Cas
     return Path(name);
   }
 
-  static json Solve(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"solve", "--model", GetParam().model, "--json"});
-    const Finished run = Taclink(arguments);
+  static json Solve(const std::vector<std::string>& arguments) {
+    std::vector<std::string> command = {"solve", "--model", GetParam().model, "--json"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    const Finished run = Taclink(command);
     EXPECT_EQ(run.exit_code, 0) << run.err;
     return json::parse(run.out);
   }
@@ -70,7 +71,7 @@ class SolveTest : public ScratchFolder, public ::testing::WithParamInterface<Cas
 TEST_P(SolveTest, PicturesGiveThePushBack) {
   for (const int seed : {1, 2, 3}) {
     const auto [frame, truth] = Simulate(seed);
-    const json solved = Solve({"--rest", Picture("top", 1), Picture("bottom", 1), "--images",
+    const json solved = Solve({"--rest", Path("out/rest_top.png"), Path("out/rest_bottom.png"), "--images",
                                Picture("top", frame), Picture("bottom", frame)});
     SCOPED_TRACE("seed " + std::to_string(seed));
     ExpectThePush(solved, truth, 0.25, 8);
@@ -102,17 +103,17 @@ TEST_P(SolveTest, MarkersGiveThePushBack) {
 
 TEST_P(SolveTest, UntouchedSkinHasNoContact) {
   Simulate(6);
-  const json solved = Solve({"--rest", Picture("top", 1), Picture("bottom", 1), "--images", Picture("top", 5),
-                             Picture("bottom", 5)});
+  const json solved = Solve({"--rest", Path("out/rest_top.png"), Path("out/rest_bottom.png"), "--images",
+                             Picture("top", 5), Picture("bottom", 5)});
   EXPECT_TRUE(solved.at("contacts").empty()) << solved.at("contacts");
 }
 
 INSTANTIATE_TEST_SUITE_P(Skins, SolveTest,
                          ::testing::Values(Case{"cylinder", 7, 5}, Case{"cylinder", 1, 2},
                                            Case{"cylinder", 18, 8}, Case{"barrel", 4, 8}),
-                         [](const auto& info) {
-                           return info.param.model + "_" + std::to_string(info.param.path) + "_" +
-                                  std::to_string(info.param.ring);
+                         [](const auto& one) {
+                           return one.param.model + "_" + std::to_string(one.param.path) + "_" +
+                                  std::to_string(one.param.ring);
                          });
 
 }  // namespace

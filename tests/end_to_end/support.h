@@ -16,13 +16,14 @@ namespace taclink::testing {
 
 using nlohmann::json;
 
-inline Finished Taclink(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), TACLINK);
-  return Run(arguments);
+inline Finished Taclink(const std::vector<std::string>& arguments) {
+  std::vector<std::string> command = {TACLINK};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  return RunToEnd(command);
 }
 
 inline Vec3 ToVec3(const json& list) {
-  return {list.at(0), list.at(1), list.at(2)};
+  return {list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>()};
 }
 
 /// A folder of this test's own, gone with it.

@@ -100,7 +100,9 @@ TEST(Config, MistakesAreNamedWithFileAndLine) {
   EXPECT_THAT(Complaint(Replaced(kGood, "name: lower", "name: upper")), HasSubstr("used by another link"));
   EXPECT_THAT(Complaint(Replaced(kGood, "name: lower", "name: 'a b'")), HasSubstr("letters"));
   EXPECT_THAT(Complaint(Replaced(kGood, ", /dev/v4l/by-path/b", "")), HasSubstr("two device paths"));
-  EXPECT_THAT(Complaint(Replaced(kGood, "scene: press", "scenes: press")), HasSubstr("scene' is missing"));
+  EXPECT_THAT(Complaint(Replaced(kGood, "scene: press", "scenes: press")),
+              HasSubstr("scenes' is not a known key"));
+  EXPECT_THAT(Complaint(Replaced(kGood, ", scene: press", "")), HasSubstr("scene' is missing"));
   EXPECT_THAT(Complaint(Replaced(kGood, "loop: false", "gain: 3")), HasSubstr("gain' is not a known key"));
   EXPECT_THAT(Complaint(Replaced(kGood, "[1, 2, 3]", "[1, 2]")), HasSubstr("3 numbers"));
   EXPECT_THAT(Complaint(Replaced(kGood, "[::1]:6000", "6000")), HasSubstr("host:port"));

@@ -118,7 +118,7 @@ long Process::ResidentKb() const {
   return -1;
 }
 
-Finished Run(const std::vector<std::string>& command, std::chrono::seconds timeout) {
+Finished RunToEnd(const std::vector<std::string>& command, std::chrono::seconds timeout) {
   Process process(command);
   return process.Wait(timeout);
 }

@@ -43,7 +43,7 @@ class Process {
   std::string buffers_[2];
 };
 
-Finished Run(const std::vector<std::string>& command,
+Finished RunToEnd(const std::vector<std::string>& command,
              std::chrono::seconds timeout = std::chrono::seconds(120));
 
 }  // namespace taclink::testing

@@ -106,7 +106,7 @@ TEST_P(RendererTest, MarkersAreWhereTheirCentresProject) {
 
 TEST_P(RendererTest, ZeroLoadLooksLikeRestButForNoise) {
   const Renderer noisy(model_, model_.nominal_rig, CameraEffects(), 1);
-  SkinTruth later = TruthAt(model_, SceneWith("pressure_kpa: 0\n"), 1);
+  const SkinTruth later = TruthAt(model_, SceneWith("pressure_kpa: 0\n"), 1);
   const cv::Mat a = Picture(noisy, rest_, CameraId::kTop), b = Picture(noisy, later, CameraId::kTop);
   cv::Mat difference, mean, deviation;
   cv::subtract(a, b, difference, cv::noArray(), CV_32F);

@@ -1,0 +1,200 @@
+// taclinkd and taclink together, as processes, against the truth of the scenes they play.
+#include <gmock/gmock.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include "tests/end_to_end/support.h"
+
+namespace taclink::testing {
+namespace {
+
+using std::chrono::seconds;
+using ::testing::HasSubstr;
+
+// Two links of 20 frames a second with a steady touch each, after 2 s of rest.
+constexpr const char* kScene = R"(taclink_scene: 1
+name: steady
+model: cylinder
+frame_rate_hz: 20
+duration_s: 600
+contacts:
+  - {at: {path: 7, ring: 5}, force_n: 0.2, begin_s: 2, end_s: 599, ramp_s: 0.2}
+)";
+
+class ServerTest : public ScratchFolder {
+ protected:
+  void StartServer(const std::string& config) {
+    server_ = std::make_unique<Process>(
+        std::vector<std::string>{TACLINKD, "--config", Write("arm.yaml", config), "--listen", "127.0.0.1:0"});
+    const auto line = server_->ReadUntil("listening on ", seconds(60), true);
+    ASSERT_TRUE(line.has_value());
+    address_ = line->substr(line->find("listening on ") + 13);
+  }
+
+  void StartSteadyArm() {
+    Write("steady.yaml", kScene);
+    StartServer(
+        "taclink_config: 1\narm:\n  name: test\n  links:\n"
+        "    - {name: a, model: cylinder, source: simulated, scene: steady.yaml}\n"
+        "    - {name: b, model: cylinder, source: simulated, scene: steady.yaml}\n");
+  }
+
+  std::vector<std::string> Watch(std::vector<std::string> more) const {
+    std::vector<std::string> command = {TACLINK, "watch", "--server", address_, "--json"};
+    command.insert(command.end(), more.begin(), more.end());
+    return command;
+  }
+
+  // The first frame with `contacts` contacts.
+  static json FrameWithContacts(Process& watch, size_t contacts) {
+    for (int i = 0; i < 2000; ++i) {
+      const auto line = watch.ReadLine(seconds(60));
+      if (!line) break;
+      json frame = json::parse(*line);
+      if (frame.contains("contacts") && frame.at("contacts").size() == contacts) return frame;
+    }
+    ADD_FAILURE() << "no frame with " << contacts << " contacts";
+    return {};
+  }
+
+  std::unique_ptr<Process> server_;
+  std::string address_;
+};
+
+TEST_F(ServerTest, ClientsGetTheForceThatTheSceneExerts) {
+  StartSteadyArm();
+  Process watch(Watch({"--links", "b"}));
+  // The ramp takes 0.2 s; the frames after it have the full force.
+  json frame = FrameWithContacts(watch, 1);
+  for (int i = 0; i < 10; ++i) frame = FrameWithContacts(watch, 1);
+  EXPECT_EQ(frame.at("link"), "b");
+  EXPECT_EQ(frame.at("status"), "ok");
+  EXPECT_GE(frame.at("markers").at("seen").get<int>(), 220);
+  const json& contact = frame.at("contacts")[0];
+  const Vec3 force = ToVec3(contact.at("force_n")), center = ToVec3(contact.at("center_mm"));
+  EXPECT_LT((force - Vec3(0, -0.2, 0)).norm(), 0.05);
+  EXPECT_LT((center - Vec3(0, 32.3, 90)).norm(), 8);
+  EXPECT_GT(frame.at("latency_ms").get<double>(), 0);
+}
+
+TEST_F(ServerTest, ListShowsEveryLink) {
+  StartSteadyArm();
+  Process watch(Watch({}));
+  FrameWithContacts(watch, 1);
+  const Finished list = Taclink({"list", "--server", address_, "--json"});
+  ASSERT_EQ(list.exit_code, 0) << list.err;
+  const json links = json::parse(list.out).at("links");
+  ASSERT_EQ(links.size(), 2u);
+  EXPECT_EQ(links[0].at("link"), "a");
+  EXPECT_EQ(links[0].at("state"), "ok");
+  EXPECT_GT(links[0].at("rate_hz").get<double>(), 1);
+  EXPECT_GT(links[0].at("latency_p50_ms").get<double>(), 0);
+  EXPECT_THAT(Taclink({"list", "--server", address_}).out, HasSubstr("CONTACTS"));
+}
+
+TEST_F(ServerTest, ShutsDownOnSigtermAndSaysWhy) {
+  StartSteadyArm();
+  Process watch(Watch({}));
+  ASSERT_TRUE(watch.ReadLine(seconds(60)).has_value());
+  server_->Signal(SIGTERM);
+  const Finished server = server_->Wait(seconds(30));
+  EXPECT_EQ(server.exit_code, 0) << server.err;
+  const Finished client = watch.Wait(seconds(30));
+  EXPECT_EQ(client.exit_code, 1);
+  EXPECT_THAT(client.err, HasSubstr("shutting down"));
+}
+
+TEST_F(ServerTest, KilledServerIsNoticed) {
+  StartSteadyArm();
+  Process watch(Watch({}));
+  ASSERT_TRUE(watch.ReadLine(seconds(60)).has_value());
+  server_->Signal(SIGKILL);
+  const Finished client = watch.Wait(seconds(60));
+  EXPECT_EQ(client.exit_code, 1);
+  EXPECT_FALSE(client.err.empty());
+}
+
+TEST_F(ServerTest, PicturesOfAFolderAreServed) {
+  const Finished simulated = Taclink(
+      {"simulate", "--scene", Write("steady.yaml", kScene), "--out", Path("pictures"), "--frames", "60"});
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  StartServer(
+      "taclink_config: 1\narm:\n  name: test\n  links:\n"
+      "    - {name: taped, model: cylinder, source: files, folder: pictures, frame_rate_hz: 20}\n");
+  Process watch(Watch({}));
+  const json frame = FrameWithContacts(watch, 1);
+  EXPECT_EQ(frame.at("link"), "taped");
+}
+
+TEST_F(ServerTest, MissingCameraIsAStatusAndNoOtherLinkMinds) {
+  Write("steady.yaml", kScene);
+  StartServer(
+      "taclink_config: 1\narm:\n  name: test\n  links:\n"
+      "    - {name: blind, model: cylinder, source: v4l2, devices: [/dev/taclink-none-0, "
+      "/dev/taclink-none-1]}\n"
+      "    - {name: well, model: cylinder, source: simulated, scene: steady.yaml}\n");
+  Process watch(Watch({}));
+  bool blind = false, well = false;
+  for (int i = 0; i < 500 && !(blind && well); ++i) {
+    const auto line = watch.ReadLine(seconds(60));
+    ASSERT_TRUE(line.has_value());
+    const json frame = json::parse(*line);
+    if (!frame.contains("link")) continue;
+    if (frame.at("link") == "well") well = well || frame.at("status") == "ok";
+    if (frame.at("link") == "blind" && frame.at("status") != "starting") {
+      blind = true;
+      EXPECT_EQ(frame.at("status"), "lost");
+      EXPECT_THAT(frame.at("reason").get<std::string>(), HasSubstr("/dev/taclink-none-0"));
+    }
+  }
+  EXPECT_TRUE(blind);
+  EXPECT_TRUE(well);
+}
+
+// A client that stops reading costs the server nothing and no other client anything; its gap is counted.
+TEST_F(ServerTest, StoppedClientHarmsNobody) {
+  StartSteadyArm();
+  Process slow(Watch({"--detail", "full", "--every"}));
+  ASSERT_TRUE(slow.ReadLine(seconds(60)).has_value());
+  Process other(Watch({}));
+  FrameWithContacts(other, 1);
+  slow.Signal(SIGSTOP);
+  // Frames are the clock here: 2 links x 20 a second x 20 s, far more than the pipes and the queue hold.
+  uint64_t last = 0;
+  long before_kb = 0;
+  for (int i = 0; i < 800; ++i) {
+    const auto line = other.ReadLine(seconds(60));
+    ASSERT_TRUE(line.has_value());
+    const json frame = json::parse(*line);
+    if (!frame.contains("link") || frame.at("link") != "a") continue;
+    const auto sequence = frame.at("sequence").get<uint64_t>();
+    EXPECT_GT(sequence, last);
+    last = sequence;
+    if (i < 200) before_kb = server_->ResidentKb();
+  }
+  EXPECT_LT(server_->ResidentKb(), before_kb + 20000);
+  slow.Signal(SIGCONT);
+}
+
+TEST_F(ServerTest, BadConfigurationIsRefusedWithFileAndLine) {
+  const auto refused = [&](const std::string& config, const std::string& hint) {
+    const Finished run = RunToEnd({TACLINKD, "--config", Write("bad.yaml", config)});
+    EXPECT_EQ(run.exit_code, 1) << config;
+    EXPECT_THAT(run.err, HasSubstr(hint));
+  };
+  refused(
+      "taclink_config: 1\narm:\n  name: x\n  links:\n    - {name: a, model: cylinder, source: telepathy}\n",
+      "bad.yaml:5");
+  refused("taclink_config: 1\narmm: {}\n", "bad.yaml:2");
+  refused(
+      "taclink_config: 1\narm:\n  name: x\n  links:\n    - {name: a, model: cone, source: simulated, scene: "
+      "press}\n",
+      "cone");
+  EXPECT_EQ(RunToEnd({TACLINKD, "--no-such-option"}).exit_code, 2);
+  const Finished open = RunToEnd({TACLINKD, "--listen", "0.0.0.0:0"});
+  EXPECT_EQ(open.exit_code, 1);
+  EXPECT_THAT(open.err, HasSubstr("--insecure-open"));
+}
+
+}  // namespace
+}  // namespace taclink::testing
