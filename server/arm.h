@@ -18,7 +18,7 @@ enum class SourceKind { kV4l2, kFiles, kSimulated };
 struct LinkDescription {
   std::string name;  ///< unique within the arm
   LinkModel model;
-  Rigid3 base_from_link;  ///< mm
+  Rigid3 base_from_link = {};  ///< mm
   SourceKind source = SourceKind::kSimulated;
 };
 

@@ -49,7 +49,7 @@ enum class Delivery : uint8_t {
 };
 
 struct SubscriberOptions {
-  std::vector<bool> links;  ///< by link: wanted; empty: all
+  std::vector<bool> links = {};  ///< by link: wanted; empty: all
   Delivery delivery = Delivery::kLatest;
   double max_rate_hz = 0;       ///< of each link; 0: all
   size_t queue_capacity = 256;  ///< with kEvery, states of all links together

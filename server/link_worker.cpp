@@ -90,9 +90,9 @@ void LinkWorker::SolveOne(const StereoFrame& frame) {
   }
   state->sequence = frame.sequence;
   last_sequence_ = frame.sequence;
-  const int64_t exposure_ns = frame.times.exposure_monotonic_ns;
-  Publish(std::move(state));
-  statistics_.Record(frame.sequence, exposure_ns, last_published_ns_);
+  Stamp(*state);
+  statistics_.Record(frame.sequence, frame.times.exposure_monotonic_ns, last_published_ns_);
+  hub_.Publish(link_, pool_.Share(std::move(state)));
 }
 
 void LinkWorker::PublishStatusIfDue() {
@@ -112,13 +112,13 @@ void LinkWorker::PublishStatusIfDue() {
     ResetTo(*state, LinkStatus::kLost, running ? "no new frame; waiting" : condition.reason);
   }
   state->sequence = last_sequence_;
-  Publish(std::move(state));
+  Stamp(*state);
+  hub_.Publish(link_, pool_.Share(std::move(state)));
 }
 
-void LinkWorker::Publish(std::unique_ptr<LinkState> state) {
+void LinkWorker::Stamp(LinkState& state) {
   last_published_ns_ = clock_.MonotonicNs();
-  state->times.published_ns = last_published_ns_;
-  hub_.Publish(link_, pool_.Share(std::move(state)));
+  state.times.published_ns = last_published_ns_;
 }
 
 }  // namespace taclink::server

@@ -27,7 +27,7 @@ struct LinkWorkerOptions {
   std::chrono::milliseconds poll{100};
   /// Without frames the status is published this often.
   std::chrono::milliseconds heartbeat{1000};
-  SupervisorOptions supervisor;
+  SupervisorOptions supervisor = {};
 };
 
 /// Runs one link: a capture thread (source -> mailbox) and a FEM thread (mailbox -> processor -> hub).
@@ -50,7 +50,7 @@ class LinkWorker {
   void Solve(const std::stop_token& stop);
   void SolveOne(const StereoFrame& frame);
   void PublishStatusIfDue();
-  void Publish(std::unique_ptr<LinkState> state);
+  void Stamp(LinkState& state);
 
   // Constant after construction.
   const size_t link_;

@@ -6,8 +6,10 @@
 namespace taclink::server {
 namespace {
 
-// How much of a period a frame may come early and still count: cameras are not exactly regular.
+// How early a frame may come and still count, for cameras are not exactly regular: a part of the period, and
+// at most.
 constexpr int64_t kEarlyDivisor = 4;
+constexpr int64_t kEarlyMaxNs = 10'000'000;
 
 size_t Capacity(size_t links, const SubscriberOptions& options) {
   return options.delivery == Delivery::kLatest ? links : std::max<size_t>(options.queue_capacity, 1);
@@ -28,7 +30,7 @@ SubscriberQueue::SubscriberQueue(size_t links, SubscriberOptions options, std::f
 // the rate in the long run.
 bool SubscriberQueue::Due(PerLink& link, int64_t published_ns) const {
   if (period_ns_ == 0) return true;
-  if (published_ns < link.next_due_ns - period_ns_ / kEarlyDivisor) return false;
+  if (published_ns < link.next_due_ns - std::min(period_ns_ / kEarlyDivisor, kEarlyMaxNs)) return false;
   link.next_due_ns += period_ns_;
   if (link.next_due_ns <= published_ns) link.next_due_ns = published_ns + period_ns_;
   return true;

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <functional>
+#include <limits>
 #include <mutex>
 #include <vector>
 
@@ -29,7 +30,7 @@ class SubscriberQueue {
  private:
   struct PerLink {
     bool wanted = true;
-    int64_t next_due_ns = 0;  // of the rate limit, in published_ns
+    int64_t next_due_ns = std::numeric_limits<int64_t>::min() / 2;  // of the rate limit, in published_ns
     DeliveryCounts counts;
   };
 

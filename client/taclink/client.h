@@ -149,7 +149,7 @@ struct Frame {
 };
 
 struct StreamOptions {
-  std::vector<std::string> links;  ///< empty: all
+  std::vector<std::string> links = {};  ///< empty: all
   Detail detail = Detail::kContacts;
   double max_rate_hz = 0;  ///< of each link; 0: all frames
   Delivery delivery = Delivery::kLatest;

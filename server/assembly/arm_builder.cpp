@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "sensing/model/model_file.h"
+#include "server/assembly/encoder.h"
 #include "server/assembly/processor_factory.h"
 #include "server/assembly/source_factory.h"
 

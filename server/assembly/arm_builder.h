@@ -11,7 +11,4 @@ namespace taclink::server {
 /// Builds the configured arm, not started. Errors name the link.
 Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock);
 
-/// The API's bytes of a state of the arm's links, named by index.
-FrameEncoder MakeEncoder(const std::vector<std::string>& link_names);
-
 }  // namespace taclink::server

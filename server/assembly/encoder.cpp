@@ -1,4 +1,5 @@
-#include "server/assembly/arm_builder.h"
+#include "server/assembly/encoder.h"
+
 #include "wire/frame_codec.h"
 
 namespace taclink::server {

@@ -1,0 +1,200 @@
+#include "server/hub.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <random>
+#include <thread>
+
+#include "tests/server/support.h"
+
+namespace taclink::server {
+namespace {
+
+std::string Encode(size_t link, const LinkState& state, Detail detail) {
+  return std::to_string(link) + ":" + std::to_string(state.sequence) + ":" + std::to_string(Index(detail));
+}
+
+std::vector<uint64_t> TakeAll(Subscription& subscription) {
+  std::vector<uint64_t> sequences;
+  while (const auto publication = subscription.Take()) sequences.push_back(publication->state().sequence);
+  return sequences;
+}
+
+TEST(Hub, LatestKeepsTheNewestOfEachLink) {
+  Hub hub(2, Encode);
+  const auto subscription = hub.Subscribe({.delivery = Delivery::kLatest}, [] {});
+  for (uint64_t i = 1; i <= 5; ++i) {
+    hub.Publish(0, MakeState(i));
+    hub.Publish(1, MakeState(10 * i));
+  }
+  EXPECT_EQ(subscription->waiting(), 2u);
+  EXPECT_EQ(TakeAll(*subscription), (std::vector<uint64_t>{5, 50}));
+  const auto counts = subscription->Counts();
+  EXPECT_EQ(counts[0].taken, 1u);
+  EXPECT_EQ(counts[0].dropped, 4u);
+  EXPECT_EQ(counts[1].dropped, 4u);
+  EXPECT_EQ(subscription->dropped(), 8u);
+}
+
+TEST(Hub, LatestBeginsWithWhatIsThere) {
+  Hub hub(2, Encode);
+  hub.Publish(1, MakeState(7));
+  const auto latest = hub.Subscribe({.delivery = Delivery::kLatest}, [] {});
+  const auto every = hub.Subscribe({.delivery = Delivery::kEvery}, [] {});
+  EXPECT_EQ(TakeAll(*latest), (std::vector<uint64_t>{7}));
+  EXPECT_TRUE(TakeAll(*every).empty());
+  EXPECT_EQ(hub.Latest(0), nullptr);
+  EXPECT_EQ(hub.Latest(1)->state().sequence, 7u);
+}
+
+TEST(Hub, EveryKeepsOrderAndDropsTheOldest) {
+  Hub hub(1, Encode);
+  const auto subscription = hub.Subscribe({.delivery = Delivery::kEvery, .queue_capacity = 4}, [] {});
+  for (uint64_t i = 1; i <= 3; ++i) hub.Publish(0, MakeState(i));
+  EXPECT_EQ(TakeAll(*subscription), (std::vector<uint64_t>{1, 2, 3}));
+  for (uint64_t i = 4; i <= 13; ++i) hub.Publish(0, MakeState(i));
+  EXPECT_EQ(TakeAll(*subscription), (std::vector<uint64_t>{10, 11, 12, 13}));
+  EXPECT_EQ(subscription->Counts()[0].taken, 7u);
+  EXPECT_EQ(subscription->Counts()[0].dropped, 6u);
+}
+
+TEST(Hub, OnlyWantedLinksArrive) {
+  Hub hub(3, Encode);
+  const auto subscription =
+      hub.Subscribe({.links = {false, true, false}, .delivery = Delivery::kEvery}, [] {});
+  for (size_t link = 0; link < 3; ++link) hub.Publish(link, MakeState(link));
+  EXPECT_EQ(TakeAll(*subscription), (std::vector<uint64_t>{1}));
+  EXPECT_EQ(subscription->dropped(), 0u);
+}
+
+TEST(Hub, StoppedSubscribersHoldABoundedNumberOfStates) {
+  Hub hub(2, Encode);
+  const auto every = hub.Subscribe({.delivery = Delivery::kEvery, .queue_capacity = 16}, [] {});
+  const auto other = hub.Subscribe({.delivery = Delivery::kEvery, .queue_capacity = 16}, [] {});
+  const auto latest = hub.Subscribe({.delivery = Delivery::kLatest}, [] {});
+  std::atomic<int> alive = 0;
+  int most_alive = 0;
+  for (uint64_t i = 0; i < 5000; ++i) {
+    ++alive;
+    hub.Publish(i % 2, {new LinkState, [&](const LinkState* state) {
+                          --alive;
+                          delete state;
+                        }});
+    most_alive = std::max(most_alive, alive.load());
+  }
+  EXPECT_LE(most_alive, 16 + 2 + 1);  // those who stopped hold the same newest ones
+  EXPECT_EQ(every->dropped(), 5000u - 16);
+  EXPECT_EQ(latest->dropped(), 5000u - 2);
+}
+
+TEST(Hub, EncodesOnceForAllAndOnlyWhatIsAsked) {
+  std::array<std::atomic<int>, kDetailCount> encoded{};
+  Hub hub(1, [&](size_t link, const LinkState& state, Detail detail) {
+    ++encoded[Index(detail)];
+    return Encode(link, state, detail);
+  });
+  const auto a = hub.Subscribe({}, [] {});
+  const auto b = hub.Subscribe({}, [] {});
+  hub.Publish(0, MakeState(3));
+  EXPECT_EQ(encoded[Index(Detail::kFull)], 0);
+  const auto from_a = a->Take()->Encoded(Detail::kFull);
+  const auto from_b = b->Take()->Encoded(Detail::kFull);
+  EXPECT_EQ(from_a, from_b);
+  EXPECT_EQ(*from_a, "0:3:2");
+  EXPECT_EQ(encoded[Index(Detail::kFull)], 1);
+  EXPECT_EQ(encoded[Index(Detail::kContacts)], 0);
+}
+
+// Publishes 10 s at 30/s with some jitter and returns how many were taken at `max_rate_hz`.
+size_t TakenAtRate(double max_rate_hz, Delivery delivery) {
+  Hub hub(1, Encode);
+  const auto subscription = hub.Subscribe({.delivery = delivery, .max_rate_hz = max_rate_hz}, [] {});
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int64_t> jitter_ns(-3'000'000, 3'000'000);
+  size_t taken = 0;
+  for (uint64_t i = 0; i < 300; ++i) {
+    hub.Publish(0, MakeState(i, 1'000'000'000 + static_cast<int64_t>(i) * 33'333'333 + jitter_ns(random)));
+    taken += TakeAll(*subscription).size();
+  }
+  EXPECT_EQ(subscription->dropped(), 0u);
+  return taken;
+}
+
+TEST(Hub, RateLimitHoldsInTheLongRun) {
+  for (const auto delivery : {Delivery::kLatest, Delivery::kEvery}) {
+    EXPECT_EQ(TakenAtRate(0, delivery), 300u);
+    EXPECT_EQ(TakenAtRate(30, delivery), 300u);
+    EXPECT_NEAR(static_cast<double>(TakenAtRate(10, delivery)), 100, 2);
+    EXPECT_NEAR(static_cast<double>(TakenAtRate(20, delivery)), 200, 4);
+    EXPECT_EQ(TakenAtRate(0.1, delivery), 1u);
+  }
+}
+
+TEST(Hub, NotifiesOnceForEachTimeThatNothingWasThere) {
+  Hub hub(1, Encode);
+  int notified = 0;
+  const auto subscription = hub.Subscribe({.delivery = Delivery::kEvery}, [&] { ++notified; });
+  EXPECT_EQ(subscription->Take(), nullptr);
+  hub.Publish(0, MakeState(1));
+  hub.Publish(0, MakeState(2));
+  EXPECT_EQ(notified, 1);
+  EXPECT_EQ(TakeAll(*subscription).size(), 2u);
+  hub.Publish(0, MakeState(3));
+  EXPECT_EQ(notified, 2);
+}
+
+TEST(Hub, NotificationMayUseTheHub) {
+  Hub hub(1, Encode);
+  std::vector<uint64_t> taken;
+  Subscription* subscription = nullptr;
+  const auto owner = hub.Subscribe({.delivery = Delivery::kEvery}, [&] { taken = TakeAll(*subscription); });
+  subscription = owner.get();
+  EXPECT_EQ(owner->Take(), nullptr);
+  hub.Publish(0, MakeState(9));
+  EXPECT_EQ(taken, (std::vector<uint64_t>{9}));
+}
+
+TEST(Hub, ManyThreadsLoseNothingUncounted) {
+  constexpr uint64_t kEach = 3000;
+  constexpr size_t kLinks = 3;
+  Hub hub(kLinks, Encode);
+  Receiver fast(hub, {.delivery = Delivery::kEvery, .queue_capacity = 64});
+  Receiver newest(hub, {.delivery = Delivery::kLatest});
+  const auto stopped = hub.Subscribe({.delivery = Delivery::kEvery, .queue_capacity = 8}, [] {});
+  std::atomic<size_t> publishing = kLinks;
+  const auto read = [&](Receiver& receiver) {
+    std::vector<uint64_t> last(kLinks, 0);
+    while (true) {
+      const bool was_publishing = publishing > 0;
+      const auto publication = receiver.Next(std::chrono::milliseconds(10));
+      if (!publication && !was_publishing) return;
+      if (!publication) continue;
+      ASSERT_GT(publication->state().sequence, last[publication->link()]);
+      last[publication->link()] = publication->state().sequence;
+      EXPECT_FALSE(publication->Encoded(Detail::kContacts)->empty());
+    }
+  };
+  std::vector<std::jthread> threads;
+  for (size_t link = 0; link < kLinks; ++link) {
+    threads.emplace_back([&, link] {
+      for (uint64_t i = 1; i <= kEach; ++i) hub.Publish(link, MakeState(i));
+      --publishing;
+    });
+  }
+  threads.emplace_back([&] { read(fast); });
+  threads.emplace_back([&] { read(newest); });
+  threads.emplace_back([&] {  // comes and goes
+    for (int i = 0; i < 200; ++i) hub.Subscribe({}, [] {})->Take();
+  });
+  threads.clear();
+  for (Subscription* subscription : {&fast.subscription(), &newest.subscription(), stopped.get()}) {
+    uint64_t total = subscription->waiting();
+    for (const auto& counts : subscription->Counts()) total += counts.taken + counts.dropped;
+    EXPECT_EQ(total, kEach * kLinks);
+  }
+  EXPECT_EQ(stopped->waiting(), 8u);
+}
+
+}  // namespace
+}  // namespace taclink::server

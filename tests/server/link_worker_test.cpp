@@ -1,0 +1,188 @@
+#include "server/link_worker.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+#include <stdexcept>
+
+#include "tests/server/support.h"
+
+namespace taclink::server {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::HasSubstr;
+
+/// Lets a thread wait until the test opens it.
+class Gate {
+ public:
+  void Open() {
+    const std::lock_guard lock(mutex_);
+    open_ = true;
+    changed_.notify_all();
+  }
+  void Pass() {
+    std::unique_lock lock(mutex_);
+    ++arrived_;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return open_; });
+  }
+  void WaitForArrival() {
+    std::unique_lock lock(mutex_);
+    ASSERT_TRUE(changed_.wait_for(lock, kForever, [this] { return arrived_ > 0; }));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool open_ = false;
+  int arrived_ = 0;
+};
+
+void Copy(const StereoFrame& frame, LinkState& state) {
+  state.times = frame.times;
+  state.status = LinkStatus::kOk;
+  state.status_reason.clear();
+}
+
+class LinkWorkerTest : public testing::Test {
+ protected:
+  void Run(FrameProcessor process) {
+    worker_ =
+        std::make_unique<LinkWorker>(0, "arm", std::make_unique<FakeSource>(script_), std::move(process),
+                                     hub_, clock_, LinkWorkerOptions{.poll = milliseconds(5)});
+    worker_->Start();
+  }
+  // The next state with a picture; status reports are passed over.
+  PublicationPtr NextFrame() {
+    while (true) {
+      auto publication = receiver_.Next();
+      if (!publication || publication->state().times.exposure_monotonic_ns != 0) return publication;
+    }
+  }
+  PublicationPtr NextStatus(LinkStatus status) {
+    while (true) {
+      auto publication = receiver_.Next();
+      if (!publication || publication->state().status == status) return publication;
+    }
+  }
+
+  ManualClock clock_;
+  const std::shared_ptr<SourceScript> script_ = std::make_shared<SourceScript>();
+  Hub hub_{1, [](size_t, const LinkState&, Detail) { return std::string(); }};
+  Receiver receiver_{hub_};
+  std::unique_ptr<LinkWorker> worker_;
+};
+
+TEST_F(LinkWorkerTest, FramesBecomeStatesInOrder) {
+  Run(Copy);
+  for (uint64_t i = 1; i <= 10; ++i) {
+    clock_.Advance(milliseconds(4));
+    script_->Push(i, clock_.MonotonicNs() - 4'000'000);
+    const auto publication = NextFrame();
+    ASSERT_NE(publication, nullptr);
+    EXPECT_EQ(publication->state().sequence, i);
+    EXPECT_EQ(publication->state().status, LinkStatus::kOk);
+    EXPECT_EQ(publication->state().times.published_ns, clock_.MonotonicNs());
+  }
+  worker_->Stop();
+  const auto statistics = worker_->Statistics();
+  EXPECT_EQ(statistics.frames, 10u);
+  EXPECT_EQ(statistics.frames_skipped, 0u);
+  EXPECT_DOUBLE_EQ(statistics.latency_p50_ms, 4);
+  EXPECT_NEAR(statistics.rate_hz, 250, 1e-6);
+}
+
+TEST_F(LinkWorkerTest, LateMeansTheNewest) {
+  Gate gate;
+  Run([&](const StereoFrame& frame, LinkState& state) {
+    gate.Pass();
+    Copy(frame, state);
+  });
+  script_->Push(1);
+  gate.WaitForArrival();
+  for (uint64_t i = 2; i <= 6; ++i) script_->Push(i);
+  script_->WaitUntilTaken();
+  gate.Open();
+  EXPECT_EQ(NextFrame()->state().sequence, 1u);
+  EXPECT_EQ(NextFrame()->state().sequence, 6u);
+  worker_->Stop();
+  EXPECT_EQ(worker_->Statistics().frames_skipped, 4u);
+}
+
+TEST_F(LinkWorkerTest, SaysThatItStartsAndWhatIsWrong) {
+  script_->FailStarts(-1);
+  Run(Copy);
+  EXPECT_THAT(NextStatus(LinkStatus::kLost)->state().status_reason, HasSubstr("no camera"));
+  EXPECT_GE(script_->starts(), 1);
+}
+
+TEST_F(LinkWorkerTest, WithoutFramesTheStatusComesEverySecond) {
+  Run(Copy);
+  EXPECT_EQ(NextStatus(LinkStatus::kStarting)->state().sequence, 0u);
+  script_->Push(3, clock_.MonotonicNs());
+  ASSERT_NE(NextFrame(), nullptr);
+  for (int i = 0; i < 3; ++i) {
+    const auto before = worker_->Statistics().frames;
+    clock_.Advance(milliseconds(1000));
+    const auto publication = NextStatus(LinkStatus::kLost);
+    ASSERT_NE(publication, nullptr);
+    EXPECT_EQ(publication->state().sequence, 3u);
+    EXPECT_FALSE(publication->state().status_reason.empty());
+    EXPECT_FALSE(publication->state().measured());
+    EXPECT_EQ(publication->state().times.exposure_monotonic_ns, 0);
+    EXPECT_EQ(worker_->Statistics().frames, before);
+  }
+}
+
+TEST_F(LinkWorkerTest, ALostSourceIsReportedAndComesBack) {
+  Run(Copy);
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);
+  script_->PushError(ErrorCode::kUnavailable, "/dev/video0 was unplugged");
+  EXPECT_THAT(NextStatus(LinkStatus::kLost)->state().status_reason, HasSubstr("unplugged"));
+  script_->Push(1);  // it counts anew
+  clock_.Advance(milliseconds(100));
+  EXPECT_EQ(NextStatus(LinkStatus::kOk)->state().sequence, 1u);
+  worker_->Stop();
+  EXPECT_EQ(worker_->source_condition().restarts, 1u);
+  EXPECT_EQ(worker_->Statistics().frames_skipped, 0u);
+}
+
+TEST_F(LinkWorkerTest, AProcessorThatThrowsCostsOneFrame) {
+  Run([](const StereoFrame& frame, LinkState& state) {
+    if (frame.sequence == 1) throw std::runtime_error("singular matrix");
+    Copy(frame, state);
+  });
+  script_->Push(1);
+  const auto failed = NextFrame();
+  EXPECT_EQ(failed->state().status, LinkStatus::kLost);
+  EXPECT_THAT(failed->state().status_reason, HasSubstr("singular matrix"));
+  script_->Push(2);
+  EXPECT_EQ(NextFrame()->state().status, LinkStatus::kOk);
+}
+
+TEST_F(LinkWorkerTest, StatesAreUsedAgain) {
+  Run([](const StereoFrame& frame, LinkState& state) {
+    Copy(frame, state);
+    state.shape.positions_mm.resize(100);
+  });
+  std::set<const LinkState*> states;
+  for (uint64_t i = 1; i <= 50; ++i) {
+    script_->Push(i);
+    states.insert(&NextFrame()->state());
+  }
+  EXPECT_LE(states.size(), 4u);
+}
+
+TEST_F(LinkWorkerTest, StopsWhileTheSourceIsLost) {
+  script_->FailStarts(-1);
+  Run(Copy);
+  ASSERT_NE(NextStatus(LinkStatus::kLost), nullptr);
+  worker_->Stop();
+  worker_->Stop();
+}
+
+}  // namespace
+}  // namespace taclink::server

@@ -1,0 +1,181 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sensing/capture/frame_source.h"
+#include "sensing/core/clock.h"
+#include "sensing/core/link_state.h"
+#include "server/hub.h"
+
+namespace taclink::server {
+
+// Longer than any test may take on any machine: it ends a test that hangs, nothing is judged by it.
+inline constexpr std::chrono::seconds kForever{120};
+
+/// Time as the test says. Sleepers wake when it is reached, or after a moment, as Clock's users must bear.
+class ManualClock final : public Clock {
+ public:
+  int64_t MonotonicNs() const override {
+    const std::lock_guard lock(mutex_);
+    return now_ns_;
+  }
+  int64_t UtcNs() const override { return MonotonicNs() + 1'700'000'000'000'000'000; }
+  void SleepUntilMonotonicNs(int64_t time_ns) override {
+    std::unique_lock lock(mutex_);
+    if (sleeping_passes_time_) {
+      now_ns_ = std::max(now_ns_, time_ns);
+    } else {
+      changed_.wait_for(lock, std::chrono::milliseconds(5), [&] { return now_ns_ >= time_ns; });
+    }
+  }
+
+  void Advance(std::chrono::nanoseconds by) {
+    {
+      const std::lock_guard lock(mutex_);
+      now_ns_ += by.count();
+    }
+    changed_.notify_all();
+  }
+  /// A sleep returns at once with the time it slept to.
+  void LetSleepingPassTime() { sleeping_passes_time_ = true; }
+
+ private:
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  int64_t now_ns_ = 1'000'000'000;
+  bool sleeping_passes_time_ = false;
+};
+
+/// What a FakeSource does next; the test writes it, the source's thread reads it.
+class SourceScript {
+ public:
+  void Push(uint64_t sequence, int64_t exposure_ns = 1) {
+    StereoFrame frame;
+    frame.sequence = sequence;
+    frame.times.exposure_monotonic_ns = exposure_ns;
+    frame.times.exposure_utc_ns = exposure_ns + 1;
+    Push([frame](StereoFrame& out) -> Result<void> { return out = frame, Result<void>(); });
+  }
+  void PushError(ErrorCode code, std::string message) {
+    Push([=](StereoFrame&) -> Result<void> { return Error{code, message}; });
+  }
+  void Push(std::function<Result<void>(StereoFrame&)> step) {
+    const std::lock_guard lock(mutex_);
+    steps_.push_back(std::move(step));
+    changed_.notify_all();
+  }
+  void FailStarts(int count, ErrorCode code = ErrorCode::kUnavailable) {
+    const std::lock_guard lock(mutex_);
+    failing_starts_ = count;
+    start_error_ = code;
+  }
+  int starts() const {
+    const std::lock_guard lock(mutex_);
+    return starts_;
+  }
+  /// Until everything was taken and the source's thread came for more.
+  void WaitUntilTaken() {
+    std::unique_lock lock(mutex_);
+    ASSERT_TRUE(changed_.wait_for(lock, kForever, [this] { return steps_.empty() && waiting_; }));
+  }
+
+ private:
+  friend class FakeSource;
+
+  Result<void> Start() {
+    const std::lock_guard lock(mutex_);
+    ++starts_;
+    changed_.notify_all();
+    if (failing_starts_ == 0) return {};
+    if (failing_starts_ > 0) --failing_starts_;
+    return Error{start_error_, "no camera"};
+  }
+  Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    waiting_ = true;
+    changed_.notify_all();
+    const bool any = changed_.wait_for(lock, timeout, [this] { return !steps_.empty(); });
+    if (!any) return Error{ErrorCode::kTimeout, "silent"};
+    waiting_ = false;
+    const auto step = std::move(steps_.front());
+    steps_.pop_front();
+    lock.unlock();
+    return step(frame);
+  }
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::function<Result<void>(StereoFrame&)>> steps_;
+  bool waiting_ = false;
+  int starts_ = 0;
+  int failing_starts_ = 0;  // < 0: all
+  ErrorCode start_error_ = ErrorCode::kUnavailable;
+};
+
+class FakeSource final : public FrameSource {
+ public:
+  explicit FakeSource(std::shared_ptr<SourceScript> script) : script_(std::move(script)) {}
+  Result<void> Start() override { return script_->Start(); }
+  Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override {
+    return script_->Next(frame, timeout);
+  }
+  SourceInfo Info() const override { return {"fake", 640, 480, 30}; }
+
+ private:
+  const std::shared_ptr<SourceScript> script_;
+};
+
+/// Takes a subscription's states one by one, waiting for them.
+class Receiver {
+ public:
+  Receiver(Hub& hub, SubscriberOptions options = {.delivery = Delivery::kEvery})
+      : subscription_(hub.Subscribe(std::move(options), [signal = signal_] { signal->Set(); })) {}
+
+  PublicationPtr Next(std::chrono::milliseconds timeout = kForever) {
+    while (true) {
+      if (auto publication = subscription_->Take()) return publication;
+      if (!signal_->Wait(timeout)) return nullptr;
+    }
+  }
+  Subscription& subscription() { return *subscription_; }
+
+ private:
+  struct Signal {
+    void Set() {
+      const std::lock_guard lock(mutex);
+      set = true;
+      changed.notify_all();
+    }
+    bool Wait(std::chrono::milliseconds timeout) {
+      std::unique_lock lock(mutex);
+      const bool was_set = changed.wait_for(lock, timeout, [this] { return set; });
+      set = false;
+      return was_set;
+    }
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool set = false;
+  };
+
+  const std::shared_ptr<Signal> signal_ = std::make_shared<Signal>();
+  const std::unique_ptr<Subscription> subscription_;
+};
+
+inline std::shared_ptr<const LinkState> MakeState(uint64_t sequence, int64_t published_ns = 0) {
+  auto state = std::make_shared<LinkState>();
+  state->sequence = sequence;
+  state->times.published_ns = published_ns;
+  return state;
+}
+
+}  // namespace taclink::server
