@@ -74,6 +74,7 @@ Result<LinkState> SolveMarkers(const SolveOptions& options, const LinkModel& mod
   ContactFinder finder(model);
   const int64_t start = SystemClock().MonotonicNs();
   estimator.Estimate(state.shape, options.pressure_kpa * 1e-3, state.forces);
+  estimator.PlaceUnseen(options.pressure_kpa * 1e-3, state.shape);
   finder.Find(state.shape, state.forces, state.contacts);
   state.stage_ms.force = static_cast<double>(SystemClock().MonotonicNs() - start) * 1e-6;
   for (const auto& contact : state.contacts) state.total_force_n += contact.force_n;

@@ -24,7 +24,7 @@ Eigen::VectorXd MarkerDisplacements(const LinkModel& model, const ShellMesh& mes
 
 LinearForceEstimator::LinearForceEstimator(const LinkModel& model, const LinearEstimatorOptions& options)
     : options_(options), markers_(model.markers.count()) {
-  const LinearShell shell(model, 1);
+  const LinearShell shell(model, options.refinement);
   const auto& mesh = shell.mesh();
   compliance_.resize(3 * markers_, markers_);
   for (int m = 0; m < markers_; ++m) {
@@ -203,6 +203,21 @@ void LinearForceEstimator::Estimate(const SkinShape& shape, double pressure_mpa,
   for (Eigen::Index k = 0; k < n; ++k) {
     forces.sigmas_n[static_cast<size_t>(loaded_[static_cast<size_t>(k)])] =
         std::sqrt(forces.loaded_covariance(k, k));
+  }
+}
+
+void LinearForceEstimator::PlaceUnseen(double pressure_mpa, SkinShape& shape) const {
+  for (int m = 0; m < markers_; ++m) {
+    const auto i = static_cast<size_t>(m);
+    if (shape.sources[i] != MarkerSource::kInferred) continue;
+    Vec3 u = pressure_mpa * per_pressure_.segment<3>(3 * m);
+    for (size_t k = 0; k < loaded_.size(); ++k) {
+      u += load_[static_cast<Eigen::Index>(k)] * compliance_.block<3, 1>(3 * m, loaded_[k]);
+    }
+    shape.positions_mm[i] += u - shape.displacements_mm[i];
+    shape.displacements_mm[i] = u;
+    const double sigma = std::max(options_.unseen_floor_mm, options_.unseen_error * u.norm());
+    shape.covariances_mm2[i] = sigma * sigma * Mat3::Identity();
   }
 }
 

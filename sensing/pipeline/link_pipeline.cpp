@@ -175,7 +175,9 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.times.tracked_ns = s.clock.MonotonicNs();
   timed(state.stage_ms.reconstruct, [&] { s.reconstructor->Reconstruct(s.labels, state.shape); });
   timed(state.stage_ms.force, [&] {
-    s.estimator.Estimate(state.shape, pressure_mpa - s.baseline_pressure_mpa, state.forces);
+    const double pressure_change_mpa = pressure_mpa - s.baseline_pressure_mpa;
+    s.estimator.Estimate(state.shape, pressure_change_mpa, state.forces);
+    s.estimator.PlaceUnseen(pressure_change_mpa, state.shape);
     s.finder.Find(state.shape, state.forces, state.contacts);
   });
   state.total_force_n.setZero();

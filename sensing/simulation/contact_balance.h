@@ -7,7 +7,7 @@
 
 namespace taclink {
 
-/// What one contact wants. Depths are radial and inward, mm, at the contact's centre.
+/// What one contact wants. Depths are along the inward normal, mm, at the contact's centre.
 struct ContactDemand {
   bool by_depth = false;
   double force_n = 0;        ///< if not by_depth

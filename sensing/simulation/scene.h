@@ -18,14 +18,14 @@ struct SkinPlace {
   double z_mm = 0;
 };
 
-/// Something that pushes radially inward with an even load over a round patch.
+/// Something that pushes along the skin's inward normal with an even load over a round patch.
 struct SceneContact {
   SkinPlace at;
   std::optional<SkinPlace> move_to;  ///< slides there from begin to end at an even speed
   double patch_diameter_mm = 5.5;
   // Exactly one of the two is set.
   std::optional<double> force_n;
-  std::optional<double> depth_mm;  ///< of the centre, radially from the undeformed surface
+  std::optional<double> depth_mm;  ///< of the centre, along the normal from the undeformed surface
   double begin_s = 0;
   double end_s = 0;
   double ramp_s = 0;  ///< smooth rise after begin and fall before end

@@ -8,7 +8,7 @@
 namespace taclink {
 namespace {
 
-constexpr int kRefinement = 2;
+constexpr int kRefinement = 3;  // not that of the estimator
 constexpr double kTubeGapMm = 0.2;  // the wall stops this far from the tube
 constexpr double kNoTubeMm = 1;     // the wall stops this far from the axis
 constexpr int kPathSamples = 400;   // places of a moving contact at which it may load new nodes
@@ -108,7 +108,7 @@ void SimulatedSkin::LearnResponses(SkinContact& contact, double diameter_mm) {
     std::vector<NodalLoad> loads;
     loads.reserve(contact.patch.size());
     for (const NodeWeight& w : contact.patch)
-      loads.push_back({w.node, -w.weight / contact.radial_share * radial_[static_cast<size_t>(w.node)]});
+      loads.push_back({w.node, -w.weight / contact.normal_share * Normal(w.node)});
     contact.response = Flat(shell_.Solve(loads));
     return;
   }
@@ -122,7 +122,7 @@ void SimulatedSkin::LearnResponses(SkinContact& contact, double diameter_mm) {
       const auto node = static_cast<size_t>(w.node);
       if (response_of_node_[node] >= 0) continue;
       response_of_node_[node] = static_cast<int>(unit_responses_.size());
-      const NodalLoad load{w.node, -radial_[node]};
+      const NodalLoad load{w.node, -Normal(w.node)};
       unit_responses_.push_back(Flat(shell_.Solve({&load, 1})));
     }
   }
@@ -135,14 +135,14 @@ void SimulatedSkin::Place(SkinContact& contact, double time_s, const SceneContac
   finder_.AtPatch(contact.spot.angle_rad, contact.spot.z_mm, plan.patch_diameter_mm, contact.patch);
   finder_.AtPoint(contact.spot.angle_rad, contact.spot.z_mm, contact.center);
   Vec3 resultant = Vec3::Zero();
-  for (const NodeWeight& w : contact.patch) resultant += w.weight * radial_[static_cast<size_t>(w.node)];
-  contact.radial_share = resultant.norm();
+  for (const NodeWeight& w : contact.patch) resultant += w.weight * Normal(w.node);
+  contact.normal_share = resultant.norm();
   if (unit_responses_.empty()) return;
   contact.response.setZero();
   for (const NodeWeight& w : contact.patch) {
     const int response = response_of_node_[static_cast<size_t>(w.node)];
     if (response >= 0)
-      contact.response += w.weight / contact.radial_share * unit_responses_[static_cast<size_t>(response)];
+      contact.response += w.weight / contact.normal_share * unit_responses_[static_cast<size_t>(response)];
   }
 }
 
@@ -215,7 +215,7 @@ double SimulatedSkin::FreeScale(const State& without, const State& contacts) con
 double SimulatedSkin::InwardDepth(const State& state, const SkinContact& contact) const {
   double depth = 0;
   for (const NodeWeight& w : contact.center)
-    depth -= w.weight * radial_[static_cast<size_t>(w.node)].dot(Shift(state, w.node));
+    depth -= w.weight * Normal(w.node).dot(Shift(state, w.node));
   return depth;
 }
 
@@ -274,8 +274,8 @@ void SimulatedSkin::WriteContact(size_t index, ContactForce force, SkinTruth& tr
   result.center_mm = at_rest + shift;
   result.normal = (model_.OutwardNormal(contact.spot.angle_rad, contact.spot.z_mm) + turn).normalized();
   for (const NodeWeight& w : contact.patch)
-    result.force_n -= force.force_n * w.weight / contact.radial_share * radial_[static_cast<size_t>(w.node)];
-  result.depth_mm = at_rest.head<2>().norm() - result.center_mm.head<2>().norm();
+    result.force_n -= force.force_n * w.weight / contact.normal_share * Normal(w.node);
+  result.depth_mm = -shift.dot(model_.OutwardNormal(contact.spot.angle_rad, contact.spot.z_mm));
   result.patch_diameter_mm = scene_.contacts[index].patch_diameter_mm;
   result.limited = force.limited;
   truth.contacts.push_back(result);

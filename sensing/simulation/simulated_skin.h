@@ -14,8 +14,8 @@
 
 namespace taclink {
 
-/// A skin on which a scene plays: linear shell, twice as fine as the marker grid, so that the truth is not
-/// computed on the mesh of whoever estimates it. Responses to unit loads are computed at construction; a
+/// A skin on which a scene plays: linear shell, three times as fine as the marker grid, so that the truth is
+/// not computed on the mesh of whoever estimates it. Responses to unit loads are computed at construction; a
 /// moment then costs only sums.
 class SimulatedSkin {
  public:
@@ -42,7 +42,7 @@ class SimulatedSkin {
     std::vector<NodeWeight> patch;  // of it
     std::vector<NodeWeight> center;
     Spot spot;
-    double radial_share = 1;  // resultant of unit loads that each point at the axis
+    double normal_share = 1;  // resultant of unit loads that each point inwards
     double level = 0;         // of the ramp, now
   };
 
@@ -56,6 +56,7 @@ class SimulatedSkin {
   void WriteContact(size_t index, ContactForce force, SkinTruth& truth) const;
 
   Vec3 Shift(const State& state, int node) const { return state.segment<3>(Eigen::Index{3} * node); }
+  const Vec3& Normal(int node) const { return mesh().normals[static_cast<size_t>(node)]; }  // at rest
   Vec3 Director(int node) const;
   double InwardDepth(const State& state, const SkinContact& contact) const;
 
@@ -68,7 +69,7 @@ class SimulatedSkin {
   std::vector<Vec3> radial_;                 // by node, unit, away from the axis
   std::vector<double> rest_wall_radius_mm_;  // by node
   std::vector<int> response_of_node_;  // index into unit_responses_; -1: never loaded by a moving contact
-  std::vector<State> unit_responses_;  // to 1 N towards the axis
+  std::vector<State> unit_responses_;  // to 1 N inwards
   // Of the current moment.
   std::vector<SkinContact> contacts_;
   std::vector<size_t> active_;  // indices of those that push

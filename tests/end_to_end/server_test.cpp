@@ -185,7 +185,7 @@ TEST_F(ServerTest, BadConfigurationIsRefusedWithFileAndLine) {
   refused(
       "taclink_config: 1\narm:\n  name: x\n  links:\n    - {name: a, model: cylinder, source: telepathy}\n",
       "bad.yaml:5");
-  refused("taclink_config: 1\narmm: {}\n", "bad.yaml:2");
+  refused("taclink_config: 1\narmm: {}\narm: {name: x}\n", "bad.yaml:2");
   refused(
       "taclink_config: 1\narm:\n  name: x\n  links:\n    - {name: a, model: cone, source: simulated, scene: "
       "press}\n",

@@ -38,8 +38,8 @@ TEST_P(SimulatedSkinTest, ContactForceIsAsAsked) {
   EXPECT_NEAR(truth.contacts[1].force_n.norm(), 0.1, 1e-9);
   EXPECT_NEAR((truth.total_force_n - truth.contacts[0].force_n - truth.contacts[1].force_n).norm(), 0, 1e-12);
   for (const TrueContact& contact : truth.contacts) {
-    const Vec3 radial = Vec3(contact.center_mm.x(), contact.center_mm.y(), 0).normalized();
-    EXPECT_NEAR(contact.force_n.normalized().dot(radial), -1, 1e-3);
+    const double angle = std::atan2(contact.center_mm.y(), contact.center_mm.x());
+    EXPECT_NEAR(contact.force_n.normalized().dot(model_.OutwardNormal(angle, contact.center_mm.z())), -1, 1e-3);
     EXPECT_GT(contact.depth_mm, 1);
     EXPECT_FALSE(contact.limited);
   }
