@@ -10,6 +10,8 @@ namespace taclink {
 namespace {
 
 constexpr double kLeastSeenFraction = 0.5;  // in each picture
+// The skin moved if more than this part of the markers scatter by more than this; noise is a fraction of it.
+constexpr double kMovedFraction = 0.03, kMovedPx = 1;
 
 double Median(std::vector<double>& values) {
   if (values.empty()) return 0;
@@ -111,6 +113,13 @@ Result<bool> RestPose::Finish() {
     }
   }
   noise_px_ = std::sqrt(std::max(0.0, Median(variances)));
+  const auto moved = std::count_if(variances.begin(), variances.end(),
+                                   [](double variance) { return variance > kMovedPx * kMovedPx; });
+  if (static_cast<double>(moved) > kMovedFraction * static_cast<double>(variances.size())) {
+    StartAgain();
+    return Error{ErrorCode::kFailedPrecondition,
+                 "the skin moved while its rest shape was taken; do not touch it"};
+  }
   if (rig_) {
     calibration_ = CalibrationSummary{.rig = *rig_};
     return true;

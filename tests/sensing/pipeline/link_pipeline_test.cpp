@@ -1,0 +1,116 @@
+// Status and robustness of the whole way; its numbers are in tests/accuracy.
+#include "sensing/pipeline/link_pipeline.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+
+#include "sensing/model/model_file.h"
+#include "sensing/simulation/renderer.h"
+#include "sensing/simulation/simulated_skin.h"
+
+namespace taclink {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kTouchedS = 3;  // in the scene `press`
+
+class LinkPipelineTest : public testing::Test {
+ protected:
+  LinkPipelineTest() { options_.rest_frames = 4; }
+
+  StereoFrame Frame(double time_s) {
+    StereoFrame frame;
+    skin_->Evaluate(time_s, truth_);
+    for (const CameraId id : kBothCameras) {
+      renderer_.Render(truth_, id, gray_);
+      PackYuyv(gray_, renderer_.chroma(id), frame.images[Index(id)]);
+    }
+    frame.sequence = truth_.frame;
+    return frame;
+  }
+
+  void TakeRest(LinkPipeline& pipeline) {
+    for (int k = 0; k < options_.rest_frames; ++k) pipeline.Process(Frame(k / 30.0), state_);
+    ASSERT_TRUE(pipeline.calibration().has_value()) << state_.status_reason;
+  }
+
+  const LinkModel model_ = LoadLinkModel("cylinder").value();
+  const Scene scene_ = LoadScene("press").value();
+  std::unique_ptr<SimulatedSkin> skin_ = SimulatedSkin::Make(model_, scene_).value();
+  Renderer renderer_{model_, model_.nominal_rig, scene_.camera, 1};
+  SkinTruth truth_;
+  cv::Mat gray_;
+  PipelineOptions options_;
+  LinkState state_;
+};
+
+TEST_F(LinkPipelineTest, CalibratesThenMeasures) {
+  LinkPipeline pipeline(model_, options_);
+  pipeline.Process(Frame(0), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_FALSE(state_.measured());
+  TakeRest(pipeline);
+  pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  ASSERT_EQ(state_.contacts.size(), 1u);
+  EXPECT_GT(state_.stage_ms.detect, 0);
+  EXPECT_GE(state_.times.solved_ns, state_.times.tracked_ns);
+}
+
+TEST_F(LinkPipelineTest, LostCameraIsDegradedAndSaysWhich) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  StereoFrame frame = Frame(0.5);
+  frame.images[Index(CameraId::kBottom)].valid = false;
+  pipeline.Process(frame, state_);
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  EXPECT_THAT(state_.status_reason, HasSubstr("bottom"));
+  EXPECT_TRUE(state_.contacts.empty());
+}
+
+TEST_F(LinkPipelineTest, DarkPicturesAreLostNotZero) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  StereoFrame frame = Frame(0.5);
+  for (auto& image : frame.images) std::fill(image.bytes.begin(), image.bytes.end(), uint8_t{16});
+  pipeline.Process(frame, state_);
+  EXPECT_EQ(state_.status, LinkStatus::kLost);
+  EXPECT_THAT(state_.status_reason, HasSubstr("0 of 240"));
+  EXPECT_FALSE(state_.measured());
+  pipeline.Process(Frame(0.6), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+}
+
+TEST_F(LinkPipelineTest, ShortFrameIsNamed) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  StereoFrame frame = Frame(0.5);
+  frame.images[Index(CameraId::kTop)].bytes.resize(1000);
+  pipeline.Process(frame, state_);
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  EXPECT_THAT(state_.status_reason, HasSubstr("top"));
+}
+
+TEST_F(LinkPipelineTest, TouchedSkinIsNoBaseline) {
+  LinkPipeline pipeline(model_, options_);
+  pipeline.Process(Frame(0), state_);
+  for (int k = 1; k < options_.rest_frames; ++k) pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_FALSE(pipeline.calibration().has_value());
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_THAT(state_.status_reason, HasSubstr("moved"));
+}
+
+TEST_F(LinkPipelineTest, PicturesOfAnotherModelAreRefused) {
+  LinkPipeline pipeline(LoadLinkModel("barrel").value(), options_);
+  for (int k = 0; k < options_.rest_frames; ++k) pipeline.Process(Frame(0), state_);
+  EXPECT_FALSE(pipeline.calibration().has_value());
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_FALSE(state_.status_reason.empty());
+}
+
+}  // namespace
+}  // namespace taclink
