@@ -12,7 +12,7 @@ namespace {
 class ContactFinderTest : public testing::Test {
  protected:
   std::vector<Contact> Contacts(const std::vector<TrueLoad>& loads, unsigned seed = 1) {
-    const SkinShape shape = ShapeUnder(model_, loads, 0, 1, 0.05, seed);
+    const SkinShape shape = ShapeUnder(model_, loads, 0, 2, 0.05, seed);
     NodalForces forces;
     estimator_.Estimate(shape, 0, forces);
     std::vector<Contact> contacts;

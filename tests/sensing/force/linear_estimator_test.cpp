@@ -26,7 +26,7 @@ class LinearEstimatorTest : public testing::TestWithParam<std::string> {
 
 TEST_P(LinearEstimatorTest, ExactDataGiveTheLoadBack) {
   const int marker = model_.MarkerIndex(6, 4);
-  estimator_.Estimate(ShapeUnder(model_, {{6, 4, 0.2}}, 0, 1, 0, 1), 0, forces_);
+  estimator_.Estimate(ShapeUnder(model_, {{6, 4, 0.2}}, 0, 2, 0, 1), 0, forces_);
   EXPECT_EQ(forces_.loaded, std::vector<int>{marker});
   EXPECT_NEAR(forces_.forces_n[static_cast<size_t>(marker)].norm(), 0.2, 1e-6);
   EXPECT_LT(forces_.forces_n[static_cast<size_t>(marker)].dot(
@@ -36,7 +36,7 @@ TEST_P(LinearEstimatorTest, ExactDataGiveTheLoadBack) {
 
 TEST_P(LinearEstimatorTest, NoiseAloneGivesNoForce) {
   for (unsigned seed = 0; seed < 200; ++seed) {
-    estimator_.Estimate(ShapeUnder(model_, {}, 0, 1, 0.1, seed), 0, forces_);
+    estimator_.Estimate(ShapeUnder(model_, {}, 0, 3, 0.1, seed), 0, forces_);
     EXPECT_EQ(TotalN(forces_), 0) << "seed " << seed;
   }
 }
@@ -45,7 +45,7 @@ TEST_P(LinearEstimatorTest, NoisyPushIsFoundWithItsUncertainty) {
   int within_two_sigma = 0;
   const int trials = 30;
   for (unsigned seed = 0; seed < trials; ++seed) {
-    estimator_.Estimate(ShapeUnder(model_, {{3, 5, 0.2}}, 0, 1, 0.1, seed), 0, forces_);
+    estimator_.Estimate(ShapeUnder(model_, {{3, 5, 0.2}}, 0, 3, 0.1, seed), 0, forces_);
     EXPECT_NEAR(TotalN(forces_), 0.2, 0.02) << "seed " << seed;
     within_two_sigma +=
         std::abs(TotalN(forces_) - 0.2) < 2 * std::sqrt(forces_.loaded_covariance.sum()) ? 1 : 0;
@@ -54,7 +54,7 @@ TEST_P(LinearEstimatorTest, NoisyPushIsFoundWithItsUncertainty) {
 }
 
 TEST_P(LinearEstimatorTest, TwoPushesAreToldApart) {
-  estimator_.Estimate(ShapeUnder(model_, {{2, 3, 0.1}, {11, 7, 0.15}}, 0, 1, 0.05, 7), 0, forces_);
+  estimator_.Estimate(ShapeUnder(model_, {{2, 3, 0.1}, {11, 7, 0.15}}, 0, 3, 0.05, 7), 0, forces_);
   double first = 0, second = 0;
   for (const int m : forces_.loaded) {
     (model_.RingOf(m) < 5 ? first : second) += forces_.forces_n[static_cast<size_t>(m)].norm();
@@ -64,14 +64,14 @@ TEST_P(LinearEstimatorTest, TwoPushesAreToldApart) {
 }
 
 TEST_P(LinearEstimatorTest, PressureIsNotAForce) {
-  estimator_.Estimate(ShapeUnder(model_, {{6, 4, 0.2}}, 1e-3, 1, 0.05, 3), 1e-3, forces_);
+  estimator_.Estimate(ShapeUnder(model_, {{6, 4, 0.2}}, 1e-3, 3, 0.05, 3), 1e-3, forces_);
   EXPECT_NEAR(TotalN(forces_), 0.2, 0.02);
-  estimator_.Estimate(ShapeUnder(model_, {}, 1.5e-3, 1, 0.05, 4), 1.5e-3, forces_);
+  estimator_.Estimate(ShapeUnder(model_, {}, 1.5e-3, 3, 0.05, 4), 1.5e-3, forces_);
   EXPECT_EQ(TotalN(forces_), 0);
 }
 
 TEST_P(LinearEstimatorTest, MissingMarkersAreLeftOut) {
-  SkinShape shape = ShapeUnder(model_, {{6, 4, 0.2}}, 0, 1, 0.05, 9);
+  SkinShape shape = ShapeUnder(model_, {{6, 4, 0.2}}, 0, 3, 0.05, 9);
   for (size_t i = 0; i < shape.sources.size(); i += 3) {
     shape.sources[i] = MarkerSource::kInferred;
     shape.displacements_mm[i] = Vec3(50, 50, 50);
@@ -81,7 +81,7 @@ TEST_P(LinearEstimatorTest, MissingMarkersAreLeftOut) {
 }
 
 TEST_P(LinearEstimatorTest, NotANumberIsLeftOut) {
-  SkinShape shape = ShapeUnder(model_, {{6, 4, 0.2}}, 0, 1, 0.05, 9);
+  SkinShape shape = ShapeUnder(model_, {{6, 4, 0.2}}, 0, 3, 0.05, 9);
   shape.displacements_mm[10] = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   shape.covariances_mm2[20](0, 0) = std::numeric_limits<double>::infinity();
   estimator_.Estimate(shape, 0, forces_);

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <algorithm>
+#include <map>
 #include <random>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "sensing/core/link_model.h"
@@ -18,7 +22,8 @@ struct TrueLoad {
 /// sigma in Z.
 inline SkinShape ShapeUnder(const LinkModel& model, const std::vector<TrueLoad>& loads, double pressure_mpa,
                             int refinement, double sigma_mm, unsigned seed) {
-  const LinearShell shell(model, refinement);
+  static std::map<std::pair<std::string, int>, LinearShell> shells;  // shells take a while to factorise
+  const LinearShell& shell = shells.try_emplace({model.name, refinement}, model, refinement).first->second;
   const auto& mesh = shell.mesh();
   std::vector<NodalLoad> nodal;
   for (const auto& [path, ring, force] : loads) {
