@@ -18,7 +18,8 @@ struct LinearEstimatorOptions {
   /// proud.
   double noise_floor_mm = 0.03;
   int max_loads = 48;
-  /// Standard deviation given to the displacement of a marker placed by PlaceUnseen, as a fraction of it, and at least.
+  /// Standard deviation given to the displacement of a marker placed by PlaceUnseen, as a fraction of it, and
+  /// at least.
   double unseen_error = 0.2;
   double unseen_floor_mm = 0.3;
   /// Elements per interval of the marker grid.
@@ -42,8 +43,9 @@ class LinearForceEstimator {
   /// `pressure_mpa`: gauge pressure now less that of the baseline. Markers that no camera saw are left out.
   void Estimate(const SkinShape& shape, double pressure_mpa, NodalForces& forces);
 
-  /// Moves the markers that no camera saw to where the forces of the last Estimate put them: the shell interpolates
-  /// better than the straight lines of (4.33), which cut off a dent whose deepest marker is hidden.
+  /// Moves the markers that no camera saw to where the forces of the last Estimate put them: the shell
+  /// interpolates better than the straight lines of (4.33), which cut off a dent whose deepest marker is
+  /// hidden.
   void PlaceUnseen(double pressure_mpa, SkinShape& shape) const;
 
  private:

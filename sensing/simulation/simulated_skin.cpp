@@ -8,7 +8,7 @@
 namespace taclink {
 namespace {
 
-constexpr int kRefinement = 3;  // not that of the estimator
+constexpr int kRefinement = 3;      // not that of the estimator
 constexpr double kTubeGapMm = 0.2;  // the wall stops this far from the tube
 constexpr double kNoTubeMm = 1;     // the wall stops this far from the axis
 constexpr int kPathSamples = 400;   // places of a moving contact at which it may load new nodes
@@ -214,8 +214,7 @@ double SimulatedSkin::FreeScale(const State& without, const State& contacts) con
 
 double SimulatedSkin::InwardDepth(const State& state, const SkinContact& contact) const {
   double depth = 0;
-  for (const NodeWeight& w : contact.center)
-    depth -= w.weight * Normal(w.node).dot(Shift(state, w.node));
+  for (const NodeWeight& w : contact.center) depth -= w.weight * Normal(w.node).dot(Shift(state, w.node));
   return depth;
 }
 

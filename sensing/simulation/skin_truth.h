@@ -23,7 +23,7 @@ struct TrueContact {
   Vec3 center_mm = Vec3::Zero();  ///< on the deformed outer surface
   Vec3 normal = Vec3::Zero();     ///< unit, of the deformed skin there, away from the axis
   Vec3 force_n = Vec3::Zero();    ///< what the world exerts on the skin
-  double depth_mm = 0;            ///< of the centre, along the normal from the undeformed surface; inward is positive
+  double depth_mm = 0;  ///< of the centre, along the normal from the undeformed surface; inward is positive
   double patch_diameter_mm = 0;
   bool limited = false;  ///< pushed less than the scene asks: the skin would go inside the tube
 };

@@ -27,7 +27,10 @@ std::string Shown(double value) {
 }  // namespace
 
 YamlMap::YamlMap(std::shared_ptr<Context> context, YAML::Node node, std::string path, int line)
-    : context_(std::move(context)), node_(std::move(node)), path_(std::move(path)), line_(LineOf(node_, line)) {}
+    : context_(std::move(context)),
+      node_(std::move(node)),
+      path_(std::move(path)),
+      line_(LineOf(node_, line)) {}
 
 bool YamlMap::Has(const std::string& key) const {
   return node_.IsMap() && node_[key].IsDefined();
@@ -49,8 +52,8 @@ YAML::Node YamlMap::Find(const std::string& key, bool required) {
 void YamlMap::FailAt(const YAML::Node& node, const std::string& key, const std::string& what) {
   if (context_->error && !context_->only_missing) return;
   context_->error =
-      Error{ErrorCode::kInvalidArgument, context_->file + ":" + std::to_string(LineOf(node, line_)) + ": '" +
-                                             path_ + key + "' " + what};
+      Error{ErrorCode::kInvalidArgument,
+            context_->file + ":" + std::to_string(LineOf(node, line_)) + ": '" + path_ + key + "' " + what};
   context_->only_missing = false;
 }
 

@@ -39,7 +39,8 @@ TEST_P(SimulatedSkinTest, ContactForceIsAsAsked) {
   EXPECT_NEAR((truth.total_force_n - truth.contacts[0].force_n - truth.contacts[1].force_n).norm(), 0, 1e-12);
   for (const TrueContact& contact : truth.contacts) {
     const double angle = std::atan2(contact.center_mm.y(), contact.center_mm.x());
-    EXPECT_NEAR(contact.force_n.normalized().dot(model_.OutwardNormal(angle, contact.center_mm.z())), -1, 1e-3);
+    EXPECT_NEAR(contact.force_n.normalized().dot(model_.OutwardNormal(angle, contact.center_mm.z())), -1,
+                1e-3);
     EXPECT_GT(contact.depth_mm, 1);
     EXPECT_FALSE(contact.limited);
   }
