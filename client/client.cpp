@@ -57,7 +57,9 @@ Error FromStatus(const grpc::Status& status, const std::string& address) {
     return {code, "the server at " + address + " does not offer this (" + status.error_message() +
                       "); use programs of the same version"};
   }
-  return {code, status.error_message()};
+  return {code, status.error_message().empty()
+                    ? "the server at " + address + " ended the call without a reason"
+                    : status.error_message()};
 }
 
 }  // namespace

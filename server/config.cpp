@@ -148,7 +148,7 @@ Result<Config> LoadConfig(const std::string& path) {
   }
   std::ostringstream text;
   text << in.rdbuf();
-  return ParseConfig(path, text.str(), std::filesystem::path(path).parent_path().string());
+  return ParseConfig(path, text.str(), std::filesystem::absolute(path).parent_path().string());
 }
 
 std::string_view DemoConfigText() {

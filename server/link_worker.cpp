@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -83,8 +84,11 @@ void LinkWorker::SolveOne(const StereoFrame& frame) {
   auto state = pool_.Acquire();
   try {
     process_(frame, *state);
+    failing_ = false;
   } catch (const std::exception& e) {
-    spdlog::error("link {}: frame {} could not be processed: {}", name_, frame.sequence, e.what());
+    if (!failing_)
+      spdlog::error("link {}: frame {} could not be processed: {}", name_, frame.sequence, e.what());
+    failing_ = true;
     ResetTo(*state, LinkStatus::kLost, std::string("processing failed: ") + e.what());
     state->times = frame.times;
   }
@@ -100,8 +104,12 @@ void LinkWorker::PublishStatusIfDue() {
   const bool running = condition.state == SourceCondition::State::kRunning;
   const bool news = !running && condition.changes != reported_changes_;
   const int64_t silence_ns = clock_.MonotonicNs() - last_published_ns_;
-  const bool due =
-      last_published_ns_ == 0 || silence_ns >= std::chrono::nanoseconds(options_.heartbeat).count();
+  // A slow source is not lost between its frames.
+  const double rate_hz = running ? condition.info.frame_rate_hz : 0;
+  const int64_t three_frames = rate_hz > 0 ? static_cast<int64_t>(3e9 / rate_hz) : 0;
+  const int64_t patience_ns =
+      std::max<int64_t>(std::chrono::nanoseconds(options_.heartbeat).count(), three_frames);
+  const bool due = last_published_ns_ == 0 || silence_ns >= patience_ns;
   if (!news && !due) return;
   reported_changes_ = condition.changes;
 

@@ -68,6 +68,7 @@ class LinkWorker {
 
   // Used by the FEM thread only.
   uint64_t last_sequence_ = 0;
+  bool failing_ = false;  // the last frame could not be processed
   int64_t last_published_ns_ = 0;
   uint64_t reported_changes_ = 0;  // of the source's condition
 

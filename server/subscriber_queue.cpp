@@ -10,6 +10,7 @@ namespace {
 // at most.
 constexpr int64_t kEarlyDivisor = 4;
 constexpr int64_t kEarlyMaxNs = 10'000'000;
+constexpr double kLongestPeriodNs = 1e15;  // any client may ask for any rate
 
 size_t Capacity(size_t links, const SubscriberOptions& options) {
   return options.delivery == Delivery::kLatest ? links : std::max<size_t>(options.queue_capacity, 1);
@@ -19,7 +20,9 @@ size_t Capacity(size_t links, const SubscriberOptions& options) {
 
 SubscriberQueue::SubscriberQueue(size_t links, SubscriberOptions options, std::function<void()> notify)
     : delivery_(options.delivery),
-      period_ns_(options.max_rate_hz > 0 ? static_cast<int64_t>(1e9 / options.max_rate_hz) : 0),
+      period_ns_(options.max_rate_hz > 0
+                     ? static_cast<int64_t>(std::min(1e9 / options.max_rate_hz, kLongestPeriodNs))
+                     : 0),
       notify_(std::move(notify)),
       links_(links),
       ring_(Capacity(links, options)) {

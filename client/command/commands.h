@@ -11,6 +11,9 @@ namespace taclink::command {
 /// Set by the subcommand that was chosen; main runs it and prints its error.
 using Selected = std::function<Result<void>()>;
 
+/// A number from `min` to `max`; CLI11's own check lets "nan" through.
+CLI::Validator Within(double min, double max);
+
 /// Each registers one subcommand with its options.
 void AddList(CLI::App& app, Selected& selected);
 void AddWatch(CLI::App& app, Selected& selected);

@@ -23,7 +23,20 @@ namespace taclink::command {
 void AddServerOption(CLI::App& command, std::string& address) {
   command.add_option("--server", address, "Address of the server, host:port")
       ->envname("TACLINK_SERVER")
+      ->check([](const std::string& text) {
+        return text.empty() ? std::string("must be host:port") : std::string();
+      })
       ->capture_default_str();
+}
+
+CLI::Validator Within(double min, double max) {
+  return {[=](std::string& text) -> std::string {
+            double value = 0;
+            if (CLI::detail::lexical_cast(text, value) && value >= min && value <= max) return {};
+            return "'" + text + "' is not a number from " + std::to_string(min) + " to " +
+                   std::to_string(max);
+          },
+          "NUMBER"};
 }
 
 }  // namespace taclink::command
@@ -52,7 +65,9 @@ int main(int argc, char** argv) {
   }
   try {
     const auto result = selected();
-    return result ? 0 : Complain(result.error().message, kFailed);
+    if (!result) return Complain(result.error().message, kFailed);
+    const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+    return written ? 0 : Complain("the output could not be written; check the disk or the pipe", kFailed);
   } catch (const std::exception& e) {
     return Complain(std::string("failed unexpectedly: ") + e.what(), kFailed);
   }

@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <vector>
@@ -13,6 +14,7 @@ namespace taclink::command {
 namespace {
 
 constexpr double kInferredSigmaMm = 5;
+constexpr const char* kBlanks = " \t\r\"";
 constexpr const char* kHeader = "path,ring,ux,uy,uz";
 
 std::vector<std::string> Fields(const std::string& line) {
@@ -20,9 +22,13 @@ std::vector<std::string> Fields(const std::string& line) {
   for (const char c : line) {
     if (c == ',') {
       fields.emplace_back();
-    } else if (c != ' ' && c != '\t' && c != '\r' && c != '"') {
+    } else {
       fields.back() += c;
     }
+  }
+  for (auto& field : fields) {
+    field.erase(0, field.find_first_not_of(kBlanks));
+    field.erase(field.find_last_not_of(kBlanks) + 1);
   }
   return fields;
 }
@@ -62,6 +68,11 @@ Result<Row> ParseRow(const std::string& line, const LinkModel& model) {
                  "' is not a finite number; leave all three empty for a missing marker");
     }
   }
+  const double largest_mm = model.PointAtDepth(0, model.length_mm / 2, 0).x();
+  if (!(row.displacement_mm.cwiseAbs().maxCoeff() <= largest_mm)) {
+    return bad(
+        "a displacement larger than the skin's radius; they are in mm, from the marker's place at rest");
+  }
   row.seen = true;
   return row;
 }
@@ -70,7 +81,8 @@ Result<Row> ParseRow(const std::string& line, const LinkModel& model) {
 
 Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model, double sigma_mm) {
   std::ifstream in(path);
-  if (!in) return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
+  if (!in || std::filesystem::is_directory(path))
+    return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
   const auto count = static_cast<size_t>(model.markers.count());
   SkinShape shape;
   shape.positions_mm = model.RestMarkers();

@@ -59,10 +59,12 @@ void AddSkin(CLI::App& app, Selected& selected) {
       ->required()
       ->delimiter(',')
       ->expected(2);
-  push->add_option("--depth-mm", options->depth_mm, "Of the disc, from the uninflated radius")->required();
-  push->add_option("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin");
-  push->add_option("--patch-diameter-mm", options->patch_diameter_mm, "Of the disc")
-      ->check(CLI::NonNegativeNumber);
+  push->add_option("--depth-mm", options->depth_mm, "Of the disc, from the uninflated radius")
+      ->required()
+      ->check(Within(-1e3, 1e3));
+  push->add_option("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin")
+      ->check(Within(-20, 20));
+  push->add_option("--patch-diameter-mm", options->patch_diameter_mm, "Of the disc")->check(Within(0, 1e3));
   push->add_option("--refinement", options->refinement, "Elements per marker interval")
       ->check(CLI::Range(1, 8));
   push->add_option("--force-model", options->force_model, "Only linear so far")

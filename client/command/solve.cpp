@@ -92,7 +92,7 @@ Result<LinkState> SolvePictures(const SolveOptions& options, const LinkModel& mo
   PipelineOptions pipeline_options;
   pipeline_options.rest_frames = 1;
   if (!options.calibration.empty()) {
-    auto rig = LoadCalibration(options.calibration);
+    auto rig = LoadCalibration(options.calibration, model);
     if (!rig) return rig.error();
     pipeline_options.rig = *rig;
   }
@@ -121,6 +121,9 @@ Result<void> Solve(const SolveOptions& options) {
   if (!model) return model.error();
   const auto state = options.markers.empty() ? SolvePictures(options, *model) : SolveMarkers(options, *model);
   if (!state) return state.error();
+  if (state->status != LinkStatus::kOk && !state->status_reason.empty()) {
+    std::fprintf(stderr, "taclink: worse than it could be: %s\n", state->status_reason.c_str());
+  }
   if (options.json) {
     PrintJson(*model, *state);
   } else {
@@ -146,11 +149,12 @@ void AddSolve(CLI::App& app, Selected& selected) {
       ->needs(rest);
   rest->needs(images)->excludes(markers);
   images->needs(rest)->excludes(markers);
-  command->add_option("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin");
+  command->add_option("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin")
+      ->check(Within(-20, 20));
   command
       ->add_option("--sigma-mm", options->sigma_mm,
                    "With --markers: their standard deviation in x and y; z: 3 times")
-      ->check(CLI::PositiveNumber);
+      ->check(Within(1e-4, 10));
   command->add_option("--force-model", options->force_model, "Only linear so far")
       ->check(CLI::IsMember({"linear"}));
   command->add_flag("--json", options->json, "One JSON object");

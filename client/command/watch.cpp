@@ -8,6 +8,7 @@
 
 #include "client/command/commands.h"
 #include "client/command/frame_json.h"
+#include "client/command/json.h"
 #include "client/command/watch_view.h"
 #include "client/taclink/client.h"
 
@@ -18,6 +19,7 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr milliseconds kPoll{100};  // how soon Ctrl-C is noticed
+constexpr double kPatienceS = 5;
 constexpr milliseconds kRedraw{100};
 constexpr const char* kClearScreen = "\x1b[2J";
 
@@ -52,8 +54,9 @@ class Output {
     if (live_) fmt::print("{}", kClearScreen);
   }
 
-  void Take(const client::Frame& frame) {
+  void Take(const client::Frame& frame, const std::vector<client::StreamCounts>& counts) {
     if (json_) {
+      PrintDrops(counts);
       fmt::print("{}\n", FrameJson(frame));
       std::fflush(stdout);
     } else if (live_) {
@@ -73,10 +76,24 @@ class Output {
   }
 
  private:
+  // A line of its own whenever the server left something out: {"dropped": {"link": frames since the start}}.
+  void PrintDrops(const std::vector<client::StreamCounts>& counts) {
+    uint64_t total = 0;
+    Json dropped = Json::object();
+    for (const auto& link : counts) {
+      total += link.frames_dropped;
+      dropped[link.link] = link.frames_dropped;
+    }
+    if (total == dropped_) return;
+    dropped_ = total;
+    fmt::print("{}\n", Json({{"dropped", dropped}}).dump());
+  }
+
   const bool json_;
   const bool live_;
   LiveView view_;
   ChangeLog log_;
+  uint64_t dropped_ = 0;
   steady_clock::time_point drawn_;
 };
 
@@ -88,15 +105,24 @@ Result<void> Run(const Options& options) {
   std::signal(SIGINT, [](int) { interrupted = true; });
   std::signal(SIGTERM, [](int) { interrupted = true; });
   Output output(options);
+  // Every link says something once a second, so silence means a server or a network that hangs.
+  const double patience_s = std::max(kPatienceS, options.rate_hz > 0 ? 3 / options.rate_hz : 0);
+  double silence_s = 0;
   for (uint64_t taken = 0; !interrupted && (options.count == 0 || taken < options.count);) {
     const auto frame = (*reader)->Next(kPoll);
     if (frame) {
-      output.Take(*frame);
+      silence_s = 0;
+      output.Take(*frame, (*reader)->counts());
       ++taken;
     } else if (frame.error().code != ErrorCode::kTimeout) {
       return frame.error();
+    } else if (silence_s += std::chrono::duration<double>(kPoll).count(); silence_s > patience_s) {
+      return Error{ErrorCode::kUnavailable,
+                   fmt::format("nothing from the server at {} for {:.0f} s; check server and "
+                               "network",
+                               options.server, patience_s)};
     }
-    if (std::ferror(stdout) != 0) break;  // who read this has gone
+    if (std::ferror(stdout) != 0) break;  // main reports it
     output.Refresh(**reader);
   }
   return {};

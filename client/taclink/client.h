@@ -197,12 +197,12 @@ class Client {
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
 
-  Result<Arm> GetArm(std::chrono::milliseconds timeout = std::chrono::seconds(3));
+  Result<Arm> GetArm(std::chrono::milliseconds timeout = std::chrono::seconds(10));
 
   /// Returns once the server has accepted. Errors: kNotFound (no such link), kInvalidArgument,
   /// kResourceExhausted, kUnavailable.
   Result<std::unique_ptr<FrameReader>> StreamFrames(
-      const StreamOptions& options, std::chrono::milliseconds timeout = std::chrono::seconds(3));
+      const StreamOptions& options, std::chrono::milliseconds timeout = std::chrono::seconds(10));
 
  private:
   struct Connection;

@@ -291,12 +291,14 @@ Result<CalibrationSummary> CalibrateFromRest(const LinkModel& model, const Label
   return summary;
 }
 
-Result<StereoRig> LoadCalibration(const std::string& path) {
+Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model) {
   auto file = YamlFile::Load(path);
   if (!file) return file.error();
   YamlMap& root = file->root();
   root.Integer("taclink_calibration", {.min = kFormatVersion, .max = kFormatVersion});
-  root.Text("model");
+  if (const std::string name = root.Text("model"); !name.empty() && name != model.name) {
+    root.Fail("model", "is '" + name + "', but the link's model is '" + model.name + "'");
+  }
   root.Integer("markers_used", 0);
   root.Number("rms_px", 0.0);
   StereoRig rig;

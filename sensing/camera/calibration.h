@@ -49,9 +49,9 @@ Result<CameraCalibration> CalibrateCamera(const LinkModel& model, CameraId id,
 Result<CalibrationSummary> CalibrateFromRest(const LinkModel& model, const LabelledMarkers& rest,
                                              const CalibrationOptions& options = {});
 
-/// Calibration files (YAML, `taclink_calibration: 1`). Errors: kNotFound, kInvalidArgument (file, line, what
-/// was expected).
-Result<StereoRig> LoadCalibration(const std::string& path);
+/// Calibration files (YAML, `taclink_calibration: 1`), for links of that model only. Errors: kNotFound,
+/// kInvalidArgument (file, line, what was expected).
+Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model);
 /// Replaces the file as a whole. Errors: kUnavailable.
 Result<void> SaveCalibration(const std::string& path, const std::string& model_name,
                              const CalibrationSummary& summary);

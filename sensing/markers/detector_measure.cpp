@@ -15,8 +15,8 @@ constexpr int kNeighbourhood = 48;  // px, cells over which typical contrast is 
 }  // namespace
 
 double MarkerDetector::BackgroundAt(double x, double y) const {
-  const double gx = std::clamp(x / cell_ - 0.5, 0.0, grid_width_ - 1.001);
-  const double gy = std::clamp(y / cell_ - 0.5, 0.0, grid_height_ - 1.001);
+  const double gx = std::clamp(x / cell_ - 0.5, 0.0, std::max(0.0, grid_width_ - 1.001));
+  const double gy = std::clamp(y / cell_ - 0.5, 0.0, std::max(0.0, grid_height_ - 1.001));
   const auto ix = static_cast<int>(gx), iy = static_cast<int>(gy);
   const double ax = gx - ix, ay = gy - iy;
   const uint8_t* at = background_.data() + iy * grid_width_ + ix;

@@ -140,10 +140,9 @@ void PathTracker::SortIntoPaths(CameraId id, const Detections& detections) {
     const auto azimuth =
         direction ? AzimuthAtRadius(rays_[Index(id)].back(), mean_radius_mm_) : std::optional<double>();
     if (azimuth && AreaFits(views_[Index(id)], d)) {
-      const double place =
-          (*azimuth - model_.markers.first_path_angle_rad) / model_.markers.path_pitch_rad() + 2 * paths;
+      const double place = (*azimuth - model_.markers.first_path_angle_rad) / model_.markers.path_pitch_rad();
       const auto nearest = static_cast<int>(std::lround(place));
-      candidate.path = nearest % paths;
+      candidate.path = (nearest % paths + paths) % paths;
       candidate.offset = place - nearest;
       by_path_[static_cast<size_t>(candidate.path)].push_back(static_cast<int>(candidates_.size()));
     }

@@ -1,9 +1,13 @@
 #include "sensing/mechanics/shell_mesh.h"
 
+#include <algorithm>
 #include <cassert>
+#include <cmath>
 
 namespace taclink {
 namespace {
+
+constexpr double kMaxElementDeg = 15;  // around the axis; coarser ones are far too stiff
 
 // z of all rows of nodes: both clamped ends, every ring, and refinement - 1 rows in between each.
 std::vector<double> RowPositions(const LinkModel& model, int refinement) {
@@ -32,6 +36,8 @@ void AddNodeAreas(ShellMesh& mesh) {
 
 ShellMesh MakeShellMesh(const LinkModel& model, int refinement) {
   assert(refinement >= 1);
+  const double widest = model.markers.path_pitch_rad() / RadFromDeg(kMaxElementDeg);
+  refinement = std::max(refinement, static_cast<int>(std::ceil(widest - 1e-9)));
   ShellMesh mesh;
   mesh.refinement = refinement;
   mesh.thickness_mm = model.thickness_mm;

@@ -32,6 +32,7 @@ struct ShellMesh {
   }
 };
 
+/// Refines more than asked where an element would span more than 15 degrees around the axis.
 ShellMesh MakeShellMesh(const LinkModel& model, int refinement);
 
 }  // namespace taclink

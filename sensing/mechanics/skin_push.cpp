@@ -11,6 +11,8 @@
 namespace taclink {
 namespace {
 
+constexpr double kMaxPressureMpa = 0.02;  // several times what any skin of this kind bears
+
 std::string Shown(double value) {
   std::string text = std::to_string(value);
   text.erase(text.find_last_not_of('0') + 1);
@@ -24,17 +26,21 @@ Result<void> Check(const LinkModel& model, const SkinPush& push) {
                                                   std::to_string(model.markers.paths) + " paths and " +
                                                   std::to_string(model.markers.rings()) + " rings"};
   }
-  if (!std::isfinite(push.depth_mm) || !std::isfinite(push.pressure_mpa) || !(push.patch_diameter_mm >= 0) ||
-      push.refinement < 1 || push.refinement > 8) {
+  if (!std::isfinite(push.depth_mm) ||
+      !(push.patch_diameter_mm >= 0 && push.patch_diameter_mm <= model.length_mm) || push.refinement < 1 ||
+      push.refinement > 8) {
     return Error{ErrorCode::kInvalidArgument,
-                 "depth, pressure and patch diameter must be finite, the refinement from 1 to 8"};
+                 "the depth must be finite, the patch no larger than the skin, the refinement from 1 to 8"};
+  }
+  if (!(std::abs(push.pressure_mpa) <= kMaxPressureMpa)) {
+    return Error{ErrorCode::kInvalidArgument, "the pressure must be between -20 and 20 kPa"};
   }
   const double z = model.markers.rings_z_mm[static_cast<size_t>(model.RingOf(push.marker))];
   const double room = model.PointAtDepth(0, z, model.thickness_mm).x() - model.tube_outer_radius_mm;
-  if (model.tube_outer_radius_mm > 0 && push.depth_mm > room) {
+  if (push.depth_mm > room) {
     return Error{ErrorCode::kInvalidArgument, "a depth of " + Shown(push.depth_mm) +
-                                                  " mm goes into the tube; at most " + Shown(room) +
-                                                  " mm is possible there"};
+                                                  " mm goes into the tube or beyond the axis; at most " +
+                                                  Shown(room) + " mm is possible there"};
   }
   return {};
 }

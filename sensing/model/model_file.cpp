@@ -14,6 +14,9 @@ std::span<const EmbeddedFile> EmbeddedModels();
 namespace {
 
 constexpr int kFormatVersion = 1;
+constexpr size_t kMaxMarkers = 1024;
+// Thickness over radius: a shell is neither a foil nor a block.
+constexpr double kMinThicknessRatio = 1e-4, kMaxThicknessRatio = 0.25;
 
 // Camera frame: x right, y down, z forward. The bottom camera is the top one turned half round about Y.
 Mat3 DesignedRotation(CameraId id) {
@@ -59,7 +62,7 @@ void ReadSkin(YamlMap map, LinkModel& model) {
   model.profile_depth_mm = model.thickness_mm * 0.5 * static_cast<double>(surface);
   model.profile = ReadProfile(map.Map("profile"), model.length_mm);
   YamlMap material = map.Map("material");
-  model.material.youngs_modulus_mpa = material.Number("youngs_modulus_mpa", kPositive);
+  model.material.youngs_modulus_mpa = material.Number("youngs_modulus_mpa", {.min = 1e-4, .max = 1e5});
   model.material.poisson_ratio = material.Number("poisson_ratio", {.min = 0, .max = 0.5});
   material.Done();
   map.Done();
@@ -68,7 +71,7 @@ void ReadSkin(YamlMap map, LinkModel& model) {
 void ReadMarkers(YamlMap map, LinkModel& model) {
   MarkerGrid& grid = model.markers;
   grid.paths = map.Integer("paths", {.min = 4, .max = 256});
-  grid.first_path_angle_rad = RadFromDeg(map.Number("first_path_angle_deg", 0.0));
+  grid.first_path_angle_rad = RadFromDeg(map.Number("first_path_angle_deg", 0.0, {.min = -360, .max = 360}));
   if (map.Has("rings_z_mm")) {
     grid.rings_z_mm = map.Numbers("rings_z_mm");
   } else {
@@ -86,6 +89,9 @@ void ReadMarkers(YamlMap map, LinkModel& model) {
     last = z;
   }
   if (grid.rings_z_mm.size() < 2) map.Fail("rings_z_mm", "needs at least 2 rings");
+  if (grid.rings_z_mm.size() * static_cast<size_t>(grid.paths) > kMaxMarkers) {
+    map.Fail("paths", "times the number of rings must be at most " + std::to_string(kMaxMarkers));
+  }
   grid.diameter_mm = map.Number("diameter_mm", kPositive);
   grid.center_depth_mm =
       map.Number("center_depth_mm", model.thickness_mm + 2 * grid.diameter_mm / (3 * kPi), kNotNegative);
@@ -96,7 +102,13 @@ void CheckGeometry(YamlMap& root, const LinkModel& model) {
   const double innermost = std::max(model.thickness_mm, model.markers.center_depth_mm);
   for (int i = 0; i <= 64; ++i) {
     const double z = model.length_mm * i / 64;
-    if (model.PointAtDepth(0, z, innermost).x() <= model.tube_outer_radius_mm) {
+    const double ratio = model.thickness_mm / model.PointAtDepth(0, z, model.thickness_mm / 2).x();
+    if (!(ratio >= kMinThicknessRatio && ratio <= kMaxThicknessRatio)) {
+      root.Fail("skin", "is no shell at z = " + std::to_string(z) + " mm: thickness over radius is " +
+                            std::to_string(ratio) + ", not between 0.0001 and 0.25");
+      return;
+    }
+    if (!(model.PointAtDepth(0, z, innermost).x() > model.tube_outer_radius_mm)) {
       root.Fail("skin", "lies inside the tube at z = " + std::to_string(z) +
                             " mm; check profile, thickness and tube");
       return;

@@ -31,6 +31,9 @@ void ClearMeasurement(LinkState& state) {
   state.forces.forces_n.clear();
   state.forces.sigmas_n.clear();
   state.forces.loaded.clear();
+  state.forces.loaded_covariance.resize(0, 0);
+  state.forces.residual = 0;
+  state.forces.converged = true;
   state.contacts.clear();
   state.total_force_n.setZero();
 }
@@ -52,6 +55,7 @@ struct LinkPipeline::Stages {
 
   std::array<GrayDecoder, kCameraCount> decoders;
   std::array<cv::Mat, kCameraCount> gray;
+  std::array<bool, kCameraCount> has_picture{};
   MarkerDetector detector;
   std::array<Detections, kCameraCount> detections;
   RestPose rest;
@@ -75,14 +79,21 @@ struct LinkPipeline::Stages {
     camera_trouble.clear();
     for (const CameraId id : kBothCameras) {
       const auto i = Index(id);
-      gray[i].release();
+      has_picture[i] = false;
       if (!frame.images[i].valid) {
         camera_trouble = std::string("no picture from the ") + Name(id) + " camera";
         continue;
       }
       if (auto decoded = decoders[i].Decode(frame.images[i], gray[i]); !decoded) {
-        gray[i].release();
         camera_trouble = std::string(Name(id)) + " camera: " + decoded.error().message;
+        continue;
+      }
+      const CameraModel& expected = (rest.calibration() ? rest.calibration()->rig : model.nominal_rig)[id];
+      has_picture[i] = gray[i].cols == expected.width_px && gray[i].rows == expected.height_px;
+      if (!has_picture[i]) {
+        camera_trouble = std::string(Name(id)) + " camera: the picture is " + std::to_string(gray[i].cols) +
+                         "x" + std::to_string(gray[i].rows) + ", the camera's model is for " +
+                         std::to_string(expected.width_px) + "x" + std::to_string(expected.height_px);
       }
     }
   }
@@ -90,7 +101,7 @@ struct LinkPipeline::Stages {
   void Detect(LinkState& state) {
     for (size_t i = 0; i < kCameraCount; ++i) {
       detections[i].clear();
-      if (!gray[i].empty()) detector.Detect(gray[i], detections[i]);
+      if (has_picture[i]) detector.Detect(gray[i], detections[i]);
       state.cameras[i].detections = static_cast<int>(detections[i].size());
     }
   }
@@ -116,14 +127,14 @@ struct LinkPipeline::Stages {
 
   void Judge(LinkState& state) const {
     const int seen = state.shape.seen(), all = model.markers.count();
-    const std::string count = std::to_string(seen) + " of " + std::to_string(all) + " markers seen";
+    const auto count = [&] { return std::to_string(seen) + " of " + std::to_string(all) + " markers seen"; };
     if (seen < kLostFraction * all) {
-      SetStatus(state, LinkStatus::kLost, count + (camera_trouble.empty() ? "" : "; " + camera_trouble));
+      SetStatus(state, LinkStatus::kLost, count() + (camera_trouble.empty() ? "" : "; " + camera_trouble));
       ClearMeasurement(state);
     } else if (!camera_trouble.empty()) {
       SetStatus(state, LinkStatus::kDegraded, camera_trouble);
     } else if (seen < kDegradedFraction * all) {
-      SetStatus(state, LinkStatus::kDegraded, count);
+      SetStatus(state, LinkStatus::kDegraded, count());
     } else if (!state.forces.converged) {
       SetStatus(state, LinkStatus::kDegraded, "more loads than the force model takes");
     } else {

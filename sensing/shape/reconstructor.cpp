@@ -32,11 +32,12 @@ ShapeReconstructor::ShapeReconstructor(const LinkModel& model, const StereoRig& 
 
 void ShapeReconstructor::SetBaseline(const SkinShape& rest) {
   for (size_t i = 0; i < baseline_mm_.size(); ++i) {
-    const bool measured = i < rest.sources.size() && rest.sources[i] == MarkerSource::kBoth;
+    const bool measured = i < rest.sources.size() && rest.sources[i] != MarkerSource::kInferred;
     baseline_mm_[i] = measured ? rest.positions_mm[i] : model_rest_mm_[i];
     // The shape's covariance may hold an older baseline's; it is that of a single measurement otherwise.
     baseline_covariance_mm2_[i] =
-        measured ? Mat3(rest.covariances_mm2[i] - baseline_covariance_mm2_[i]) : Mat3(Mat3::Zero());
+        measured ? Mat3(rest.covariances_mm2[i] - baseline_covariance_mm2_[i])
+                 : Mat3(options_.unseen_rest_sigma_mm * options_.unseen_rest_sigma_mm * Mat3::Identity());
   }
 }
 

@@ -24,6 +24,8 @@ struct ShapeOptions {
   /// those that none sees (each axis, (4.33)).
   double assumed_z_sigma_mm = 2.5;
   double inferred_sigma_mm = 5;
+  /// Of the model's rest position, which stands in for that of a marker unseen in the baseline, each axis.
+  double unseen_rest_sigma_mm = 2;
 };
 
 /// Labelled markers to 3-D positions, each with covariance and source.
@@ -43,7 +45,7 @@ class ShapeReconstructor {
   /// Displacements are from the baseline, their covariances include the baseline's.
   void Reconstruct(const LabelledMarkers& markers, SkinShape& shape);
 
-  /// Takes a reconstructed shape as the baseline. Where it was not measured by both cameras, the model's rest
+  /// Takes a reconstructed shape as the baseline. Where no camera saw a marker, the model's rest
   /// position stands in, as it does for all markers before the first call.
   void SetBaseline(const SkinShape& rest);
 

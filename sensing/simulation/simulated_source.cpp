@@ -26,6 +26,7 @@ SimulatedSource::SimulatedSource(const LinkModel& model, Scene scene, Clock& clo
 }
 
 Result<void> SimulatedSource::Start() {
+  if (started_) sequence_offset_ += next_frame_;
   started_ = true;
   start_ns_ = clock_.MonotonicNs();
   next_frame_ = 0;
@@ -68,7 +69,7 @@ void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
     renderer_.Render(truth_, id, gray_);
     PackYuyv(gray_, renderer_.chroma(id), frame.images[Index(id)]);
   }
-  frame.sequence = frame_number;
+  frame.sequence = sequence_offset_ + frame_number;
   frame.pressure_mpa = truth_.pressure_mpa;
   frame.times = {};
   frame.times.exposure_monotonic_ns = ExposureNs(frame_number);

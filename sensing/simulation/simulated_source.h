@@ -14,7 +14,7 @@
 namespace taclink {
 
 /// Plays a scene as a pair of cameras would deliver it: YUYV at the scene's rate by the clock. Frame k of the
-/// scene has the sequence number k, whatever was skipped.
+/// scene has the sequence number k, whatever was skipped; another Start counts on.
 class SimulatedSource final : public FrameSource {
  public:
   /// The cameras are the model's nominal ones. Errors: kInvalidArgument (the scene does not fit the model).
@@ -43,6 +43,7 @@ class SimulatedSource final : public FrameSource {
   bool started_ = false;
   int64_t start_ns_ = 0;
   uint64_t next_frame_ = 0;
+  uint64_t sequence_offset_ = 0;  // frames of earlier starts: the count goes on
   SkinTruth truth_;
   cv::Mat gray_;
 };

@@ -16,7 +16,7 @@ Result<FrameProcessor> MakeProcessor(const LinkConfig& link, const LinkModel& mo
   PipelineOptions options;
   if (link.pressure_kpa) options.pressure_mpa = *link.pressure_kpa * kMpaPerKpa;
   if (link.calibration) {
-    auto rig = LoadCalibration(*link.calibration);
+    auto rig = LoadCalibration(*link.calibration, model);
     if (!rig) return rig.error();
     options.rig = *rig;
   }

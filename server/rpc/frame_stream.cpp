@@ -93,7 +93,9 @@ void FrameStream::Pump() {
                           grpc::Status(grpc::StatusCode::UNAVAILABLE, end_reason_));
       break;
     case Step::kFinishCancelled:
-      Finish(grpc::Status::CANCELLED);
+      // Also where the server gave up on a client that does not read: it may still get to see the reason.
+      Finish(end_reason_.empty() ? grpc::Status::CANCELLED
+                                 : grpc::Status(grpc::StatusCode::UNAVAILABLE, end_reason_));
       break;
   }
 }

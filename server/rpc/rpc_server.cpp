@@ -10,9 +10,10 @@ namespace taclink::server {
 namespace {
 
 constexpr int kMaxRequestBytes = 64 * 1024;
-// A client that vanished without a word is noticed after about this long.
-constexpr int kKeepaliveTimeMs = 20'000;
-constexpr int kKeepaliveTimeoutMs = 10'000;
+// A client that vanished without a word is noticed after their sum; one that is only stopped for a minute or
+// two is kept.
+constexpr int kKeepaliveTimeMs = 60'000;
+constexpr int kKeepaliveTimeoutMs = 120'000;
 
 void SetUp(grpc::ServerBuilder& builder) {
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);

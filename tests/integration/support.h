@@ -65,7 +65,7 @@ class TestServer {
   int states_alive() const { return *alive_; }
 
   client::Client Connect() {
-    auto client = client::Client::Connect(server_->address());
+    auto client = client::Client::Connect(server_->address(), std::chrono::seconds(60));
     EXPECT_TRUE(client.ok()) << client.error().message;
     return std::move(*client);
   }

@@ -97,7 +97,7 @@ TEST(Calibration, FilesKeepTheRig) {
   summary.rig[CameraId::kTop].lens.focal_px = 231.25;
   const auto path = (std::filesystem::temp_directory_path() / "taclink_calibration_test.yaml").string();
   ASSERT_TRUE(SaveCalibration(path, "barrel", summary).ok());
-  const auto loaded = LoadCalibration(path);
+  const auto loaded = LoadCalibration(path, LoadLinkModel("barrel").value());
   ASSERT_TRUE(loaded.ok()) << loaded.error().message;
   for (const CameraId id : kBothCameras) {
     EXPECT_DOUBLE_EQ((*loaded)[id].lens.focal_px, summary.rig[id].lens.focal_px);
@@ -106,9 +106,9 @@ TEST(Calibration, FilesKeepTheRig) {
         1e-8);
   }
   std::ofstream(path, std::ios::app) << "suprise: 1\n";
-  EXPECT_FALSE(LoadCalibration(path).ok());
+  EXPECT_FALSE(LoadCalibration(path, LoadLinkModel("barrel").value()).ok());
   std::filesystem::remove(path);
-  EXPECT_EQ(LoadCalibration(path).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(LoadCalibration(path, LoadLinkModel("barrel").value()).error().code, ErrorCode::kNotFound);
   EXPECT_FALSE(SaveCalibration("/nowhere/at/all.yaml", "barrel", summary).ok());
 }
 
