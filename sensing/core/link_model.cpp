@@ -50,7 +50,7 @@ RadiusProfile RadiusProfile::Arc(double length_mm, double end_mm, double middle_
   return RadiusProfile(ArcShape{half, middle_mm - sign * arc_radius, arc_radius, sign});
 }
 
-RadiusProfile RadiusProfile::Spline(std::vector<std::pair<double, double>> points_mm) {
+RadiusProfile RadiusProfile::Spline(const std::vector<std::pair<double, double>>& points_mm) {
   SplineShape shape;
   for (const auto& [z, r] : points_mm) {
     shape.z.push_back(z);

@@ -18,7 +18,7 @@ class RadiusProfile {
   /// Circular arc through (0, end_mm), (length/2, middle_mm), (length, end_mm).
   static RadiusProfile Arc(double length_mm, double end_mm, double middle_mm);
   /// Natural cubic spline through (z, R), z strictly rising, at least two points.
-  static RadiusProfile Spline(std::vector<std::pair<double, double>> points_mm);
+  static RadiusProfile Spline(const std::vector<std::pair<double, double>>& points_mm);
 
   double Radius(double z_mm) const;
   double Slope(double z_mm) const;  ///< dR/dz

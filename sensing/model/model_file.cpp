@@ -45,7 +45,7 @@ RadiusProfile ReadProfile(YamlMap map, double length_mm) {
       }
       std::vector<std::pair<double, double>> points;
       for (size_t i = 0; i < z.size(); ++i) points.emplace_back(z[i], r[i]);
-      profile = RadiusProfile::Spline(std::move(points));
+      profile = RadiusProfile::Spline(points);
       break;
     }
     default:
