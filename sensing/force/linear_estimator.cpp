@@ -58,7 +58,8 @@ bool LinearForceEstimator::Whiten(const SkinShape& shape, double pressure_mpa) {
   for (int m = 0; m < markers_; ++m) {
     const auto i = static_cast<size_t>(m);
     auto block = whitener_.block<3, 3>(0, 3 * m);
-    const Vec3 u = shape.displacements_mm[i] - pressure_mpa * per_pressure_.segment<3>(3 * m);
+    const Vec3 inflation = pressure_mpa * per_pressure_.segment<3>(3 * m);
+    const Vec3 u = shape.displacements_mm[i] - inflation;
     if (shape.sources[i] == MarkerSource::kInferred || !u.allFinite() ||
         !shape.covariances_mm2[i].allFinite()) {
       block.setZero();
@@ -66,7 +67,7 @@ bool LinearForceEstimator::Whiten(const SkinShape& shape, double pressure_mpa) {
       continue;
     }
     ++used_markers_;
-    const double model_sigma = options_.model_error * u.norm();
+    const double model_sigma = options_.model_error * u.norm() + options_.pressure_error * inflation.norm();
     const Mat3 covariance =
         shape.covariances_mm2[i] + (floor2 + model_sigma * model_sigma) * Mat3::Identity();
     block.setIdentity();

@@ -14,6 +14,8 @@ struct LinearEstimatorOptions {
   double significance = 4.5;
   /// What the linear model itself gets wrong, as a fraction of each marker's displacement; adds to its noise.
   double model_error = 0.05;
+  /// The same of the displacement that the pressure makes.
+  double pressure_error = 0.03;
   /// Smallest standard deviation given to a marker, mm; detections correlate, so covariances alone are too
   /// proud.
   double noise_floor_mm = 0.03;
