@@ -49,7 +49,7 @@ Result<void> Detect(const DetectOptions& options) {
                          {"y", d.center_px.y()},
                          {"width", d.width_px},
                          {"height", d.height_px},
-                         {"sigma_px", d.sigma_px}});
+                         {"sigma_px", d.sigma_px()}});
     }
     std::puts(Json({{"markers", markers}}).dump().c_str());
   } else {

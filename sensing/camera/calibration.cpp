@@ -58,8 +58,8 @@ double AxialZ(CameraId id, const Vec3& p) {
 std::vector<Sample> Collect(const LinkModel& model, std::span<const MarkerObservation> rest) {
   std::vector<Sample> samples;
   for (size_t i = 0; i < rest.size(); ++i) {
-    if (!rest[i].seen || rest[i].sigma_px > kMaxSigmaPx) continue;
-    const double weight = 1 / std::hypot(rest[i].sigma_px, kSigmaFloorPx);
+    if (!rest[i].seen || rest[i].sigma_px() > kMaxSigmaPx) continue;
+    const double weight = 1 / std::hypot(rest[i].sigma_px(), kSigmaFloorPx);
     samples.push_back({model.RestMarker(static_cast<int>(i)), rest[i].center_px, weight});
   }
   return samples;
@@ -273,7 +273,7 @@ Result<CalibrationSummary> CalibrateFromRest(const LinkModel& model, const Label
   double r = 0, z = 0, all = 0;
   for (size_t i = 0; i < rest.cameras[0].size(); ++i) {
     const MarkerObservation &a = rest.cameras[0][i], &b = rest.cameras[1][i];
-    if (!a.seen || !b.seen || std::max(a.sigma_px, b.sigma_px) > kMaxSigmaPx) continue;
+    if (!a.seen || !b.seen || std::max(a.sigma_px(), b.sigma_px()) > kMaxSigmaPx) continue;
     const auto ray_a = top.Ray(a.center_px), ray_b = bottom.Ray(b.center_px);
     if (!ray_a || !ray_b) continue;
     const auto meeting = MeetRays({top.center_in_link(), *ray_a}, {bottom.center_in_link(), *ray_b});

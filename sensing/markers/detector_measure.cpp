@@ -143,9 +143,10 @@ bool MarkerDetector::Measure(const cv::Mat& gray, const Blob& blob, const Levels
   const double size = std::sqrt(area);
   const double from_noise = noise_ * std::sqrt(0.5 * static_cast<double>(ramp)) / (area * (high - low));
   const double from_shade = options_.sigma_per_size * size;
-  detection.sigma_px = detection.clipped ? 0.25 * size
-                                         : std::sqrt(from_noise * from_noise + from_shade * from_shade +
-                                                     options_.sigma_floor_px * options_.sigma_floor_px);
+  const double variance = detection.clipped ? 0.0625 * area
+                                            : from_noise * from_noise + from_shade * from_shade +
+                                                  options_.sigma_floor_px * options_.sigma_floor_px;
+  detection.covariance_px2 = variance * Mat2::Identity();
 
   const double pixel = 1.0 / 12;  // second moment of a pixel itself
   const double xx = mean(wxx) - mx * mx + pixel, yy = mean(wyy) - my * my + pixel, xy = mean(wxy) - mx * my;

@@ -121,7 +121,7 @@ void PathTracker::Label(const std::array<Detections, kCameraCount>& detections, 
             static_cast<size_t>(chains_[Index(id)][static_cast<size_t>(l)][static_cast<size_t>(place)]);
         const Detection& d = detections[Index(id)][detection];
         out.cameras[Index(id)][static_cast<size_t>(model_.MarkerIndex(l, j))] = {true, d.center_px,
-                                                                                 d.sigma_px};
+                                                                                 d.covariance_px2};
       }
     }
   }

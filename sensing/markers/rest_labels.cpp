@@ -226,7 +226,7 @@ class RestLabeller {
         if (distance >= off[marker]) continue;
         off[marker] = distance;
         const Detection& d = detections_[static_cast<size_t>(spot.detection)];
-        seen[marker] = {true, d.center_px, d.sigma_px};
+        seen[marker] = {true, d.center_px, d.covariance_px2};
       }
     }
     const auto count = std::count_if(seen.begin(), seen.end(), [](const auto& o) { return o.seen; });

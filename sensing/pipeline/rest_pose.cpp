@@ -92,7 +92,7 @@ void RestPose::Accumulate() {
       const MarkerObservation& one = labels_.cameras[c][m];
       if (!one.seen) continue;
       mean_.cameras[c][m].center_px += one.center_px;
-      mean_.cameras[c][m].sigma_px += one.sigma_px;
+      mean_.cameras[c][m].covariance_px2 += one.covariance_px2;
       squares_[c][m] += one.center_px.squaredNorm();
       ++counts_[c][m];
     }
@@ -108,7 +108,7 @@ Result<bool> RestPose::Finish() {
       mean.seen = 2 * n > taken_;
       if (!mean.seen) continue;
       mean.center_px /= n;
-      mean.sigma_px /= n * std::sqrt(n);
+      mean.covariance_px2 /= n * n;
       if (n > 1) variances.push_back((squares_[c][m] - n * mean.center_px.squaredNorm()) / (2.0 * (n - 1)));
     }
   }

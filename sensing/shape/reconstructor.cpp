@@ -91,7 +91,7 @@ bool ShapeReconstructor::Triangulate(const MarkerObservation& top, const MarkerO
     for (size_t c = 0; c < seen.size(); ++c) {
       const auto projected = projectors_[c].ProjectWithJacobian(p);
       if (!projected) return false;
-      const double variance = Variance(seen[c]->sigma_px, options_.camera_sigma_px);
+      const double variance = Variance(seen[c]->sigma_px(), options_.camera_sigma_px);
       const Vec2 residual = seen[c]->center_px - projected->pixel;
       // The last round only judges what the steps have reached.
       const double gate =
@@ -129,7 +129,7 @@ bool ShapeReconstructor::FromOneCamera(CameraId id, const MarkerObservation& see
   const Vec3 along = *direction / direction->z();
   Mat3 covariance = options_.assumed_z_sigma_mm * options_.assumed_z_sigma_mm * (along * along.transpose());
   covariance.topLeftCorner<2, 2>() +=
-      Variance(seen.sigma_px, options_.camera_sigma_px) * (pixel_to_plane * pixel_to_plane.transpose());
+      Variance(seen.sigma_px(), options_.camera_sigma_px) * (pixel_to_plane * pixel_to_plane.transpose());
   shape.positions_mm[marker] = *p;
   shape.covariances_mm2[marker] = covariance;
   return true;

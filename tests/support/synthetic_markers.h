@@ -101,7 +101,7 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
       if (d.center_px.x() < 2 || d.center_px.y() < 2 || d.center_px.x() > width - 3 ||
           d.center_px.y() > height - 3)
         continue;
-      d.sigma_px = options.noise_px;
+      d.covariance_px2 = options.noise_px * options.noise_px * Mat2::Identity();
       const double scale = camera_scale(rest);
       d.area_px2 = scale * scale * model.markers.diameter_mm * model.markers.diameter_mm * 0.5;
       all.emplace_back(d, i);
@@ -112,7 +112,7 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
     for (int i = 0; i < options.false_spots; ++i) {
       Detection d;
       d.center_px = Vec2(width * uniform(random), height * uniform(random));
-      d.sigma_px = options.noise_px;
+      d.covariance_px2 = options.noise_px * options.noise_px * Mat2::Identity();
       d.area_px2 = 5 + 10 * uniform(random);  // dust
       all.emplace_back(d, -1);
     }

@@ -83,7 +83,7 @@ TEST(Detector, CentresOfEllipsesAreSubPixelAtAnySize) {
       EXPECT_FALSE(d->clipped);
       EXPECT_NEAR(d->area_px2, kPi * e.a * e.b, 0.25 * kPi * e.a * e.b);
       squares += error * error;
-      normalised += error * error / (2 * d->sigma_px * d->sigma_px);
+      normalised += error * error / d->covariance_px2.trace();
       ++count;
     }
   }
@@ -132,7 +132,7 @@ TEST(Detector, ABlobAtTheEdgeSaysSo) {
   const Detection* clipped = Nearest(found, Vec2(100, 4), 4);
   ASSERT_NE(clipped, nullptr);
   EXPECT_TRUE(clipped->clipped);
-  EXPECT_GT(clipped->sigma_px, 1);
+  EXPECT_GT(clipped->sigma_px(), 1);
 }
 
 TEST(Detector, OddPicturesGiveNothing) {
