@@ -21,7 +21,7 @@ LabelledMarkers TrueLabels(const LinkModel& model, const std::vector<Dent>& dent
       const auto pixel = projector.Project(Deform(model, dents, model.RestMarker(i)));
       labels.cameras[Index(id)].push_back(
           {pixel.has_value(), pixel ? Vec2(*pixel + Vec2(gauss(random), gauss(random))) : Vec2(Vec2::Zero()),
-           noise_px});
+           Mat2(noise_px * noise_px * Mat2::Identity())});
     }
   }
   return labels;
