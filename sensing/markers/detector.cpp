@@ -72,23 +72,35 @@ void MarkerDetector::Detect(const cv::Mat& gray, Detections& out) {
   FindRuns(gray);
   CollectBlobs(gray);
   measured_.clear();
+  bells_.Begin(gray, noise_, contrast_);
+  first_level_ = true;
   for (const double level : kSplitLevels) {
     MeasureBlobs(gray, level);
+    first_level_ = false;
     SplitAgain(gray);
     CollectBlobs(gray);
   }
   MeasureBlobs(gray, 0);
+  DropDimBells();
+  if (!bells_.bells().empty()) {
+    for (const Measured& m : measured_) {
+      if (m.detection.area_px2 < 150) bells_.AddKnown(m.detection.center_px, m.spread, m.contrast);
+    }
+    bells_.Fit();
+  }
+  TakeBells();
   DropSpecks(out);
 }
 
 // From the median step between neighbours, which edges hardly move: |N(0, 2 sigma^2)| has median 0.954 sigma.
 void MarkerDetector::EstimateNoise(const cv::Mat& gray) {
-  std::array<int, 256> histogram{};
+  std::array<int, 256> histogram{}, levels{};
   int count = 0;
   for (int y = 4; y < height_; y += 8) {
     const uint8_t* row = gray.ptr(y);
     for (int x = 0; x + 1 < width_; x += 2, ++count) {
       ++histogram[static_cast<size_t>(std::abs(row[x] - row[x + 1]))];
+      ++levels[row[x]];
     }
   }
   int below = 0;
@@ -97,7 +109,10 @@ void MarkerDetector::EstimateNoise(const cv::Mat& gray) {
   // Within the step, linearly: the steps are coarse against the noise.
   const double part = (0.5 * count - below) / std::max(1, histogram[step]);
   noise_ = std::max(0.7, (static_cast<double>(step) - 0.5 + part) / 0.954);
-  contrast_ = std::max(options_.min_contrast, 3.5 * noise_);
+  size_t median = 0;
+  for (int sum = levels[0]; 2 * sum < count; sum += levels[++median]) {
+  }
+  contrast_ = std::max({options_.min_contrast, 3.5 * noise_, 0.4 * static_cast<double>(median)});
 }
 
 void MarkerDetector::FindBackground(const cv::Mat& gray) {
@@ -220,8 +235,8 @@ void MarkerDetector::CollectBlobs(const cv::Mat& gray) {
   const double max_area = options_.max_area_fraction * width_ * height_;
   int first = 0;
   for (Blob& blob : blobs_) {
-    blob.dropped = blob.area < options_.min_area_px2 || blob.area > max_area ||
-                   blob.area < 0.3 * (blob.x1 - blob.x0) * (blob.y1 - blob.y0);
+    blob.dropped = blob.area < 3;
+    blob.odd = blob.area > max_area || blob.area < 0.3 * (blob.x1 - blob.x0) * (blob.y1 - blob.y0);
     blob.first_run = first;
     first += blob.runs;
     blob.runs = 0;

@@ -5,13 +5,14 @@
 #include <vector>
 
 #include "sensing/core/markers.h"
+#include "sensing/markers/detector_peaks.h"
 
 namespace taclink {
 
 struct DetectorOptions {
   /// A marker is at least this much brighter than what surrounds it, gray levels; raised to 3.5 times the
-  /// picture's noise where that is more.
-  double min_contrast = 10;
+  /// picture's noise, or 0.4 times its median level, where that is more.
+  double min_contrast = 5;
   double min_area_px2 = 5;
   double max_area_fraction = 0.02;  ///< of the picture
   /// Longest over shortest axis of a whole blob. A dome near the edge of a fisheye picture has about 2.
@@ -25,15 +26,18 @@ struct DetectorOptions {
   /// Contrast against the mean of the blobs within about 70 px; less is dust.
   double min_relative_contrast = 0.35;
   /// The part of a centre's error that is not pixel noise: sampling, and uneven shade, which grows with size.
-  double sigma_floor_px = 0.03;
-  double sigma_per_size = 0.006;
+  double sigma_floor_px = 0.034;
+  double small_sigma_floor_px = 0.055;  ///< of blobs below some 60 px^2, which are mostly edge
+  double sigma_per_size = 0.002;
 };
 
-/// Finds bright blobs on a darker surround, in any picture: knows nothing of links. Two tests pick the
-/// pixels: brighter than the local background (a morphological opening wider than any marker), and not darker
-/// than the mean of the 7 x 7 around, which parts the far markers, 3 px wide and 2 px apart. Connected pixels
-/// are a blob; blobs that are not compact or not dark all round are left out. Allocates only when a picture
-/// is larger or fuller than those before. One thread.
+/// Finds bright blobs on a darker surround, in any picture: knows nothing of links, and nothing of the
+/// picture before. Two tests pick the pixels: brighter than the local background (a morphological opening
+/// wider than any marker), and not darker than the mean of the 7 x 7 around. Connected pixels are a blob. A
+/// compact blob with one summit is measured by its soft coverage; others come apart by their summits
+/// (BellFinder), or at a higher level. The centre is that of the outline: shade inside is taken out. A blob
+/// that the picture's edge cuts stands for a whole one, with a covariance that is long across the edge.
+/// Allocates only when a picture is larger or fuller than those before. One thread.
 class MarkerDetector {
  public:
   explicit MarkerDetector(DetectorOptions options = {});
@@ -51,20 +55,38 @@ class MarkerDetector {
   struct Blob {
     int first_run = 0, runs = 0;  // in sorted_
     int area = 0, x0 = 0, x1 = 0, y0 = 0, y1 = 0;
-    int64_t sum = 0;  // of gray levels
-    bool dropped = false;
+    int64_t sum = 0;       // of gray levels
+    bool dropped = false;  // too small for anything
+    bool odd = false;      // too large or too thin for one marker
   };
   struct Levels {  // gray levels of a blob and of the pixels around it
     double peak = 0, background = 0, outline = 0;
     double dark_outline = 0;  // part of the outline below half the contrast
     double contrast() const { return peak - background; }
   };
+  struct Moments {
+    int x = 0, y = 0;  // the sums' origin
+    int64_t w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0;
+    int64_t ramp_xx = 0, ramp_xy = 0, ramp_yy = 0;  // of pixels whose noise counts, not weighted
+  };
   struct Measured {
     Detection detection;
     double contrast = 0;
+    Mat2 spread = Mat2::Zero();  // second moments, px^2
   };
-  struct Cell {
-    double weight = 0, contrast = 0;  // sums
+  // How bright markers are around a place.
+  struct Neighbourhoods {
+    struct Cell {
+      double weight = 0, contrast = 0;  // sums
+    };
+    void Clear(int width, int height);
+    void Add(const Vec2& p, double size_px, double contrast);
+    double Typical(const Vec2& p) const;
+    size_t Of(const Vec2& p) const;
+
+    int columns = 0, count = 0;
+    Cell all;
+    std::vector<Cell> cells;
   };
 
   void Resize(int width, int height);
@@ -80,12 +102,24 @@ class MarkerDetector {
   void MeasureBlobs(const cv::Mat& gray, double split_level);
   void SplitAgain(const cv::Mat& gray);
   Levels MeasureLevels(const cv::Mat& gray, const Blob& blob);
-  bool Measure(const cv::Mat& gray, const Blob& blob, const Levels& levels, Detection& detection) const;
+  Vec2 Shade(const cv::Mat& gray, const Blob& blob, const Levels& levels) const;
+  Moments SumCoverage(const cv::Mat& gray, const Blob& blob, const Levels& levels, double low, double high,
+                      const Vec2& shade) const;
+  bool Measure(const cv::Mat& gray, const Blob& blob, const Levels& levels, Measured& measured) const;
+  void CompleteClipped(const Blob& blob, Detection& d) const;
+  void FindSummits(const Blob& blob, double base);
+  void TakeBells();
+  double Floor(bool small) const {
+    const double sigma = small ? options_.small_sigma_floor_px : options_.sigma_floor_px;
+    return sigma * sigma;
+  }
+  void DropDimBells();
   void DropSpecks(Detections& out);
 
   const DetectorOptions options_;
   int width_ = 0, height_ = 0;
   double noise_ = 1, contrast_ = 10;
+  bool first_level_ = true;
   int cell_ = 8, grid_width_ = 0, grid_height_ = 0;  // background grid, cells of cell_ px
   std::vector<uint8_t> background_, grid_scratch_;
   std::vector<uint16_t> block_sums_;
@@ -95,8 +129,9 @@ class MarkerDetector {
   std::vector<int> parents_, blob_of_label_;
   std::vector<Blob> blobs_;
   std::vector<Run> again_;
+  BellFinder bells_;
   std::vector<Measured> measured_;
-  std::vector<Cell> cells_;
+  Neighbourhoods around_;
 };
 
 }  // namespace taclink
