@@ -42,6 +42,8 @@ PathTracker::PathTracker(const LinkModel& model, const StereoRig& rig, PathTrack
     path_rays_[Index(id)].reserve(static_cast<size_t>(numbering_.max_chain()));
   }
   by_path_.resize(paths);
+  displacements_mm_.resize(static_cast<size_t>(model.markers.count()));
+  dropped_.reserve(displacements_mm_.size());
   tracings_.resize(paths);
   for (int j = 0; j < model.markers.rings(); ++j) {
     mean_radius_mm_ += model.RestMarker(model.MarkerIndex(0, j)).head<2>().norm() / model.markers.rings();
@@ -113,6 +115,10 @@ void PathTracker::Label(const std::array<Detections, kCameraCount>& detections, 
       for (const int detection : chain) rays.push_back(rays_[Index(id)][static_cast<size_t>(detection)]);
     }
     numbering_.Number(path_rays_[0], path_rays_[1]);
+    for (int j = 0; j < model_.markers.rings(); ++j) {
+      displacements_mm_[static_cast<size_t>(model_.MarkerIndex(l, j))] =
+          numbering_.DisplacementOf(j).value_or(std::numeric_limits<double>::quiet_NaN());
+    }
     for (const CameraId id : kBothCameras) {
       for (int j = 0; j < model_.markers.rings(); ++j) {
         const int place = numbering_.LabelOf(id, j);
@@ -124,6 +130,27 @@ void PathTracker::Label(const std::array<Detections, kCameraCount>& detections, 
                                                                                  d.covariance_px2};
       }
     }
+  }
+  DropImplausible(out);
+}
+
+void PathTracker::DropImplausible(LabelledMarkers& out) {
+  const int paths = model_.markers.paths;
+  const auto inward = [&](int path, int ring) {
+    return -displacements_mm_[static_cast<size_t>(model_.MarkerIndex((path + paths) % paths, ring))];
+  };
+  dropped_.clear();
+  for (int j = 0; j < model_.markers.rings(); ++j) {
+    for (int l = 0; l < paths; ++l) {
+      const double u = inward(l, j), a = inward(l - 1, j), b = inward(l + 1, j);
+      if (std::isnan(u) || std::isnan(a) || std::isnan(b)) continue;
+      const bool in = u > options_.max_beyond_mm + options_.max_beyond_times * std::max({a, b, 0.0});
+      const bool beyond = u < std::min(a, b) - options_.max_beyond_mm;
+      if (in || beyond) dropped_.push_back(model_.MarkerIndex(l, j));
+    }
+  }
+  for (const int marker : dropped_) {
+    for (auto& camera : out.cameras) camera[static_cast<size_t>(marker)] = {};
   }
 }
 

@@ -18,6 +18,9 @@ struct PathTrackerOptions {
   double sector = 0.6;
   /// A detection whose area is off the expected one by more than this factor is dust or a reflection.
   double max_area_ratio = 6;
+  /// Skin is continuous: a marker's displacement beyond what both neighbouring paths show at its ring,
+  /// inwards by more than this and times theirs, or outwards by more than this, is a wrong label's.
+  double max_beyond_mm = 2.5, max_beyond_times = 2;
   RingNumberingOptions numbering;
 };
 
@@ -28,6 +31,8 @@ struct PathTrackerOptions {
 ///    path's detections in their order, which is also the order of the rings: a camera on the axis sees no
 ///    two points of a path in reverse order.
 /// 2. Number. Which ring each of them is takes both pictures, see RingNumbering.
+///
+/// 3. Check. A label whose displacement does not suit those of the neighbouring paths is dropped.
 ///
 /// Constant after construction but for scratch memory: one thread.
 class PathTracker {
@@ -65,6 +70,7 @@ class PathTracker {
   void FindAreas(View& view) const;
   bool AreaFits(const View& view, const Detection& d) const;
   void SortIntoPaths(CameraId id, const Detections& detections);
+  void DropImplausible(LabelledMarkers& out);
   void Trace(CameraId id);
   void FindBest(int path, Tracing& tracing) const;
 
@@ -78,6 +84,8 @@ class PathTracker {
   std::array<std::vector<SightRay>, kCameraCount> rays_;            // by detection
   std::array<std::vector<SightRay>, kCameraCount> path_rays_;       // of one path's chains
   std::vector<int> owners_;                                         // path, by candidate
+  std::vector<double> displacements_mm_;                            // radial, by marker; NaN: not labelled
+  std::vector<int> dropped_;
   double mean_radius_mm_ = 0;
   RingNumbering numbering_;
 };

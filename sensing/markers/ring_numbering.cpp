@@ -64,6 +64,7 @@ void RingNumbering::Number(std::span<const SightRay> top, std::span<const SightR
       DropUnsupported();
     }
   }
+  for (const CameraId id : kBothCameras) DropShortRuns(id);
   CheckSingles();
   if (skipped > 0) {
     for (int& label : labels_[Index(CameraId::kBottom)]) label += label >= 0 ? static_cast<int>(skipped) : 0;
@@ -175,6 +176,31 @@ void RingNumbering::DropUnsupported() {
   for (size_t k = 0; k < doubtful_.size(); ++k) {
     if ((doubtful_[k] & 1) != 0) labels_[0][k] = -1;
     if ((doubtful_[k] & 2) != 0) labels_[1][k] = -1;
+  }
+}
+
+// Runs of rings without more than one missing between them, from the camera's end; the first one is sure.
+void RingNumbering::DropShortRuns(CameraId id) {
+  auto& labels = labels_[Index(id)];
+  const auto ring_at = [&](int i) { return static_cast<size_t>(id == CameraId::kTop ? i : rings_ - 1 - i); };
+  int begin = 0, count = 0, missing = 0;
+  bool first = true;
+  for (int i = 0; i <= rings_; ++i) {
+    const bool end = i == rings_;
+    if (!end && labels[ring_at(i)] >= 0) {
+      if (count == 0) begin = i;
+      ++count;
+      missing = 0;
+      continue;
+    }
+    ++missing;
+    if (count == 0) first = first && i == 0;
+    if (count == 0 || (missing < 2 && !end)) continue;
+    if (!first && count < options_.min_run) {
+      for (int k = begin; k < i; ++k) labels[ring_at(k)] = -1;
+    }
+    first = false;
+    count = 0;
   }
 }
 

@@ -23,6 +23,9 @@ struct RingNumberingOptions {
   double min_margin = 2.5;
   double sigma_rival_mm = 2.5;  ///< of the radial displacement off the neighbours' line, for that
   double max_rival_cost = 4;    ///< of the displacement, for that
+  /// Behind rings that a camera does not see, so many in a row must hold again: a few spots beside the rays
+  /// of the other camera meet them by chance.
+  int min_run = 4;
   // Weights of the alignment: standard deviations, and costs in squared ones.
   double sigma_z = 0.06;  ///< ring pitches
   double sigma_gap_mm = 0.6;
@@ -46,6 +49,13 @@ class RingNumbering {
   void Number(std::span<const SightRay> top, std::span<const SightRay> bottom);
   /// Place in that camera's chain of the ring (from 0); -1: not seen, or dropped.
   int LabelOf(CameraId id, int ring) const { return labels_[Index(id)][static_cast<size_t>(ring)]; }
+
+  /// Radial displacement (outwards) of a ring that has a label, mm; None: it has none.
+  std::optional<double> DisplacementOf(int ring) const {
+    const auto k = static_cast<size_t>(ring);
+    if (!known_[k] || (labels_[0][k] < 0 && labels_[1][k] < 0)) return std::nullopt;
+    return bends_mm_[k];
+  }
 
   /// Longest chain that is used.
   int max_chain() const { return max_chain_; }
@@ -78,6 +88,7 @@ class RingNumbering {
   double RivalCost(const Pair& pair, int ring) const;
   void DropAmbiguousPairs();
   void DropUnsupported();
+  void DropShortRuns(CameraId id);
   bool HasNeighbour(CameraId id, int ring) const;
   void CheckSingles();
   bool SingleHolds(CameraId id, int ring, double expected_mm) const;

@@ -45,8 +45,14 @@ TEST_P(PathTrackerTest, NoWrongLabelInDentsAndBulges) {
   for (const double depth : {4.0, 8.0, 10.0, -6.0}) {
     const LabelScore score = Run(depth, 1, {.noise_px = 0.1}, 40);
     EXPECT_EQ(score.wrong, 0) << depth;
-    EXPECT_GE(score.right, 0.95 * score.shown) << depth;
+    EXPECT_GE(score.right, 0.94 * score.shown) << depth;
   }
+}
+
+TEST_P(PathTrackerTest, HardlyAWrongLabelInThreeDeepDents) {
+  const LabelScore score = Run(15, 3, {.noise_px = 0.3, .drop = 0.02}, 60);
+  EXPECT_LE(score.wrong, 2);
+  EXPECT_GE(score.right, 0.62 * score.shown);
 }
 
 TEST_P(PathTrackerTest, MissingMarkersShiftNoLabel) {

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "sensing/markers/detector.h"
+#include "sensing/markers/picture_labels.h"
 #include "sensing/model/model_file.h"
+#include "sensing/simulation/renderer.h"
+#include "sensing/simulation/simulated_skin.h"
 #include "tests/support/read_jpeg.h"
 #include "tests/support/synthetic_markers.h"
 
@@ -23,6 +26,12 @@ StereoRig Built(const LinkModel& model, std::mt19937& random) {
     rig[id].camera_from_link.translation = roll * rig[id].camera_from_link.translation;
   }
   return rig;
+}
+
+SkinTruth RestTruth(const LinkModel& model) {
+  SkinTruth truth;
+  SimulatedSkin::Make(model, LoadScene("rest").value()).value()->Evaluate(0, truth);
+  return truth;
 }
 
 class RestLabelsTest : public testing::TestWithParam<std::string> {
@@ -50,6 +59,65 @@ TEST_P(RestLabelsTest, NoiseIsRefused) {
   ASSERT_FALSE(labels.ok());
   EXPECT_EQ(labels.error().code, ErrorCode::kInvalidArgument);
   EXPECT_NE(labels.error().message.find("top camera"), std::string::npos);
+}
+
+// 2 mm and 2 degrees off, seen by the renderer and found by the detector.
+TEST_P(RestLabelsTest, MisalignedCameras) {
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  MarkerDetector detector;
+  for (int trial = 0; trial < 6; ++trial) {
+    StereoRig rig = model_.nominal_rig;
+    for (const CameraId id : kBothCameras) {
+      const Vec3 axis = Vec3(uniform(random), uniform(random), uniform(random)).normalized();
+      const Vec3 shift = 2 * Vec3(uniform(random), uniform(random), uniform(random)).normalized();
+      Rigid3& pose = rig[id].camera_from_link;
+      const Mat3 turn(Eigen::AngleAxisd(RadFromDeg(2), axis));
+      pose.rotation = turn * pose.rotation;
+      pose.translation = turn * pose.translation + shift;
+    }
+    const Renderer renderer(model_, rig, {}, 5);
+    const SkinTruth truth = RestTruth(model_);
+    for (const CameraId id : kBothCameras) {
+      cv::Mat gray;
+      Detections found;
+      renderer.Render(truth, id, gray);
+      detector.Detect(gray, found);
+      const auto labels = LabelPicture(model_, id, found, gray);
+      ASSERT_TRUE(labels.ok()) << trial << ": " << labels.error().message;
+      EXPECT_GE(labels->markers.size(), 0.9 * model_.markers.count());
+      const Projector projector(rig[id]);
+      for (const PictureMarker& m : labels->markers) {
+        if (m.detection.clipped) continue;
+        const Vec2 off = m.detection.center_px - projector.Project(model_.RestMarker(m.marker)).value();
+        EXPECT_LT(off.norm(), std::max(1.5, 0.3 * m.detection.width_px)) << m.marker;
+      }
+    }
+  }
+}
+
+TEST_P(RestLabelsTest, WrongModelsAreRefused) {
+  std::mt19937 random(5);
+  const auto view = See(model_, Built(model_, random), {}, {.noise_px = 0.2, .drop = 0.02}, random);
+  const auto refused = [&](const LinkModel& model, const std::string& why) {
+    const auto labels = LabelRestPair(model, view.detections);
+    ASSERT_FALSE(labels.ok()) << why;
+    EXPECT_NE(labels.error().message.find(why), std::string::npos) << labels.error().message;
+  };
+  LinkModel wrong = model_;
+  wrong.markers.rings_z_mm.pop_back();
+  refused(wrong, "ring");
+  wrong = model_;
+  wrong.markers.rings_z_mm.push_back(2 * model_.markers.rings_z_mm.back() -
+                                     model_.markers.rings_z_mm[model_.markers.rings_z_mm.size() - 2]);
+  wrong.length_mm += 20;
+  refused(wrong, "ring");
+  wrong = model_;
+  wrong.markers.paths -= 1;
+  refused(wrong, std::to_string(model_.markers.paths) + " paths");
+  wrong = model_;
+  wrong.markers.paths *= 2;
+  refused(wrong, "spots found");
 }
 
 INSTANTIATE_TEST_SUITE_P(ShippedModels, RestLabelsTest, testing::Values("cylinder", "barrel"));
