@@ -21,6 +21,7 @@ void AddDetect(CLI::App& app, Selected& selected);
 void AddSolve(CLI::App& app, Selected& selected);
 void AddSimulate(CLI::App& app, Selected& selected);
 void AddSkin(CLI::App& app, Selected& selected);
+void AddBench(CLI::App& app, Selected& selected);
 void AddShow(CLI::App& app, Selected& selected);
 
 /// `--server`, or the environment variable TACLINK_SERVER, or the local default.

@@ -52,6 +52,7 @@ int main(int argc, char** argv) {
   taclink::command::AddSolve(app, selected);
   taclink::command::AddSimulate(app, selected);
   taclink::command::AddSkin(app, selected);
+  taclink::command::AddBench(app, selected);
   taclink::command::AddShow(app, selected);
   try {
     app.parse(argc, argv);

@@ -69,7 +69,7 @@ Result<void> Simulate(const SimulateOptions& options) {
   if (failed || !truth_file) {
     return Error{ErrorCode::kInvalidArgument, options.out + ": cannot be written; choose another --out"};
   }
-  const Renderer renderer(*model, model->nominal_rig, scene->camera, scene->seed);
+  const Renderer renderer(*model, MountedRig(model->nominal_rig, scene->camera), scene->camera, scene->seed);
   if (auto written = WriteRest(*model, *scene, renderer, folder); !written) return written.error();
 
   const int all = static_cast<int>(std::ceil(scene->duration_s * scene->frame_rate_hz));

@@ -156,8 +156,18 @@ LinkPipeline::LinkPipeline(const LinkModel& model, const PipelineOptions& option
 LinkPipeline::~LinkPipeline() = default;
 LinkPipeline::LinkPipeline(LinkPipeline&&) noexcept = default;
 
+void LinkPipeline::Restart() {
+  stages_->rest.Restart();
+  stages_->tracker.reset();
+  stages_->reconstructor.reset();
+  stages_->finder = ContactFinder(stages_->model, stages_->options.contact);
+}
+
 const LinkModel& LinkPipeline::model() const {
   return stages_->model;
+}
+const LabelledMarkers& LinkPipeline::labels() const {
+  return stages_->labels;
 }
 const std::optional<CalibrationSummary>& LinkPipeline::calibration() const {
   return stages_->rest.calibration();

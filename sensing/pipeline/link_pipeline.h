@@ -9,6 +9,7 @@
 #include "sensing/core/frame.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/link_state.h"
+#include "sensing/core/markers.h"
 #include "sensing/core/result.h"
 #include "sensing/force/linear_estimator.h"
 
@@ -38,7 +39,13 @@ class LinkPipeline {
   /// is wrong is in the state's status and reason.
   void Process(const StereoFrame& frame, LinkState& state);
 
+  /// Forgets the rest shape and all that followed: the next pairs are taken as rest pictures, as after
+  /// construction.
+  void Restart();
+
   const LinkModel& model() const;
+  /// Of the last pair that was measured: which detection is which marker.
+  const LabelledMarkers& labels() const;
   /// Set once the cameras are known.
   const std::optional<CalibrationSummary>& calibration() const;
 

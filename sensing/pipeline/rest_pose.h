@@ -22,6 +22,9 @@ class RestPose {
   /// reason; collecting starts again.
   Result<bool> Add(const std::array<Detections, kCameraCount>& detections);
 
+  /// As after construction.
+  void Restart();
+
   /// Set once complete.
   const std::optional<CalibrationSummary>& calibration() const { return calibration_; }
   /// The mean over the pairs. Valid once complete.

@@ -43,6 +43,13 @@ bool Look(const Projector& camera, const Dome& dome, DomeSight& sight) {
 
 }  // namespace
 
+std::optional<Vec2> SilhouetteCentroid(const Projector& camera, const Dome& dome) {
+  DomeSight sight;
+  if (!Look(camera, dome, sight)) return std::nullopt;
+  const double rise = 4 * dome.radius_mm / (3 * kPi) * (1 - sight.facing);
+  return sight.foot_px - dome.shift_px + rise * sight.px_from_mm.col(0);
+}
+
 void DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat& gray) {
   DomeSight sight;
   if (!Look(camera, dome, sight)) return;

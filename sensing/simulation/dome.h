@@ -1,6 +1,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "sensing/camera/projection.h"
 #include "sensing/core/geometry.h"
@@ -15,6 +16,10 @@ struct Dome {
   double level = 255;            ///< brightness where it faces the light
   Vec2 shift_px = Vec2::Zero();  ///< added to where it is seen
 };
+
+/// Where the centroid of the dome's silhouette is seen, without the shift. None: it turns its back, or is
+/// beyond the lens.
+std::optional<Vec2> SilhouetteCentroid(const Projector& camera, const Dome& dome);
 
 /// Draws the dome over an 8-bit picture: the affine image of half a ball at its place, lit from beside the
 /// camera, with edges as soft as a Gaussian blur makes them. What lies outside the picture or turns its back

@@ -18,7 +18,7 @@ constexpr double kHardlyDeformedMm = 0.5;   // shallower dents hide nothing
 constexpr double kGrazeMm = 0.3;  // a wall this close to the line of sight hides less than half a marker
 
 // Independent streams of one frame.
-enum class Stream : uint64_t { kNoise = 1, kJitter = 2 };
+enum class Stream : uint64_t { kNoise = 1, kJitter = 2, kGain = 3 };
 
 uint64_t FrameBits(uint64_t seed, uint64_t frame, CameraId id, Stream stream) {
   return MixBits(MixBits(MixBits(seed) + frame) + Index(id) * 16 + static_cast<uint64_t>(stream));
@@ -60,7 +60,8 @@ Renderer::Renderer(const LinkModel& model, const StereoRig& rig, const CameraEff
   for (const CameraId id : kBothCameras) {
     const Projector projector(rig[id]);
     Eye eye{projector, MakeBackground(model, rig[id], id, effects, MixBits(seed)),
-            FarToNear(markers, projector.center_in_link())};
+            FarToNear(markers, projector.center_in_link()), false,
+            Dirt(rig[id].width_px, rig[id].height_px, effects.dirt_specks, MixBits(seed + 17) + Index(id))};
     for (const Vec3& p : markers)
       eye.hides_at_rest = eye.hides_at_rest || IsHidden(wall, p, projector.center_in_link(), kGrazeMm);
     pixels = std::max(pixels, eye.background.gray.total());
@@ -98,6 +99,22 @@ Dome Renderer::MarkerDome(const SkinTruth& truth, CameraId id, int marker) const
   return dome;
 }
 
+std::optional<Vec2> Renderer::Centroid(const SkinTruth& truth, CameraId id, int marker) const {
+  const Dome dome = MarkerDome(truth, id, marker);
+  const auto centroid = SilhouetteCentroid(eyes_[Index(id)].projector, dome);
+  if (!centroid) return std::nullopt;
+  return Vec2(*centroid + dome.shift_px);
+}
+
+double Renderer::Gain(const SkinTruth& truth, CameraId id) const {
+  if (effects_.flicker <= 0) return 1;
+  const uint64_t bits = FrameBits(seed_, truth.frame, id, Stream::kGain);
+  // Box and Muller.
+  const double radius = std::sqrt(-2 * std::log(1 - UnitFromBits(bits)));
+  const double normal = radius * std::cos(2 * kPi * UnitFromBits(MixBits(bits)));
+  return std::clamp(1 + effects_.flicker * normal, 0.2, 3.0);
+}
+
 void Renderer::Render(const SkinTruth& truth, CameraId id, cv::Mat& gray) const {
   const Eye& eye = eyes_[Index(id)];
   eye.background.gray.copyTo(gray);
@@ -105,6 +122,8 @@ void Renderer::Render(const SkinTruth& truth, CameraId id, cv::Mat& gray) const 
     if (Sees(truth, id, marker))
       DrawDome(eye.projector, MarkerDome(truth, id, marker), effects_.blur_px, gray);
   }
+  eye.dirt.CoverLens(gray);
+  if (effects_.flicker > 0) gray.convertTo(gray, CV_8U, Gain(truth, id));
   if (noise_above_.empty()) return;
   const size_t offset = FrameBits(seed_, truth.frame, id, Stream::kNoise) % kNoiseOffsets;
   // OpenCV takes its inputs as non-const; it does not write them.

@@ -3,12 +3,14 @@
 #include <array>
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "sensing/camera/projection.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/link_model.h"
 #include "sensing/simulation/background.h"
+#include "sensing/simulation/dirt.h"
 #include "sensing/simulation/dome.h"
 #include "sensing/simulation/scene.h"
 #include "sensing/simulation/skin_truth.h"
@@ -28,6 +30,13 @@ class Renderer {
   /// Whether the camera can see the marker at all: not behind the skin, in front of the lens.
   bool Sees(const SkinTruth& truth, CameraId id, int marker) const;
 
+  /// Where the centroid of a marker's outline is in the picture, its jitter included. Says nothing of what
+  /// hides it. None: the marker turns its back, or is beyond the lens.
+  std::optional<Vec2> Centroid(const SkinTruth& truth, CameraId id, int marker) const;
+
+  /// The picture's gain, as the light flickers.
+  double Gain(const SkinTruth& truth, CameraId id) const;
+
   /// Colour of the surroundings, for PackYuyv.
   const cv::Mat& chroma(CameraId id) const { return eyes_[Index(id)].background.chroma; }
 
@@ -37,6 +46,7 @@ class Renderer {
     Background background;
     std::vector<int> far_to_near;  // marker indices in drawing order
     bool hides_at_rest = false;    // the undeformed wall already hides a marker
+    Dirt dirt;
   };
 
   Dome MarkerDome(const SkinTruth& truth, CameraId id, int marker) const;

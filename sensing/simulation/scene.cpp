@@ -65,6 +65,20 @@ std::vector<PressureKey> ReadPressure(YamlMap& root) {
   return keys;
 }
 
+Vec3 ReadVector(YamlMap& map, const std::string& key, double most) {
+  if (!map.Has(key)) return Vec3::Zero();
+  const auto numbers = map.Numbers(key, 3, {.min = -most, .max = most});
+  return numbers.size() == 3 ? Vec3(numbers[0], numbers[1], numbers[2]) : Vec3(Vec3::Zero());
+}
+
+MountError ReadMountError(YamlMap map) {
+  MountError error;
+  error.shift_mm = ReadVector(map, "shift_mm", 50);
+  error.turn_rad = RadFromDeg(1) * ReadVector(map, "turn_deg", 45);
+  map.Done();
+  return error;
+}
+
 CameraEffects ReadCameraEffects(YamlMap map) {
   CameraEffects effects;
   effects.marker_jitter_px = map.Number("marker_jitter_px", effects.marker_jitter_px, {.min = 0, .max = 20});
@@ -74,6 +88,15 @@ CameraEffects ReadCameraEffects(YamlMap map) {
   effects.exposure = map.Number("exposure", effects.exposure, {.min = 0, .max = 10});
   effects.glow = map.Number("glow", effects.glow, {.min = 0, .max = 5});
   effects.vignetting = map.Number("vignetting", effects.vignetting, {.min = 0, .max = 2});
+  effects.flicker = map.Number("flicker", effects.flicker, {.min = 0, .max = 1});
+  effects.dirt_specks = map.Integer("dirt_specks", effects.dirt_specks, {.min = 0, .max = 1000});
+  if (map.Has("mount")) {
+    YamlMap mount = map.Map("mount");
+    for (const CameraId id : kBothCameras) {
+      if (mount.Has(Name(id))) effects.mount[Index(id)] = ReadMountError(mount.Map(Name(id)));
+    }
+    mount.Done();
+  }
   map.Done();
   return effects;
 }
@@ -100,6 +123,19 @@ Result<Scene> ReadScene(YamlFile file) {
 }
 
 }  // namespace
+
+StereoRig MountedRig(const StereoRig& nominal, const CameraEffects& effects) {
+  StereoRig rig = nominal;
+  for (const CameraId id : kBothCameras) {
+    const MountError& error = effects.mount[Index(id)];
+    if (!error.any()) continue;
+    const double angle = error.turn_rad.norm();
+    const Vec3 axis = angle > 0 ? Vec3(error.turn_rad / angle) : Vec3(Vec3::UnitZ());
+    const Rigid3 nominal_from_real{Mat3(Eigen::AngleAxisd(angle, axis)), error.shift_mm};
+    rig[id].camera_from_link = nominal_from_real.Inverse() * nominal[id].camera_from_link;
+  }
+  return rig;
+}
 
 double Scene::PressureKpa(double time_s) const {
   const auto after = std::find_if(pressure.begin(), pressure.end(),

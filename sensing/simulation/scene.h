@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "sensing/core/camera_model.h"
 #include "sensing/core/result.h"
 
 namespace taclink {
@@ -37,6 +39,14 @@ struct PressureKey {
   double kpa = 0;
 };
 
+/// How a camera is mounted off its nominal place, in the camera's own frame.
+struct MountError {
+  Vec3 shift_mm = Vec3::Zero();
+  Vec3 turn_rad = Vec3::Zero();  ///< rotation vector
+
+  bool any() const { return !shift_mm.isZero(0) || !turn_rad.isZero(0); }
+};
+
 /// How the cameras depart from ideal ones. Levels are of 255.
 struct CameraEffects {
   double marker_jitter_px = 0;     ///< standard deviation of each drawn marker's shift, each axis
@@ -45,6 +55,10 @@ struct CameraEffects {
   double exposure = 1;             ///< scales all brightness
   double glow = 1;                 ///< of the far LED ring; 0: none
   double vignetting = 1;           ///< darkening to the picture's edge; 0: none
+  /// Standard deviation of each picture's own gain: the light flickers. Gains stay within [0.2, 3].
+  double flicker = 0;
+  int dirt_specks = 0;  ///< on each lens: every second one dark, the others lit
+  std::array<MountError, kCameraCount> mount;
 };
 
 /// What happens to a simulated link, over time.
@@ -64,6 +78,9 @@ struct Scene {
 };
 
 inline constexpr int kMaxSceneContacts = 16;
+
+/// Where a scene's cameras really are.
+StereoRig MountedRig(const StereoRig& nominal, const CameraEffects& effects);
 
 /// Loads a scene: the name of a shipped one or a path of a YAML file.
 /// Errors: kNotFound (names the shipped ones), kInvalidArgument (file, line, what was expected).

@@ -8,7 +8,6 @@
 namespace taclink {
 namespace {
 
-constexpr int kRefinement = 3;      // not that of the estimator
 constexpr double kTubeGapMm = 0.2;  // the wall stops this far from the tube
 constexpr double kNoTubeMm = 1;     // the wall stops this far from the axis
 constexpr int kPathSamples = 400;   // places of a moving contact at which it may load new nodes
@@ -57,6 +56,11 @@ Result<std::pair<double, double>> Locate(const LinkModel& model, const SkinPlace
 }  // namespace
 
 Result<std::unique_ptr<SimulatedSkin>> SimulatedSkin::Make(const LinkModel& model, const Scene& scene) {
+  return Make(model, scene, std::make_shared<const LinearShell>(model, kSimulatedRefinement));
+}
+
+Result<std::unique_ptr<SimulatedSkin>> SimulatedSkin::Make(const LinkModel& model, const Scene& scene,
+                                                           std::shared_ptr<const LinearShell> shell) {
   if (scene.contacts.size() > kMaxSceneContacts || scene.pressure.empty())
     return Error{ErrorCode::kInvalidArgument,
                  "scene '" + scene.name + "': too many contacts, or no pressure"};
@@ -73,15 +77,17 @@ Result<std::unique_ptr<SimulatedSkin>> SimulatedSkin::Make(const LinkModel& mode
     contact.moves = plan.move_to.has_value();
     contacts.push_back(std::move(contact));
   }
-  return std::unique_ptr<SimulatedSkin>(new SimulatedSkin(model, scene, std::move(contacts)));
+  return std::unique_ptr<SimulatedSkin>(
+      new SimulatedSkin(model, scene, std::move(shell), std::move(contacts)));
 }
 
-SimulatedSkin::SimulatedSkin(const LinkModel& model, const Scene& scene, std::vector<SkinContact> contacts)
+SimulatedSkin::SimulatedSkin(const LinkModel& model, const Scene& scene,
+                             std::shared_ptr<const LinearShell> shell, std::vector<SkinContact> contacts)
     : model_(model),
       scene_(scene),
-      shell_(model, kRefinement),
-      finder_(model, shell_.mesh()),
-      per_pressure_(Flat(shell_.PerPressure())),
+      shell_(std::move(shell)),
+      finder_(model, shell_->mesh()),
+      per_pressure_(Flat(shell_->PerPressure())),
       response_of_node_(static_cast<size_t>(mesh().node_count()), -1),
       contacts_(std::move(contacts)),
       pressed_(State::Zero(per_pressure_.size())),
@@ -109,7 +115,7 @@ void SimulatedSkin::LearnResponses(SkinContact& contact, double diameter_mm) {
     loads.reserve(contact.patch.size());
     for (const NodeWeight& w : contact.patch)
       loads.push_back({w.node, -w.weight / contact.normal_share * Normal(w.node)});
-    contact.response = Flat(shell_.Solve(loads));
+    contact.response = Flat(shell_->Solve(loads));
     return;
   }
   const double generous_mm = 1.1 * diameter_mm + 1;  // no node may be missed between two samples of the path
@@ -123,7 +129,7 @@ void SimulatedSkin::LearnResponses(SkinContact& contact, double diameter_mm) {
       if (response_of_node_[node] >= 0) continue;
       response_of_node_[node] = static_cast<int>(unit_responses_.size());
       const NodalLoad load{w.node, -Normal(w.node)};
-      unit_responses_.push_back(Flat(shell_.Solve({&load, 1})));
+      unit_responses_.push_back(Flat(shell_->Solve({&load, 1})));
     }
   }
 }

@@ -14,20 +14,26 @@
 
 namespace taclink {
 
-/// A skin on which a scene plays: linear shell, three times as fine as the marker grid, so that the truth is
-/// not computed on the mesh of whoever estimates it. Responses to unit loads are computed at construction; a
-/// moment then costs only sums.
+/// Elements per interval of the marker grid that a simulated skin has unless told: finer than an estimator's.
+inline constexpr int kSimulatedRefinement = 3;
+
+/// A skin on which a scene plays: linear shell, finer than the marker grid, so that the truth is not computed
+/// on the mesh of whoever estimates it. Responses to unit loads are computed at construction; a moment then
+/// costs only sums.
 class SimulatedSkin {
  public:
   /// Errors: kInvalidArgument (a contact that is not on this model, with the scene's file and line).
   static Result<std::unique_ptr<SimulatedSkin>> Make(const LinkModel& model, const Scene& scene);
+  /// The same with a shell of that model that several scenes share.
+  static Result<std::unique_ptr<SimulatedSkin>> Make(const LinkModel& model, const Scene& scene,
+                                                     std::shared_ptr<const LinearShell> shell);
 
   /// The truth at a time since the scene's start, which goes on for ever if the scene loops and stands still
   /// after its end if not. Reuses the truth's buffers.
   void Evaluate(double time_s, SkinTruth& truth);
 
   const LinkModel& model() const { return model_; }
-  const ShellMesh& mesh() const { return shell_.mesh(); }
+  const ShellMesh& mesh() const { return shell_->mesh(); }
 
  private:
   // Translations then rotations, three numbers a node each.
@@ -46,7 +52,8 @@ class SimulatedSkin {
     double level = 0;         // of the ramp, now
   };
 
-  SimulatedSkin(const LinkModel& model, const Scene& scene, std::vector<SkinContact> contacts);
+  SimulatedSkin(const LinkModel& model, const Scene& scene, std::shared_ptr<const LinearShell> shell,
+                std::vector<SkinContact> contacts);
   void LearnResponses(SkinContact& contact, double diameter_mm);
   void Place(SkinContact& contact, double time_s, const SceneContact& plan);
   ContactForces Forces(double pressure_mpa);
@@ -63,7 +70,7 @@ class SimulatedSkin {
   // Constant after construction.
   LinkModel model_;
   Scene scene_;
-  LinearShell shell_;
+  std::shared_ptr<const LinearShell> shell_;
   PatchFinder finder_;
   State per_pressure_;                       // 1 MPa
   std::vector<Vec3> radial_;                 // by node, unit, away from the axis

@@ -18,7 +18,7 @@ SimulatedSource::SimulatedSource(const LinkModel& model, Scene scene, Clock& clo
     : scene_(std::move(scene)),
       clock_(clock),
       skin_(std::move(skin)),
-      renderer_(model, model.nominal_rig, scene_.camera, scene_.seed) {
+      renderer_(model, MountedRig(model.nominal_rig, scene_.camera), scene_.camera, scene_.seed) {
   const CameraModel& camera = model.nominal_rig[CameraId::kTop];
   info_ = {"simulated scene '" + scene_.name + "' on model '" + model.name + "'", camera.width_px,
            camera.height_px, scene_.frame_rate_hz};

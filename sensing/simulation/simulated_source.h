@@ -17,7 +17,8 @@ namespace taclink {
 /// scene has the sequence number k, whatever was skipped; another Start counts on.
 class SimulatedSource final : public FrameSource {
  public:
-  /// The cameras are the model's nominal ones. Errors: kInvalidArgument (the scene does not fit the model).
+  /// The cameras are the model's nominal ones, mounted as the scene says. Errors: kInvalidArgument (the scene
+  /// does not fit the model).
   static Result<std::unique_ptr<SimulatedSource>> Make(const LinkModel& model, const Scene& scene,
                                                        Clock& clock);
 

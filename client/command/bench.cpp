@@ -1,0 +1,236 @@
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "client/command/bench_json.h"
+#include "client/command/commands.h"
+#include "sensing/capture/image_io.h"
+#include "sensing/evaluation/scene_generator.h"
+#include "sensing/evaluation/vision_bench.h"
+#include "sensing/evaluation/vision_report.h"
+#include "sensing/model/model_file.h"
+
+namespace taclink::command {
+namespace {
+
+constexpr int kScenes = 216;
+constexpr int kQuickScenes = 2 * kSceneCategoryCount;
+constexpr int kWorstShown = 10;
+
+struct VisionOptions {
+  int scenes = kScenes;
+  bool quick = false;
+  uint64_t seed = 1;
+  std::string model = "both";
+  std::vector<std::string> methods;
+  std::string scene;
+  std::string keep;
+  std::string json, markdown, svg;
+  int jobs = 1;
+};
+
+Result<std::vector<LinkModel>> LoadModels(const std::string& name) {
+  const std::vector<std::string> names =
+      name == "both" ? std::vector<std::string>{"cylinder", "barrel"} : std::vector<std::string>{name};
+  std::vector<LinkModel> models;
+  for (const std::string& one : names) {
+    auto model = LoadLinkModel(one);
+    if (!model) return model.error();
+    models.push_back(std::move(*model));
+  }
+  return models;
+}
+
+Result<std::vector<VisionMethodKind>> ChooseMethods(const std::vector<std::string>& names) {
+  if (names.empty()) return VisionMethodKinds();
+  std::vector<VisionMethodKind> chosen;
+  for (const std::string& name : names) {
+    std::string known;
+    const size_t before = chosen.size();
+    for (const VisionMethodKind& kind : VisionMethodKinds()) {
+      if (kind.name == name) chosen.push_back(kind);
+      known.append(known.empty() ? "" : ", ").append(kind.name);
+    }
+    if (chosen.size() == before)
+      return Error{ErrorCode::kInvalidArgument, "no method '" + name + "'; there are " + known};
+  }
+  return chosen;
+}
+
+void PrintFrame(const BenchFrame& frame, const std::vector<VisionMethodKind>& methods) {
+  if (frame.frame < kRestFrames - 1) return;
+  for (size_t i = 0; i < methods.size(); ++i) {
+    const VisionResult& result = frame.results[i];
+    double squares = 0;
+    int count = 0;
+    for (size_t m = 0; m < result.shape.positions_mm.size(); ++m) {
+      if (frame.truth.WholeIn(m) < 2) continue;
+      squares += (result.shape.positions_mm[m] - frame.truth.positions_mm[m]).squaredNorm();
+      ++count;
+    }
+    int labelled = 0;
+    for (const auto& camera : result.labels.cameras)
+      labelled +=
+          static_cast<int>(std::count_if(camera.begin(), camera.end(), [](const auto& m) { return m.seen; }));
+    std::printf("frame %3d  %-12s %4d labels  RMSE %.3f mm  %.2f ms  %s\n", frame.frame,
+                methods[i].name.c_str(), labelled, count > 0 ? std::sqrt(squares / count) : 0.0,
+                result.stage_ms.detect + result.stage_ms.register_ + result.stage_ms.reconstruct,
+                result.status_reason.c_str());
+  }
+}
+
+Result<void> KeepPictures(const BenchFrame& frame, const std::string& folder) {
+  for (const CameraId id : kBothCameras) {
+    char name[64];
+    std::snprintf(name, sizeof name, "%s_%06d.png", Name(id), frame.frame);
+    const auto path = std::filesystem::path(folder) / name;
+    if (auto written = WritePng(path.string(), frame.gray[Index(id)]); !written) return written.error();
+  }
+  return {};
+}
+
+// What went wrong, worst first, so that it can be played again with --scene.
+void PrintWorst(const std::vector<SceneOutcome>& outcomes, const std::vector<LinkModel>& models,
+                const std::vector<VisionMethodKind>& methods) {
+  for (size_t i = 0; i < methods.size(); ++i) {
+    std::vector<const SceneOutcome*> order;
+    order.reserve(outcomes.size());
+    for (const SceneOutcome& outcome : outcomes) order.push_back(&outcome);
+    const auto bad = [i](const SceneOutcome* o) {
+      const auto& labels = o->scores[i].labels;
+      return std::pair(labels[0].wrong + labels[1].wrong, o->incidents[i].worst_mm);
+    };
+    std::stable_sort(order.begin(), order.end(),
+                     [&](const SceneOutcome* a, const SceneOutcome* b) { return bad(a) > bad(b); });
+    std::printf("Worst scenes: %s\n", methods[i].name.c_str());
+    for (size_t k = 0; k < std::min<size_t>(order.size(), kWorstShown); ++k) {
+      const SceneOutcome& o = *order[k];
+      const Incidents& what = o.incidents[i];
+      const auto model =
+          std::find_if(models.begin(), models.end(), [&](const auto& m) { return m.name == o.model; });
+      std::printf("  %-26s wrong %lld  worst %.2f mm at marker (%d, %d), frame %llu%s%s\n", o.name.c_str(),
+                  static_cast<long long>(bad(&o).first), what.worst_mm,
+                  what.worst_marker < 0 ? 0 : model->PathOf(what.worst_marker) + 1,
+                  what.worst_marker < 0 ? 0 : model->RingOf(what.worst_marker) + 1,
+                  static_cast<unsigned long long>(what.worst_frame), what.labels.empty() ? "" : "; ",
+                  what.labels.empty() ? "" : what.labels.front().c_str());
+    }
+  }
+}
+
+Result<void> WriteText(const std::string& path, const std::string& text) {
+  if (path.empty()) return {};
+  std::ofstream file(path, std::ios::trunc);
+  file << text;
+  file.close();
+  if (!file)
+    return Error{ErrorCode::kUnavailable, path + ": cannot be written; check the folder and the disk"};
+  return {};
+}
+
+// Between the two marks of a page, if there are any; else the file holds the tables alone.
+Result<void> WriteMarkdown(const std::string& path, const std::string& tables) {
+  if (path.empty()) return {};
+  const std::string begin = "<!-- begin: taclink bench vision -->\n", end = "<!-- end -->";
+  std::ostringstream before;
+  if (const std::ifstream file(path); file) before << file.rdbuf();
+  const std::string page = before.str();
+  const size_t from = page.find(begin), to = page.find(end, from == std::string::npos ? 0 : from);
+  if (from == std::string::npos || to == std::string::npos) return WriteText(path, tables);
+  return WriteText(path, page.substr(0, from) + begin + "\n" + tables + page.substr(to));
+}
+
+Result<std::vector<EvaluationScene>> ChooseScenes(const VisionOptions& options,
+                                                  const std::vector<LinkModel>& models) {
+  if (options.scene.empty())
+    return GenerateScenes(models, options.quick ? kQuickScenes : options.scenes, options.seed);
+  auto scene = GenerateScene(models, options.scene, options.seed);
+  if (!scene) return scene.error();
+  return std::vector<EvaluationScene>{std::move(*scene)};
+}
+
+std::string Settings(const std::vector<EvaluationScene>& scenes, const VisionOptions& options) {
+  int frames = 0;
+  for (const EvaluationScene& scene : scenes) frames += scene.frames - kRestFrames;
+  return std::to_string(scenes.size()) + " scenes, " + std::to_string(frames) +
+         " stereo pairs after the rest frames, seed " + std::to_string(options.seed) + ".\n\n";
+}
+
+Result<void> Vision(const VisionOptions& options) {
+  const auto models = LoadModels(options.model);
+  if (!models) return models.error();
+  const auto methods = ChooseMethods(options.methods);
+  if (!methods) return methods.error();
+  const auto scenes = ChooseScenes(options, *models);
+  if (!scenes) return scenes.error();
+  std::optional<Error> keep_error;
+  if (!options.keep.empty()) {
+    std::error_code failed;
+    std::filesystem::create_directories(options.keep, failed);
+  }
+  VisionBenchOptions bench{.methods = *methods, .jobs = options.jobs, .progress = {}, .on_frame = {}};
+  bench.progress = [](int done, int all) {
+    std::fprintf(stderr, "\rscene %d of %d%s", done, all, done == all ? "\n" : "");
+  };
+  if (!options.scene.empty()) {
+    bench.on_frame = [&](const BenchFrame& frame) {
+      PrintFrame(frame, *methods);
+      if (options.keep.empty() || keep_error) return;
+      if (auto kept = KeepPictures(frame, options.keep); !kept) keep_error = kept.error();
+    };
+  }
+  const auto outcomes = RunVisionBench(*models, *scenes, bench);
+  if (!outcomes) return outcomes.error();
+  if (keep_error) return *keep_error;
+
+  std::string markdown = Settings(*scenes, options);
+  for (const ReportTable& table : VisionTables(*outcomes, *methods)) {
+    std::printf("%s\n", AlignedText(table).c_str());
+    markdown += Markdown(table) + "\n";
+  }
+  PrintWorst(*outcomes, *models, *methods);
+  if (!options.scene.empty()) {
+    for (size_t i = 0; i < methods->size(); ++i) {
+      for (const std::string& label : outcomes->front().incidents[i].labels)
+        std::printf("%s: %s\n", (*methods)[i].name.c_str(), label.c_str());
+    }
+  }
+  if (auto written = WriteMarkdown(options.markdown, markdown); !written) return written.error();
+  if (auto written = WriteText(options.svg, ErrorTimePlot(*outcomes, *methods)); !written)
+    return written.error();
+  if (options.json.empty()) return {};
+  return WriteText(options.json, BenchJson(*outcomes, *methods, options.seed).dump(1) + "\n");
+}
+
+}  // namespace
+
+void AddBench(CLI::App& app, Selected& selected) {
+  auto options = std::make_shared<VisionOptions>();
+  CLI::App* bench = app.add_subcommand("bench", "Measure accuracy and time on simulated scenes");
+  bench->require_subcommand(1);
+  CLI::App* vision =
+      bench->add_subcommand("vision", "From two pictures to marker positions, against the truth");
+  vision->add_option("--scenes", options->scenes, "How many")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  vision->add_flag("--quick", options->quick, "One scene of each category and model");
+  vision->add_option("--seed", options->seed, "Of all scenes")->capture_default_str();
+  vision->add_option("--model", options->model, "cylinder, barrel, both, or a YAML file")
+      ->capture_default_str();
+  vision->add_option("--methods", options->methods, "Some of them, comma-separated")->delimiter(',');
+  vision->add_option("--scene", options->scene, "One scene by its name, frame by frame");
+  vision->add_option("--keep", options->keep, "Folder for the pictures of --scene")->needs("--scene");
+  vision->add_option("--json", options->json, "File for all numbers");
+  vision->add_option("--markdown", options->markdown,
+                     "File for the tables, or a page with marks to put them between");
+  vision->add_option("--svg", options->svg, "File for the plot of error against time");
+  vision->add_option("--jobs", options->jobs, "Scenes at the same time")->check(CLI::Range(1, 256));
+  vision->callback([options, &selected] { selected = [options] { return Vision(*options); }; });
+}
+
+}  // namespace taclink::command

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <memory>
+
+#include "sensing/core/link_model.h"
+#include "sensing/evaluation/vision_method.h"
+
+namespace taclink {
+
+/// The product, or a variant of it that works less.
+enum class PipelineVariant {
+  kWhole,      ///< as it runs
+  kHalf,       ///< pictures and cameras of half the resolution; making them is not counted
+  kOneCamera,  ///< the bottom camera fails once the rest shape is known
+};
+
+std::unique_ptr<VisionMethod> MakePipelineMethod(const LinkModel& model, PipelineVariant variant);
+
+}  // namespace taclink

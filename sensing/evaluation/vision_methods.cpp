@@ -1,0 +1,21 @@
+#include "sensing/evaluation/pipeline_method.h"
+#include "sensing/evaluation/thesis_method.h"
+#include "sensing/evaluation/vision_method.h"
+
+namespace taclink {
+
+const std::vector<VisionMethodKind>& VisionMethodKinds() {
+  const auto pipeline = [](PipelineVariant variant) {
+    return [variant](const LinkModel& model) { return MakePipelineMethod(model, variant); };
+  };
+  static const std::vector<VisionMethodKind> kinds = {
+      {"tracked", "ours as it runs", pipeline(PipelineVariant::kWhole)},
+      {"half", "ours, pictures of half the width and height", pipeline(PipelineVariant::kHalf)},
+      {"one-camera", "ours, the bottom camera fails after the rest frames",
+       pipeline(PipelineVariant::kOneCamera)},
+      {"thesis", "chapter 4 of the thesis as written", MakeThesisMethod},
+  };
+  return kinds;
+}
+
+}  // namespace taclink
