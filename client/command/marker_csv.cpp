@@ -8,12 +8,9 @@
 #include <sstream>
 #include <vector>
 
-#include "sensing/shape/inference.h"
-
 namespace taclink::command {
 namespace {
 
-constexpr double kInferredSigmaMm = 5;
 constexpr const char* kBlanks = " \t\r\"";
 constexpr const char* kHeader = "path,ring,ux,uy,uz";
 
@@ -89,6 +86,7 @@ Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
   shape.displacements_mm.assign(count, Vec3::Zero());
   shape.covariances_mm2.assign(count, Mat3::Identity());
   shape.sources.assign(count, MarkerSource::kInferred);
+  shape.measured.resize(count);
   std::vector<int> first_line(count, 0);
   std::string line;
   int number = 0;
@@ -118,9 +116,9 @@ Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
     shape.positions_mm[m] += row->displacement_mm;
     shape.covariances_mm2[m] = variances.asDiagonal();
     shape.sources[m] = MarkerSource::kBoth;
+    shape.measured[m] = {row->displacement_mm, variances.cwiseInverse().asDiagonal()};
   }
   if (shape.seen() < 3) return Error{ErrorCode::kInvalidArgument, path + ": holds fewer than 3 markers"};
-  InferUnseen(model, kInferredSigmaMm, shape);
   return shape;
 }
 

@@ -9,8 +9,8 @@
 namespace taclink::command {
 
 /// Reads marker displacements: columns `path,ring,ux,uy,uz` (from 1; mm, link frame), a header line first,
-/// rows in any order. Markers that are left out or have empty displacements are inferred from their
-/// neighbours. `sigma_mm`: standard deviation of ux and uy; uz's is three times that. Errors: kNotFound,
+/// rows in any order. Markers that are left out or have empty displacements are kInferred and not displaced;
+/// see InferUnseen. `sigma_mm`: standard deviation of ux and uy; uz's is three times that. Errors: kNotFound,
 /// kInvalidArgument with file and line.
 Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model, double sigma_mm);
 

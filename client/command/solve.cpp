@@ -10,6 +10,7 @@
 #include "sensing/capture/image_io.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/link_pipeline.h"
+#include "sensing/shape/inference.h"
 
 namespace taclink::command {
 namespace {
@@ -70,11 +71,11 @@ Result<LinkState> SolveMarkers(const SolveOptions& options, const LinkModel& mod
   if (!shape) return shape.error();
   LinkState state;
   state.shape = std::move(*shape);
+  InferUnseen(model, {.mpa = options.pressure_kpa * 1e-3}, state.shape);
   LinearForceEstimator estimator(model);
   ContactFinder finder(model);
   const int64_t start = SystemClock().MonotonicNs();
   estimator.Estimate(state.shape, options.pressure_kpa * 1e-3, state.forces);
-  estimator.PlaceUnseen(options.pressure_kpa * 1e-3, state.shape);
   finder.Find(state.shape, state.forces, state.contacts);
   state.stage_ms.force = static_cast<double>(SystemClock().MonotonicNs() - start) * 1e-6;
   for (const auto& contact : state.contacts) state.total_force_n += contact.force_n;

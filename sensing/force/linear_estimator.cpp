@@ -1,6 +1,7 @@
 #include "sensing/force/linear_estimator.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -18,6 +19,15 @@ Eigen::VectorXd MarkerDisplacements(const LinkModel& model, const ShellMesh& mes
     stacked.segment<3>(3 * m) = u.AtOffset(mesh, mesh.NodeOfMarker(model, m), offset);
   }
   return stacked;
+}
+
+// W with W^T W = (information^-1 + variance I)^-1; the information may be of rank 2.
+Mat3 Factor(const Mat3& information, double variance) {
+  constexpr double kLeast = 1e-9;  // 1/mm^2, keeps the factor defined
+  const Mat3 more = Mat3::Identity() + variance * information;
+  const Mat3 less = more.inverse() * information;
+  const Eigen::LLT<Mat3> factor(0.5 * (less + less.transpose()) + kLeast * Mat3::Identity());
+  return factor.matrixU();
 }
 
 }  // namespace
@@ -53,26 +63,23 @@ LinearForceEstimator::LinearForceEstimator(const LinkModel& model, const LinearE
 // False: nothing moved, no forces to solve for.
 bool LinearForceEstimator::Whiten(const SkinShape& shape, double pressure_mpa) {
   bool moved = false;
-  used_markers_ = 0;
+  measured_numbers_ = 0;
   const double floor2 = options_.noise_floor_mm * options_.noise_floor_mm;
   for (int m = 0; m < markers_; ++m) {
     const auto i = static_cast<size_t>(m);
     auto block = whitener_.block<3, 3>(0, 3 * m);
     const Vec3 inflation = pressure_mpa * per_pressure_.segment<3>(3 * m);
-    const Vec3 u = shape.displacements_mm[i] - inflation;
+    const MeasuredDisplacement& measured = shape.measured[i];
+    const Vec3 u = measured.displacement_mm - inflation;
     if (shape.sources[i] == MarkerSource::kInferred || !u.allFinite() ||
-        !shape.covariances_mm2[i].allFinite()) {
+        !measured.information_per_mm2.allFinite()) {
       block.setZero();
       data_.segment<3>(3 * m).setZero();
       continue;
     }
-    ++used_markers_;
+    measured_numbers_ += shape.sources[i] == MarkerSource::kBoth ? 3 : 2;
     const double model_sigma = options_.model_error * u.norm() + options_.pressure_error * inflation.norm();
-    const Mat3 covariance =
-        shape.covariances_mm2[i] + (floor2 + model_sigma * model_sigma) * Mat3::Identity();
-    block.setIdentity();
-    const Eigen::LLT<Mat3> factor(covariance);
-    factor.matrixL().solveInPlace(block);
+    block = Factor(measured.information_per_mm2, floor2 + model_sigma * model_sigma);
     data_.segment<3>(3 * m) = block * u;
     moved = moved || data_.segment<3>(3 * m).norm() > options_.significance;
   }
@@ -190,7 +197,7 @@ void LinearForceEstimator::Estimate(const SkinShape& shape, double pressure_mpa,
     RemoveBias();
   }
   const auto n = static_cast<Eigen::Index>(loaded_.size());
-  const double residual2 = residual_.squaredNorm() / std::max(1, 3 * used_markers_);
+  const double residual2 = residual_.squaredNorm() / std::max(1, measured_numbers_);
   forces.residual = std::sqrt(residual2);
   if (n == 0) return;
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -204,21 +211,6 @@ void LinearForceEstimator::Estimate(const SkinShape& shape, double pressure_mpa,
   for (Eigen::Index k = 0; k < n; ++k) {
     forces.sigmas_n[static_cast<size_t>(loaded_[static_cast<size_t>(k)])] =
         std::sqrt(forces.loaded_covariance(k, k));
-  }
-}
-
-void LinearForceEstimator::PlaceUnseen(double pressure_mpa, SkinShape& shape) const {
-  for (int m = 0; m < markers_; ++m) {
-    const auto i = static_cast<size_t>(m);
-    if (shape.sources[i] != MarkerSource::kInferred) continue;
-    Vec3 u = pressure_mpa * per_pressure_.segment<3>(3 * m);
-    for (size_t k = 0; k < loaded_.size(); ++k) {
-      u += load_[static_cast<Eigen::Index>(k)] * compliance_.block<3, 1>(3 * m, loaded_[k]);
-    }
-    shape.positions_mm[i] += u - shape.displacements_mm[i];
-    shape.displacements_mm[i] = u;
-    const double sigma = std::max(options_.unseen_floor_mm, options_.unseen_error * u.norm());
-    shape.covariances_mm2[i] = sigma * sigma * Mat3::Identity();
   }
 }
 

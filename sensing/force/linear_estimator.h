@@ -20,10 +20,6 @@ struct LinearEstimatorOptions {
   /// proud.
   double noise_floor_mm = 0.03;
   int max_loads = 48;
-  /// Standard deviation given to the displacement of a marker placed by PlaceUnseen, as a fraction of it, and
-  /// at least.
-  double unseen_error = 0.2;
-  double unseen_floor_mm = 0.3;
   /// Elements per interval of the marker grid.
   int refinement = 2;
 };
@@ -42,13 +38,9 @@ class LinearForceEstimator {
  public:
   explicit LinearForceEstimator(const LinkModel& model, const LinearEstimatorOptions& options = {});
 
-  /// `pressure_mpa`: gauge pressure now less that of the baseline. Markers that no camera saw are left out.
+  /// Uses the shape's measured displacements; its others are not independent of each other. `pressure_mpa`:
+  /// gauge pressure now less that of the baseline.
   void Estimate(const SkinShape& shape, double pressure_mpa, NodalForces& forces);
-
-  /// Moves the markers that no camera saw to where the forces of the last Estimate put them: the shell
-  /// interpolates better than the straight lines of (4.33), which cut off a dent whose deepest marker is
-  /// hidden.
-  void PlaceUnseen(double pressure_mpa, SkinShape& shape) const;
 
  private:
   bool Whiten(const SkinShape& shape, double pressure_mpa);
@@ -68,7 +60,7 @@ class LinearForceEstimator {
   Eigen::VectorXd per_pressure_;  // 3 markers, mm/MPa
 
   // Scratch of one call.
-  Eigen::MatrixXd whitener_;         // 3 x 3 blocks side by side: inverse Cholesky factors of the covariances
+  Eigen::MatrixXd whitener_;         // 3 x 3 blocks side by side: Cholesky factors of the information
   Eigen::MatrixXd whitened_;         // compliance in standard deviations
   Eigen::VectorXd norms_;            // of its columns
   Eigen::VectorXd data_, residual_;  // displacements in standard deviations
@@ -77,7 +69,7 @@ class LinearForceEstimator {
   std::vector<char> is_loaded_;
   Eigen::VectorXd load_, trial_, rhs_;  // N, in the order of loaded_
   Eigen::MatrixXd gram_, columns_;
-  int used_markers_ = 0;
+  int measured_numbers_ = 0;
 };
 
 }  // namespace taclink

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -28,6 +29,8 @@ void ClearMeasurement(LinkState& state) {
   state.shape.displacements_mm.clear();
   state.shape.covariances_mm2.clear();
   state.shape.sources.clear();
+  state.shape.measured.clear();
+  state.shape.rejected.clear();
   state.forces.forces_n.clear();
   state.forces.sigmas_n.clear();
   state.forces.loaded.clear();
@@ -116,11 +119,11 @@ struct LinkPipeline::Stages {
     if (!*complete) return;
     tracker.emplace(model, rest.calibration()->rig);
     ShapeOptions shape_options;
-    shape_options.camera_sigma_px = std::max(shape_options.camera_sigma_px, rest.noise_px());
+    double& sigma_px = shape_options.cameras.camera_sigma_px;
+    sigma_px = std::max(sigma_px, rest.noise_px());
+    shape_options.cameras.rest_sigma_px = rest.noise_px() / std::sqrt(std::max(1, options.rest_frames));
     reconstructor.emplace(model, rest.calibration()->rig, shape_options);
-    SkinShape baseline;
-    reconstructor->Reconstruct(rest.markers(), baseline);
-    reconstructor->SetBaseline(baseline);
+    reconstructor->SetBaseline(rest.markers(), pressure_mpa);
     baseline_ns = clock.MonotonicNs();
     baseline_pressure_mpa = pressure_mpa;
   }
@@ -194,11 +197,11 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   }
   timed(state.stage_ms.register_, [&] { s.Register(state); });
   state.times.tracked_ns = s.clock.MonotonicNs();
-  timed(state.stage_ms.reconstruct, [&] { s.reconstructor->Reconstruct(s.labels, state.shape); });
+  timed(state.stage_ms.reconstruct,
+        [&] { s.reconstructor->Reconstruct(s.labels, pressure_mpa, state.shape); });
   timed(state.stage_ms.force, [&] {
     const double pressure_change_mpa = pressure_mpa - s.baseline_pressure_mpa;
     s.estimator.Estimate(state.shape, pressure_change_mpa, state.forces);
-    s.estimator.PlaceUnseen(pressure_change_mpa, state.shape);
     s.finder.Find(state.shape, state.forces, state.contacts);
   });
   state.total_force_n.setZero();

@@ -2,13 +2,15 @@
 
 #include "sensing/core/link_model.h"
 #include "sensing/core/skin_shape.h"
+#include "sensing/shape/shape_estimator.h"
 
 namespace taclink {
 
-/// Gives the markers that no camera saw (MarkerSource::kInferred) a displacement, interpolated along the path
-/// between the nearest known markers or the clamped ends, (4.33) and (4.34), and moves their positions from
-/// where the baseline has them by it. `sigma_mm`: what their covariance says, each axis. On entry the
-/// positions of these markers are the baseline's.
-void InferUnseen(const LinkModel& model, double sigma_mm, SkinShape& shape);
+/// Gives the markers that nobody saw (MarkerSource::kInferred) the displacement that the skin's mechanics
+/// make of the others' measured ones, with covariance, and moves their positions by it. On entry these
+/// positions are those without displacement. The other markers stay as they are. Solves the shell: for single
+/// shapes, not for streams.
+void InferUnseen(const LinkModel& model, const KnownPressure& pressure, SkinShape& shape,
+                 const ShapeEstimatorOptions& options = {});
 
 }  // namespace taclink

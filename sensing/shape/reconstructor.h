@@ -1,67 +1,49 @@
 #pragma once
 
-#include <array>
+#include <optional>
 #include <vector>
 
-#include "sensing/camera/projection.h"
-#include "sensing/camera/triangulation.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
 #include "sensing/core/skin_shape.h"
+#include "sensing/shape/camera_evidence.h"
+#include "sensing/shape/shape_estimator.h"
 
 namespace taclink {
 
 struct ShapeOptions {
-  /// Error of the calibrated cameras themselves, px; added to each detection's.
-  double camera_sigma_px = 0.1;
-  /// A triangulated marker whose reprojection is off by more than this many sigmas is not believed; the
-  /// second figure is the least sigma for this test, for calibrations that are not perfect.
-  double max_residual_sigmas = 5;
-  double min_gate_sigma_px = 0.5;
-  /// Nor is one further outside the skin at rest than this, or inside the tube.
-  double max_outward_mm = 15;
-  /// Standard deviation of what is assumed for markers that only one camera sees (their z, (4.31)), and of
-  /// those that none sees (each axis, (4.33)).
-  double assumed_z_sigma_mm = 2.5;
-  double inferred_sigma_mm = 5;
-  /// Of the model's rest position, which stands in for that of a marker unseen in the baseline, each axis.
-  double unseen_rest_sigma_mm = 2;
+  CameraEvidenceOptions cameras;
+  ShapeEstimatorOptions estimator;
 };
 
-/// Labelled markers to 3-D positions, each with covariance and source.
-///
-/// Both cameras: weighted least squares of the reprojection, from where the rays meet, covariance
-/// (J^T W J)^-1. One camera: the point of its ray at the z that the marker has at rest, (4.31) and (4.32).
-/// None: displacement interpolated along the path between the nearest known markers or the clamped ends,
-/// (4.33) and (4.34), which for straight paths is the same as interpolating positions. What is not plausible
-/// counts as unseen.
-///
-/// Constant after construction but for the baseline and scratch memory: one thread. Steady state allocates
-/// nothing.
+/// Labelled markers to 3-D positions of all markers, each with covariance and source: the most probable shape
+/// of a skin that obeys the linear shell under few loads, see map_shape.md. Markers that one camera or none
+/// sees follow from the others by the same mechanics. Observations that contradict all others are left out
+/// and listed. Constant after construction but for the baseline, the frame before and scratch memory: one
+/// thread. Steady state allocates nothing.
 class ShapeReconstructor {
  public:
-  ShapeReconstructor(const LinkModel& model, const StereoRig& rig, ShapeOptions options = {});
+  /// Solves the shell, about 0.2 s at 256 markers.
+  ShapeReconstructor(const LinkModel& model, const StereoRig& rig, const ShapeOptions& options = {});
 
-  /// Displacements are from the baseline, their covariances include the baseline's.
-  void Reconstruct(const LabelledMarkers& markers, SkinShape& shape);
+  /// Takes the markers of the untouched skin (means over frames, with the means' covariances), under a gauge
+  /// pressure. Before the first call they are expected where the model's projection has them.
+  void SetBaseline(const LabelledMarkers& rest, double pressure_mpa = 0);
 
-  /// Takes a reconstructed shape as the baseline. Where no camera saw a marker, the model's rest
-  /// position stands in, as it does for all markers before the first call.
-  void SetBaseline(const SkinShape& rest);
+  /// `pressure_mpa`: gauge pressure; none: not known, and estimated.
+  void Reconstruct(const LabelledMarkers& markers, std::optional<double> pressure_mpa, SkinShape& shape);
+
+  int rounds() const { return estimator_.rounds(); }
+  /// Loads that the last shape needs, N; inward, around, and across both, by 3 * marker + direction.
+  const ShapeSolver& solver() const { return estimator_.solver(); }
 
  private:
-  bool Triangulate(const MarkerObservation& top, const MarkerObservation& bottom, size_t marker,
-                   SkinShape& shape) const;
-  bool FromOneCamera(CameraId id, const MarkerObservation& seen, size_t marker, SkinShape& shape) const;
-  bool Plausible(const Vec3& p, size_t marker) const;
+  void Write(SkinShape& shape) const;
 
-  const LinkModel model_;
-  const ShapeOptions options_;
-  const std::vector<Projector> projectors_;  // by camera
-  double length_mm_, tube_radius_mm_;
-  std::vector<double> rest_radius_mm_;  // by marker, of the model
-  std::vector<Vec3> model_rest_mm_, baseline_mm_;
-  std::vector<Mat3> baseline_covariance_mm2_;
+  const std::vector<Vec3> model_rest_mm_;
+  ShapeEstimator estimator_;
+  CameraEvidence evidence_;
+  Eigen::VectorXd rest_u_;  // of the skin in the rest pictures, own frames
 };
 
 }  // namespace taclink

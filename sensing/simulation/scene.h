@@ -58,7 +58,7 @@ struct CameraEffects {
   /// Standard deviation of each picture's own gain: the light flickers. Gains stay within [0.2, 3].
   double flicker = 0;
   int dirt_specks = 0;  ///< on each lens: every second one dark, the others lit
-  std::array<MountError, kCameraCount> mount;
+  std::array<MountError, kCameraCount> mount = {};
 };
 
 /// What happens to a simulated link, over time.

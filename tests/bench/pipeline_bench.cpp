@@ -79,8 +79,8 @@ struct Stages {
         detector.Detect(gray[i], detections[i]);
       }
       tracker.Label(detections, labels);
-      reconstructor.Reconstruct(labels, shape);
-      if (frame == &bench.rest) reconstructor.SetBaseline(shape);
+      if (frame == &bench.rest) reconstructor.SetBaseline(labels);
+      reconstructor.Reconstruct(labels, 0, shape);
     }
   }
 
@@ -119,7 +119,7 @@ void Register(benchmark::State& state) {
 
 void Reconstruct(benchmark::State& state) {
   Stages s(For(state));
-  for (auto _ : state) s.reconstructor.Reconstruct(s.labels, s.shape);
+  for (auto _ : state) s.reconstructor.Reconstruct(s.labels, 0, s.shape);
 }
 
 void ForceAndContacts(benchmark::State& state) {

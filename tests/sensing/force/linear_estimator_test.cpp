@@ -74,7 +74,7 @@ TEST_P(LinearEstimatorTest, MissingMarkersAreLeftOut) {
   SkinShape shape = ShapeUnder(model_, {{6, 4, 0.2}}, 0, 3, 0.05, 9);
   for (size_t i = 0; i < shape.sources.size(); i += 3) {
     shape.sources[i] = MarkerSource::kInferred;
-    shape.displacements_mm[i] = Vec3(50, 50, 50);
+    shape.measured[i].displacement_mm = Vec3(50, 50, 50);
   }
   estimator_.Estimate(shape, 0, forces_);
   EXPECT_NEAR(TotalN(forces_), 0.2, 0.03);
@@ -82,8 +82,8 @@ TEST_P(LinearEstimatorTest, MissingMarkersAreLeftOut) {
 
 TEST_P(LinearEstimatorTest, NotANumberIsLeftOut) {
   SkinShape shape = ShapeUnder(model_, {{6, 4, 0.2}}, 0, 3, 0.05, 9);
-  shape.displacements_mm[10] = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
-  shape.covariances_mm2[20](0, 0) = std::numeric_limits<double>::infinity();
+  shape.measured[10].displacement_mm = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+  shape.measured[20].information_per_mm2(0, 0) = std::numeric_limits<double>::infinity();
   estimator_.Estimate(shape, 0, forces_);
   EXPECT_NEAR(TotalN(forces_), 0.2, 0.03);
 }

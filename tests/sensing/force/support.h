@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <map>
 #include <random>
@@ -44,6 +45,7 @@ inline SkinShape ShapeUnder(const LinkModel& model, const std::vector<TrueLoad>&
     shape.positions_mm.push_back(model.RestMarker(m) + shape.displacements_mm.back());
     const double s2 = std::max(sigma_mm, 0.01) * std::max(sigma_mm, 0.01);
     shape.covariances_mm2.push_back(Vec3(s2, s2, 9 * s2).asDiagonal());
+    shape.measured.push_back({shape.displacements_mm.back(), shape.covariances_mm2.back().inverse()});
     shape.sources.push_back(MarkerSource::kBoth);
   }
   return shape;

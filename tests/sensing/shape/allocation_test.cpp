@@ -1,0 +1,50 @@
+// Steady state allocates nothing: counted at malloc, where the sanitizers leave it to us.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+
+#include "sensing/model/model_file.h"
+#include "sensing/shape/reconstructor.h"
+#include "tests/sensing/shape/support.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define TACLINK_COUNTS 0
+#else
+#define TACLINK_COUNTS 1
+namespace {
+std::atomic<int> allocations{0};
+}
+extern "C" void* __libc_malloc(size_t size);  // NOLINT(bugprone-reserved-identifier)
+extern "C" void* malloc(size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+#endif
+
+namespace taclink {
+namespace {
+
+TEST(ShapeAllocation, NoneOnceRunning) {
+#if TACLINK_COUNTS
+  const LinkModel model = LoadLinkModel("cylinder").value();
+  ShapeReconstructor reconstructor(model, model.nominal_rig);
+  Eyes eyes(model.nominal_rig);
+  reconstructor.SetBaseline(eyes.See(model.RestMarkers(), 0.1));
+  SkinShape shape;
+  const auto still = eyes.See(model.RestMarkers(), 0.3);
+  const auto touched = eyes.See(TrueMarkers(model, {{1, 0.4, 8}, {4, 0.6, 5}}), 0.3);
+  LabelledMarkers outlier = touched;
+  outlier.cameras[0][50].center_px += Vec2(20, 0);
+  reconstructor.Reconstruct(outlier, 0, shape);
+  const int before = allocations;
+  for (const LabelledMarkers* labels : {&still, &touched, static_cast<const LabelledMarkers*>(&outlier)}) reconstructor.Reconstruct(*labels, 0, shape);
+  EXPECT_GT(before, 0);
+  EXPECT_EQ(allocations - before, 0);
+#else
+  GTEST_SKIP() << "the sanitizer owns malloc";
+#endif
+}
+
+}  // namespace
+}  // namespace taclink
