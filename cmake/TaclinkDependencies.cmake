@@ -1,6 +1,7 @@
 # Everything comes from Debian 12's packages (deploy/packages lists them).
 find_package(Threads REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
+find_package(Ceres 2.1 REQUIRED)
 find_package(OpenCVLite REQUIRED)
 find_package(Protobuf REQUIRED)  # module mode, before gRPC's config looks for its own
 find_package(gRPC CONFIG REQUIRED)

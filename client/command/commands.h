@@ -19,6 +19,7 @@ void AddList(CLI::App& app, Selected& selected);
 void AddWatch(CLI::App& app, Selected& selected);
 void AddDetect(CLI::App& app, Selected& selected);
 void AddSolve(CLI::App& app, Selected& selected);
+void AddCalibrate(CLI::App& app, Selected& selected);
 void AddSimulate(CLI::App& app, Selected& selected);
 void AddSkin(CLI::App& app, Selected& selected);
 void AddBench(CLI::App& app, Selected& selected);

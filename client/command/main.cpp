@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
   taclink::command::AddWatch(app, selected);
   taclink::command::AddDetect(app, selected);
   taclink::command::AddSolve(app, selected);
+  taclink::command::AddCalibrate(app, selected);
   taclink::command::AddSimulate(app, selected);
   taclink::command::AddSkin(app, selected);
   taclink::command::AddBench(app, selected);

@@ -4,209 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <vector>
 
-#include "sensing/camera/projection.h"
-#include "sensing/camera/triangulation.h"
-#include "sensing/model/model_file.h"
+#include "sensing/camera/camera_fit.h"
+#include "sensing/camera/rest_check.h"
 
 namespace taclink {
 namespace {
 
-constexpr int kClosedFormRounds = 10;
-constexpr int kMaxSteps = 60;
-constexpr int kTrimRounds = 3;
-constexpr double kSigmaFloorPx = 0.1;  // a detection is not believed to be better than this
-constexpr double kMaxSigmaPx = 2;      // worse ones (clipped) do not count
-constexpr double kMinOutlierPx = 0.6;
-constexpr double kPlaceStiffness = 1e3;  // sigmas per mm beyond the mount's tolerance
-constexpr int kFormatVersion = 1;
-
-struct Sample {
-  Vec3 p_in_link;
-  Vec2 pixel;
-  double weight;  // 1 / sigma
-};
-
-// Coaxial camera: 0 focal px, 1 distance b mm, 2-3 principal point px, 4 roll rad, 5 k1 in 1e-6/px2,
-// 6 k2 in 1e-11/px4. So scaled, all have steps of a like size.
-using Parameters = Eigen::Matrix<double, 7, 1>;
-constexpr double kK1Unit = 1e-6, kK2Unit = 1e-11;
-
-double PlaceOnAxis(const LinkModel& model, CameraId id) {
-  const double z = model.nominal_rig[id].camera_from_link.Inverse().translation.z();
-  return id == CameraId::kTop ? -z : z;
-}
-
-CameraModel CameraFrom(const LinkModel& model, CameraId id, const Parameters& p) {
-  CameraModel camera = model.nominal_rig[id];
-  camera.lens = {p[0], Vec2(p[2], p[3]), p[5] * kK1Unit, p[6] * kK2Unit};
-  const Mat3 roll(Eigen::AngleAxisd(p[4], Vec3::UnitZ()));
-  camera.camera_from_link.rotation = roll * model.nominal_rig[id].camera_from_link.rotation;
-  const Vec3 center(0, 0, id == CameraId::kTop ? -p[1] : p[1]);
-  camera.camera_from_link.translation = -(camera.camera_from_link.rotation * center);
-  return camera;
-}
-
-// Depth along the axis beyond the camera's place b, as (4.3) and (4.4) count it.
-double AxialZ(CameraId id, const Vec3& p) {
-  return id == CameraId::kTop ? p.z() : -p.z();
-}
-
-std::vector<Sample> Collect(const LinkModel& model, std::span<const MarkerObservation> rest) {
-  std::vector<Sample> samples;
-  for (size_t i = 0; i < rest.size(); ++i) {
-    if (!rest[i].seen || rest[i].sigma_px() > kMaxSigmaPx) continue;
-    const double weight = 1 / std::hypot(rest[i].sigma_px(), kSigmaFloorPx);
-    samples.push_back({model.RestMarker(static_cast<int>(i)), rest[i].center_px, weight});
-  }
-  return samples;
-}
-
-// Where the paths' lines meet, and the roll against the nominal orientation: linear least squares of the
-// distance across the lines, n . (pixel - center) = r roll, repeated because n turns with the roll.
-void FindCenterAndRoll(const LinkModel& model, CameraId id, const std::vector<Sample>& samples,
-                       Parameters& p) {
-  const Mat3& rotation = model.nominal_rig[id].camera_from_link.rotation;
-  for (int round = 0; round < kClosedFormRounds; ++round) {
-    Mat3 normal = Mat3::Zero();
-    Vec3 right = Vec3::Zero();
-    for (const Sample& s : samples) {
-      const Vec3 d = rotation * Vec3(s.p_in_link.x(), s.p_in_link.y(), 0);
-      const double line = std::atan2(d.y(), d.x()) + p[4];
-      const Vec2 across(-std::sin(line), std::cos(line)), at = s.pixel - Vec2(p[2], p[3]);
-      const Vec3 row(across.x(), across.y(), at.norm());
-      normal += row * row.transpose();
-      right += row * across.dot(at);
-    }
-    const Vec3 step = normal.ldlt().solve(right);
-    if (!step.allFinite()) return;
-    p.segment<3>(2) += step;
-  }
-}
-
-// (4.37) for f and b with the lens known, then (4.43) for the lens with f and b known, by turns.
-void FindFocalAndLens(CameraId id, const std::vector<Sample>& samples, Parameters& p) {
-  for (int round = 0; round < kClosedFormRounds; ++round) {
-    Mat2 normal = Mat2::Zero();
-    Vec2 right = Vec2::Zero();
-    for (const Sample& s : samples) {
-      const double r2 = (s.pixel - Vec2(p[2], p[3])).squaredNorm();
-      const double r = std::sqrt(r2) / (1 + r2 * (p[5] * kK1Unit + r2 * p[6] * kK2Unit));
-      const Vec2 row(s.p_in_link.head<2>().norm(), -r);
-      normal += row * row.transpose();
-      right += row * r * AxialZ(id, s.p_in_link);
-    }
-    const Vec2 focal_and_place = normal.ldlt().solve(right);
-    if (!focal_and_place.allFinite() || focal_and_place[0] <= 0) return;
-    p.head<2>() = focal_and_place;
-    normal.setZero();
-    right.setZero();
-    for (const Sample& s : samples) {
-      const double seen2 = (s.pixel - Vec2(p[2], p[3])).squaredNorm(), seen = std::sqrt(seen2);
-      const double r = p[0] * s.p_in_link.head<2>().norm() / (p[1] + AxialZ(id, s.p_in_link));
-      const Vec2 row(r * seen2 * kK1Unit, r * seen2 * seen2 * kK2Unit);
-      normal += row * row.transpose();
-      right += row * (seen - r);
-    }
-    const Vec2 lens = normal.ldlt().solve(right);
-    if (!lens.allFinite()) return;
-    p.tail<2>() = lens;
-  }
-}
-
-// What is fitted: samples of one camera, and where its mount can hold it.
-struct Problem {
-  const LinkModel& model;
-  CameraId id;
-  double tolerance_mm;  // of the place on the axis
-  std::vector<Sample> samples;
-};
-
-// Weighted residuals in px sigmas, and how far the place is beyond the mount's tolerance; false: some marker
-// can't be projected.
-bool Residuals(const Problem& problem, const Parameters& p, Eigen::VectorXd& residuals) {
-  if (!(p[0] > 1)) return false;
-  const Projector projector(CameraFrom(problem.model, problem.id, p));
-  const auto count = static_cast<Eigen::Index>(problem.samples.size());
-  residuals.resize(2 * count + 1);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const Sample& s = problem.samples[static_cast<size_t>(i)];
-    const auto pixel = projector.Project(s.p_in_link);
-    if (!pixel) return false;
-    residuals.segment<2>(2 * i) = s.weight * (*pixel - s.pixel);
-  }
-  const double off = std::abs(p[1] - PlaceOnAxis(problem.model, problem.id));
-  residuals[2 * count] = kPlaceStiffness * std::max(0.0, off - problem.tolerance_mm);
-  return true;
-}
-
-// Gauss-Newton with Levenberg's damping; derivatives by central differences. Returns the cost reached.
-double Refine(const Problem& problem, Parameters& p) {
-  const Parameters steps = (Parameters() << 1e-3, 1e-3, 1e-3, 1e-3, 1e-5, 1e-4, 1e-4).finished();
-  Eigen::VectorXd now, plus, minus;
-  if (!Residuals(problem, p, now)) return std::numeric_limits<double>::infinity();
-  double damping = 1e-4;
-  Eigen::MatrixXd jacobian(now.size(), p.size());
-  for (int step = 0; step < kMaxSteps && damping < 1e8; ++step) {
-    for (Eigen::Index k = 0; k < p.size(); ++k) {
-      const Parameters h = steps[k] * Parameters::Unit(k);
-      if (!Residuals(problem, p + h, plus) || !Residuals(problem, p - h, minus)) return now.squaredNorm();
-      jacobian.col(k) = (plus - minus) / (2 * steps[k]);
-    }
-    const Eigen::Matrix<double, 7, 7> normal = jacobian.transpose() * jacobian;
-    const Parameters gradient = jacobian.transpose() * now;
-    bool better = false;
-    while (!better && damping < 1e8) {
-      Eigen::Matrix<double, 7, 7> damped = normal;
-      damped.diagonal() += damping * normal.diagonal();
-      const Parameters candidate = p - damped.ldlt().solve(gradient);
-      better = candidate.allFinite() && Residuals(problem, candidate, plus) &&
-               plus.squaredNorm() < now.squaredNorm();
-      damping = better ? damping / 10 : damping * 10;
-      if (!better) continue;
-      const double gain = 1 - plus.squaredNorm() / now.squaredNorm();
-      p = candidate;
-      now = plus;
-      if (gain < 1e-10) return now.squaredNorm();
-    }
-  }
-  return now.squaredNorm();
-}
-
-// The better of two starts: the closed form, and the nominal lens.
-Parameters Fit(const Problem& problem) {
-  const auto& [model, id, tolerance_mm, samples] = problem;
-  const LensModel& lens = model.nominal_rig[id].lens;
-  Parameters nominal;
-  nominal << lens.focal_px, PlaceOnAxis(model, id), lens.principal_point_px, 0, lens.k1_per_px2 / kK1Unit,
-      lens.k2_per_px4 / kK2Unit;
-  FindCenterAndRoll(model, id, samples, nominal);
-  Parameters closed = nominal;
-  FindFocalAndLens(id, samples, closed);
-  closed[1] = std::clamp(closed[1], nominal[1] - tolerance_mm, nominal[1] + tolerance_mm);
-  const double nominal_cost = Refine(problem, nominal);
-  const double closed_cost = Refine(problem, closed);
-  return closed_cost <= nominal_cost ? closed : nominal;
-}
-
-std::vector<double> ErrorsPx(const CameraModel& camera, const std::vector<Sample>& samples) {
-  const Projector projector(camera);
-  std::vector<double> errors;
-  for (const Sample& s : samples) {
-    const auto pixel = projector.Project(s.p_in_link);
-    errors.push_back(pixel ? (*pixel - s.pixel).norm() : std::numeric_limits<double>::infinity());
-  }
-  return errors;
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+constexpr int kLeastMarkers = 8;
 
 Error Refusal(const std::string& what) {
   return {ErrorCode::kInvalidArgument, "calibration refused: " + what};
@@ -218,113 +23,268 @@ std::string Rounded(double value) {
   return text;
 }
 
+void Tell(const CalibrationOptions& options, double done, const std::string& step) {
+  if (options.progress) options.progress({done, step});
+}
+
+CameraFitOptions FitOptions(const LinkModel& model, CameraId id, const CalibrationOptions& options) {
+  return {options.tolerance, options.lens.value_or(model.nominal_rig[id].lens.kind), options.domes};
+}
+
+Result<CameraFit> FitOne(const LinkModel& model, CameraId id, std::span<const MarkerObservation> rest,
+                         const CalibrationOptions& options) {
+  const std::string camera = std::string("the ") + Name(id) + " camera";
+  const int usable = CountUsable(rest);
+  if (usable < std::max<double>(kLeastMarkers, options.min_seen * model.markers.count())) {
+    return Refusal(camera + " sees only " + std::to_string(usable) + " of " +
+                   std::to_string(model.markers.count()) +
+                   " markers well: check light, focus and that the model is this link's");
+  }
+  auto fit = FitCamera(model, id, rest, FitOptions(model, id, options));
+  if (!fit) {
+    return Refusal("no lens and place of " + camera +
+                   " explain its picture: check that the model is this link's, and its nominal cameras");
+  }
+  return *std::move(fit);
+}
+
+// Residuals against the model's places of the markers.
+CameraCalibration Judge(const LinkModel& model, const CameraModel& camera, const CameraFit& fit,
+                        std::span<const MarkerObservation> rest, const CalibrationOptions& options) {
+  CameraCalibration result;
+  result.camera = camera;
+  result.markers_used = static_cast<int>(fit.samples.size());
+  result.outliers = static_cast<int>(fit.outliers.size());
+  result.residuals.resize(rest.size());
+  const auto mark = [&](int marker, MarkerResidual::Kind kind) {
+    result.residuals[static_cast<size_t>(marker)].kind = kind;
+  };
+  for (const BundleSample& s : fit.samples) mark(s.marker, MarkerResidual::Kind::kUsed);
+  for (const int marker : fit.outliers) mark(marker, MarkerResidual::Kind::kOutlier);
+  const Projector projector(camera);
+  double squares = 0;
+  for (size_t i = 0; i < rest.size(); ++i) {
+    MarkerResidual& residual = result.residuals[i];
+    const auto pixel =
+        projector.Project(SeenPoint(model, static_cast<int>(i), projector.center_in_link(), options.domes));
+    if (residual.kind == MarkerResidual::Kind::kUnseen || !pixel) continue;
+    residual.seen_px = rest[i].center_px;
+    residual.residual_px = rest[i].center_px - *pixel;
+    if (residual.kind == MarkerResidual::Kind::kUsed) squares += residual.residual_px.squaredNorm();
+  }
+  result.rms_px = std::sqrt(squares / (2.0 * std::max(1, result.markers_used)));
+  return result;
+}
+
+std::string Percent(double more) {
+  return Rounded(100 * std::abs(more)) + " % " + (more > 0 ? "more" : "less");
+}
+
+// r(theta) against the nominal lens, where it differs most, as far out as the link fills the picture.
+double Magnification(const LinkModel& model, CameraId id, const CameraModel& camera) {
+  const CameraModel& nominal = model.nominal_rig[id];
+  double widest = 0;
+  for (const Vec3& p : model.RestMarkers()) {
+    const Vec3 seen = nominal.camera_from_link * p;
+    widest = std::max(widest, std::atan2(seen.head<2>().norm(), seen.z()));
+  }
+  const Projector was(nominal), is(camera);
+  double worst = 1;
+  for (int i = 1; i <= 8; ++i) {
+    const auto a = was.lens().AtAngle(widest * i / 8), b = is.lens().AtAngle(widest * i / 8);
+    if (a && b && std::abs(b->px / a->px - 1) > std::abs(worst - 1)) worst = b->px / a->px;
+  }
+  return worst;
+}
+
+// What of a camera is furthest off the model's nominal one.
+struct Departure {
+  double tolerances = 0;
+  std::string what;
+};
+
+Departure FarthestOff(const LinkModel& model, CameraId id, const CameraModel& camera,
+                      const BuildTolerance& tolerance) {
+  CameraModel nominal = model.nominal_rig[id];
+  nominal.lens.kind = camera.lens.kind;
+  const CameraStep step = StepBetween(nominal, camera);
+  const auto deg = [](double rad) { return Rounded(std::abs(DegFromRad(rad))) + " deg"; };
+  const double place = step.segment<3>(3).cwiseAbs().maxCoeff(), tilt = step.head<2>().cwiseAbs().maxCoeff();
+  const double center = step.segment<2>(6).cwiseAbs().maxCoeff();
+  std::vector<Departure> all = {
+      {place / tolerance.place_mm, "stands " + Rounded(place) + " mm from"},
+      {tilt / tolerance.tilt_rad, "is tilted by " + deg(tilt) + " against"},
+      {std::abs(step[2]) / tolerance.roll_rad, "is rolled by " + deg(step[2]) + " against"},
+      {center / tolerance.principal_point_px,
+       "has its principal point " + Rounded(center) + " px from that of"}};
+  const double more = Magnification(model, id, camera) - 1;
+  all.push_back({std::abs(more) / tolerance.lens, "magnifies by " + Percent(more) + " than"});
+  return *std::max_element(all.begin(), all.end(),
+                           [](const auto& a, const auto& b) { return a.tolerances < b.tolerances; });
+}
+
+Result<void> CheckCamera(const LinkModel& model, CameraId id, const CameraCalibration& one,
+                         const CalibrationOptions& options) {
+  const std::string camera = std::string("the ") + Name(id) + " camera";
+  const int seen = one.markers_used + one.outliers;
+  if (one.outliers > options.max_outliers * seen) {
+    return Refusal(std::to_string(one.outliers) + " of the " + std::to_string(seen) + " markers that " +
+                   camera +
+                   " sees do not fit the model: check that it is this link's, and that nothing "
+                   "touches the skin");
+  }
+  if (!(one.rms_px <= options.max_rms_px)) {
+    return Refusal(camera + " fits to " + Rounded(one.rms_px) + " px only, " + Rounded(options.max_rms_px) +
+                   " px is the limit: check that the model is this link's, or try the other lens model");
+  }
+  const Departure off = FarthestOff(model, id, one.camera, options.tolerance);
+  if (!(off.tolerances <= options.max_departure)) {
+    return Refusal(camera + " " + off.what +
+                   " the model's nominal one: it is not this link's model, the skin is under pressure, or "
+                   "the model's cameras must be corrected");
+  }
+  return {};
+}
+
+// Lenses differ one by one; both off by the same tell that the link is wider, shorter or inflated.
+Result<void> CheckBoth(const LinkModel& model, const CalibrationSummary& summary,
+                       const CalibrationOptions& options) {
+  double more = -1;
+  for (const CameraId id : kBothCameras) more += 0.5 * Magnification(model, id, summary.rig[id]);
+  if (std::abs(more) <= options.max_departure * options.tolerance.lens / std::sqrt(2.0)) return {};
+  return Refusal(
+      "both cameras magnify by " + Percent(more) +
+      " than the model's nominal ones: radius or ring distances are not this link's, the skin is under "
+      "pressure, or the model's cameras must be corrected");
+}
+
+CameraStep SigmasOf(const Eigen::MatrixXd& covariance, size_t camera) {
+  if (covariance.size() == 0) return CameraStep::Zero();
+  const auto first = static_cast<Eigen::Index>(camera) * kCameraParameters;
+  return covariance.diagonal().segment<kCameraParameters>(first).cwiseMax(0).cwiseSqrt();
+}
+
+// Both together; the covariances grow by the misfit that each camera showed alone.
+Result<BundleResult> AdjustBoth(const LinkModel& model, const std::array<CameraFit, kCameraCount>& fits,
+                                const CalibrationOptions& options) {
+  BundleOptions bundle{.tolerance = options.tolerance};
+  bundle.tolerance.marker_mm *= std::max(fits[0].misfit, fits[1].misfit);
+  std::vector<BundleCamera> cameras;
+  for (const CameraId id : kBothCameras) {
+    const CameraFit& fit = fits[Index(id)];
+    cameras.push_back({fit.camera, model.nominal_rig[id], fit.samples});
+    for (BundleSample& s : cameras.back().samples) s.covariance_px2 *= fit.misfit * fit.misfit;
+  }
+  BundleResult result = AdjustBundle(cameras, bundle);
+  if (!result.converged) return Refusal("the adjustment of both cameras does not converge");
+  return result;
+}
+
+// Weighted least squares from the model's place, where one step does nearly all.
+std::optional<Vec3> Triangulate(const LinkModel& model, int marker, const CalibrationOptions& options,
+                                const std::array<Projector, kCameraCount>& projectors,
+                                const LabelledMarkers& rest) {
+  const Vec3 start = model.RestMarker(marker);
+  Vec3 at = start;
+  for (int step = 0; step < 4; ++step) {
+    Mat3 normal = Mat3::Zero();
+    Vec3 right = Vec3::Zero();
+    for (const CameraId id : kBothCameras) {
+      const Projector& projector = projectors[Index(id)];
+      const MarkerObservation& one = rest.cameras[Index(id)][static_cast<size_t>(marker)];
+      // A dome's look moves with it.
+      const Vec3 look = SeenPoint(model, marker, projector.center_in_link(), options.domes) - start;
+      const auto seen = projector.ProjectWithJacobian(at + look);
+      if (!seen) return std::nullopt;
+      const Mat2 weight = (one.covariance_px2 + 0.01 * Mat2::Identity()).inverse();
+      normal += seen->jacobian.transpose() * weight * seen->jacobian;
+      right += seen->jacobian.transpose() * weight * (one.center_px - seen->pixel);
+    }
+    const Vec3 change = normal.ldlt().solve(right);
+    if (!change.allFinite()) return std::nullopt;
+    at += change;
+  }
+  return at;
+}
+
+void MeasureShifts(const LinkModel& model, const LabelledMarkers& rest, const CalibrationOptions& options,
+                   CalibrationSummary& summary) {
+  const std::array projectors = {Projector(summary.rig[CameraId::kTop]),
+                                 Projector(summary.rig[CameraId::kBottom])};
+  const auto count = static_cast<size_t>(model.markers.count());
+  summary.shifts_mm.assign(count, std::nullopt);
+  double r = 0, phi = 0, z = 0, all = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const auto used = [&](CameraId id) {
+      return summary.cameras[Index(id)].residuals[i].kind == MarkerResidual::Kind::kUsed;
+    };
+    if (!used(CameraId::kTop) || !used(CameraId::kBottom)) continue;
+    const auto at = Triangulate(model, static_cast<int>(i), options, projectors, rest);
+    if (!at) continue;
+    const Vec3 truth = model.RestMarker(static_cast<int>(i)), off = *at - truth;
+    summary.shifts_mm[i] = off;
+    const double radius = truth.head<2>().norm();
+    r += std::pow(at->head<2>().norm() - radius, 2);
+    phi += std::pow((truth.x() * off.y() - truth.y() * off.x()) / radius, 2);
+    z += off.z() * off.z();
+    all += off.squaredNorm();
+    ++summary.markers_used;
+  }
+  const double used = std::max(1, summary.markers_used);
+  summary.rmse_r_mm = std::sqrt(r / used);
+  summary.rmse_phi_r_mm = std::sqrt(phi / used);
+  summary.rmse_z_mm = std::sqrt(z / used);
+  summary.rmse_3d_mm = std::sqrt(all / used);
+}
+
 }  // namespace
 
 Result<CameraCalibration> CalibrateCamera(const LinkModel& model, CameraId id,
                                           std::span<const MarkerObservation> rest,
                                           const CalibrationOptions& options) {
-  const std::vector<Sample> all = Collect(model, rest);
-  const std::string camera_name = std::string("the ") + Name(id) + " camera ";
-  if (static_cast<double>(all.size()) < std::max(8.0, options.min_seen * model.markers.count()))
-    return Refusal(camera_name + "sees only " + std::to_string(all.size()) + " of " +
-                   std::to_string(model.markers.count()) + " markers well");
-  Problem problem{model, id, options.place_tolerance_mm, all};
-  std::vector<Sample>& used = problem.samples;
-  Parameters parameters;
-  for (int round = 0; round < kTrimRounds; ++round) {
-    parameters = Fit(problem);
-    const auto errors = ErrorsPx(CameraFrom(model, id, parameters), all);
-    const double limit = std::max(kMinOutlierPx, 4 * Median(errors));
-    used.clear();
-    for (size_t i = 0; i < all.size(); ++i) {
-      if (errors[i] <= limit) used.push_back(all[i]);
-    }
-  }
-  CameraCalibration result;
-  result.camera = CameraFrom(model, id, parameters);
-  result.markers_used = static_cast<int>(used.size());
-  result.outliers = static_cast<int>(all.size() - used.size());
-  double squares = 0;
-  for (const double e : ErrorsPx(result.camera, used)) squares += e * e;
-  result.rms_px = std::sqrt(squares / (2.0 * static_cast<double>(used.size())));
-  if (result.outliers > options.max_outliers * static_cast<double>(all.size()))
-    return Refusal(std::to_string(result.outliers) + " of the " + std::to_string(all.size()) +
-                   " markers that " + camera_name + "sees do not fit the model");
-  if (!(result.rms_px <= options.max_rms_px))
-    return Refusal(camera_name + "fits to " + Rounded(result.rms_px) + " px only, " +
-                   Rounded(options.max_rms_px) + " px is the limit");
+  auto fit = FitOne(model, id, rest, options);
+  if (!fit) return fit.error();
+  CameraCalibration result = Judge(model, fit->camera, *fit, rest, options);
+  result.sigmas = SigmasOf(fit->bundle.covariance, 0);
+  if (auto good = CheckCamera(model, id, result, options); !good) return good.error();
   return result;
 }
 
 Result<CalibrationSummary> CalibrateFromRest(const LinkModel& model, const LabelledMarkers& rest,
                                              const CalibrationOptions& options) {
-  CalibrationSummary summary;
-  double squares = 0;
-  int used = 0;
+  std::array<CameraFit, kCameraCount> fits;
   for (const CameraId id : kBothCameras) {
-    auto one = CalibrateCamera(model, id, rest.cameras[Index(id)], options);
-    if (!one) return one.error();
-    summary.rig[id] = one->camera;
-    squares += one->rms_px * one->rms_px * one->markers_used;
-    used += one->markers_used;
+    Tell(options, 0.25 * static_cast<double>(Index(id)), std::string("fit the ") + Name(id) + " camera");
+    auto fit = FitOne(model, id, rest.cameras[Index(id)], options);
+    if (!fit) return fit.error();
+    fits[Index(id)] = *std::move(fit);
+  }
+  Tell(options, 0.5, "adjust both cameras together");
+  auto bundle = AdjustBoth(model, fits, options);
+  if (!bundle) return bundle.error();
+  Tell(options, 0.9, "check the result");
+  CalibrationSummary summary;
+  summary.covariance = bundle->covariance;
+  summary.departure_cost = bundle->tolerance_cost;
+  double squares = 0, used = 0;
+  for (const CameraId id : kBothCameras) {
+    CameraCalibration& one = summary.cameras[Index(id)];
+    one = Judge(model, bundle->cameras[Index(id)], fits[Index(id)], rest.cameras[Index(id)], options);
+    one.sigmas = SigmasOf(bundle->covariance, Index(id));
+    summary.rig[id] = one.camera;
+    squares += one.rms_px * one.rms_px * one.markers_used;
+    used += one.markers_used;
   }
   summary.rms_px = std::sqrt(squares / used);
-  const Projector top(summary.rig[CameraId::kTop]), bottom(summary.rig[CameraId::kBottom]);
-  double r = 0, z = 0, all = 0;
-  for (size_t i = 0; i < rest.cameras[0].size(); ++i) {
-    const MarkerObservation &a = rest.cameras[0][i], &b = rest.cameras[1][i];
-    if (!a.seen || !b.seen || std::max(a.sigma_px(), b.sigma_px()) > kMaxSigmaPx) continue;
-    const auto ray_a = top.Ray(a.center_px), ray_b = bottom.Ray(b.center_px);
-    if (!ray_a || !ray_b) continue;
-    const auto meeting = MeetRays({top.center_in_link(), *ray_a}, {bottom.center_in_link(), *ray_b});
-    if (!meeting) continue;
-    const Vec3 truth = model.RestMarker(static_cast<int>(i)), off = meeting->point_mm - truth;
-    r += std::pow(meeting->point_mm.head<2>().norm() - truth.head<2>().norm(), 2);
-    z += off.z() * off.z();
-    all += off.squaredNorm();
-    ++summary.markers_used;
-  }
-  if (summary.markers_used < 8) return Refusal("fewer than 8 markers are seen by both cameras");
-  summary.rmse_r_mm = std::sqrt(r / summary.markers_used);
-  summary.rmse_z_mm = std::sqrt(z / summary.markers_used);
-  summary.rmse_3d_mm = std::sqrt(all / summary.markers_used);
-  return summary;
-}
-
-Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model) {
-  auto file = YamlFile::Load(path);
-  if (!file) return file.error();
-  YamlMap& root = file->root();
-  root.Integer("taclink_calibration", {.min = kFormatVersion, .max = kFormatVersion});
-  if (const std::string name = root.Text("model"); !name.empty() && name != model.name) {
-    root.Fail("model", "is '" + name + "', but the link's model is '" + model.name + "'");
-  }
-  root.Integer("markers_used", 0);
-  root.Number("rms_px", 0.0);
-  StereoRig rig;
-  YamlMap cameras = root.Map("cameras");
-  for (const CameraId id : kBothCameras) rig[id] = ReadCamera(cameras.Map(Name(id)), id);
-  cameras.Done();
-  root.Done();
-  if (auto good = file->Finish(); !good) return good.error();
-  return rig;
-}
-
-Result<void> SaveCalibration(const std::string& path, const std::string& model_name,
-                             const CalibrationSummary& summary) {
-  const std::string part = path + ".part";
-  std::ofstream out(part, std::ios::trunc);
-  out << "taclink_calibration: " << kFormatVersion << "\nmodel: " << model_name
-      << "\nmarkers_used: " << summary.markers_used << "\nrms_px: " << summary.rms_px << "\ncameras:\n";
+  MeasureShifts(model, rest, options, summary);
+  if (const auto dent = FindDent(model, summary, options.max_dent_mm)) return Refusal(Describe(model, *dent));
   for (const CameraId id : kBothCameras) {
-    out << "  " << Name(id) << ":\n" << CameraText(summary.rig[id], id, "    ");
+    if (auto good = CheckCamera(model, id, summary.cameras[Index(id)], options); !good) return good.error();
   }
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(part, path, error);
-  if (!out || error)
-    return Error{ErrorCode::kUnavailable, "cannot write the calibration file '" + path + "'"};
-  return {};
+  if (auto good = CheckBoth(model, summary, options); !good) return good.error();
+  if (summary.markers_used < kLeastMarkers) return Refusal("fewer than 8 markers are seen by both cameras");
+  Tell(options, 1, "done");
+  return summary;
 }
 
 }  // namespace taclink

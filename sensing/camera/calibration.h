@@ -1,8 +1,14 @@
 #pragma once
 
+#include <array>
+#include <functional>
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "sensing/camera/bundle.h"
+#include "sensing/camera/projection.h"
 #include "sensing/core/camera_model.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
@@ -10,47 +16,80 @@
 
 namespace taclink {
 
+/// Told between the steps of a calibration, from its own thread.
+struct CalibrationProgress {
+  double done = 0;   ///< of 1
+  std::string step;  ///< what begins now
+};
+
 struct CalibrationOptions {
-  double max_rms_px = 1.5;  ///< worse is refused
-  double min_seen = 0.5;    ///< part of all markers that a picture must show
-  /// How far a camera's place on the axis may be off the nominal one. One picture hardly tells place, focal
-  /// length and lens apart where the lens model is not quite the lens; the mount is known better.
-  double place_tolerance_mm = 5;
+  std::optional<LensKind> lens = std::nullopt;  ///< to fit; none: the model's
+  BuildTolerance tolerance = {};                ///< priors of the fit
+  /// A camera further than so many tolerances off the model's nominal one is refused: the model is a wrong
+  /// one, or its cameras must be corrected.
+  double max_departure = 3;
+  double max_rms_px = 1.5;    ///< worse is refused
+  double min_seen = 0.5;      ///< part of all markers that a picture must show
   double max_outliers = 0.1;  ///< part of the seen ones that may be left out
+  double max_dent_mm = 0.4;   ///< a patch that lies further in than the model says is called touched
+  /// Markers are half balls that show another side to every camera; false: points, for made-up pictures.
+  bool domes = true;
+  std::function<void(const CalibrationProgress&)> progress = nullptr;
+};
+
+/// What became of one marker in one picture.
+struct MarkerResidual {
+  enum class Kind { kUnseen, kOutlier, kUsed };
+  Kind kind = Kind::kUnseen;
+  Vec2 seen_px = Vec2::Zero();
+  Vec2 residual_px = Vec2::Zero();  ///< seen less projected from where the model has it
 };
 
 /// One camera, fitted to one picture.
 struct CameraCalibration {
   CameraModel camera;
+  CameraStep sigmas = CameraStep::Zero();  ///< standard deviations of its parameters (see CameraStep)
   int markers_used = 0;
-  int outliers = 0;   ///< seen, but left out
-  double rms_px = 0;  ///< of the reprojection, per axis, over the used ones
+  int outliers = 0;                            ///< seen, but left out
+  double rms_px = 0;                           ///< of the reprojection, per axis, over the used ones
+  std::vector<MarkerResidual> residuals;  ///< by marker
 };
 
 struct CalibrationSummary {
   StereoRig rig;
-  int markers_used = 0;  ///< seen by both cameras
+  int markers_used = 0;  ///< by both cameras
   double rms_px = 0;     ///< of the reprojection, per axis, both pictures
-  double rmse_r_mm = 0;  ///< of the triangulated rest markers against the model
+  /// Of the triangulated rest markers against the model: distance from the axis, angle times that distance,
+  /// along the axis.
+  double rmse_r_mm = 0;
+  double rmse_phi_r_mm = 0;
   double rmse_z_mm = 0;
   double rmse_3d_mm = 0;
+  std::array<CameraCalibration, kCameraCount> cameras = {};
+  /// 26 x 26, of the top camera's CameraStep and then the bottom one's; empty: can't be told.
+  Eigen::MatrixXd covariance;
+  /// Triangulated less the model's, by marker; none: not used by both cameras.
+  std::vector<std::optional<Vec3>> shifts_mm;
+  int pairs = 1;  ///< of rest pictures, averaged
+  /// Half the squared distance of the cameras from the model's nominal ones, in tolerances.
+  double departure_cost = 0;
 };
 
-/// Fits focal length, lens, principal point, roll and place on the axis to the labelled markers of a rest
-/// picture. Start: the closed form, (4.37) and (4.43) by turns; the principal point is where the paths' lines
-/// meet, not the mean of (4.35), which is off as soon as a marker is missing. Then Gauss-Newton on the
-/// reprojection, all parameters together, with outliers left out. From the model's nominal rig, orientation
-/// and picture size are kept. Errors: kInvalidArgument (too few markers, residual too large) with the reason.
+/// Fits pose, principal point and lens of one camera to the labelled markers of a rest picture. Start: the
+/// closed form of the thesis (see FindStarts); then a robust adjustment of all parameters. Picture size is
+/// the nominal one's. Errors: kInvalidArgument (too few markers, residual too large, far off the model) with
+/// the reason.
 Result<CameraCalibration> CalibrateCamera(const LinkModel& model, CameraId id,
                                           std::span<const MarkerObservation> rest,
                                           const CalibrationOptions& options = {});
 
-/// Both cameras, from the labelled markers of a rest pair; checked by triangulating it. Errors as above.
+/// Both cameras, from the labelled markers of a rest pair: each alone first, then both and the markers'
+/// places within the mould's tolerance in one bundle adjustment. Errors as above, and a skin that is touched.
 Result<CalibrationSummary> CalibrateFromRest(const LinkModel& model, const LabelledMarkers& rest,
                                              const CalibrationOptions& options = {});
 
-/// Calibration files (YAML, `taclink_calibration: 1`), for links of that model only. Errors: kNotFound,
-/// kInvalidArgument (file, line, what was expected).
+/// Calibration files (YAML, `taclink_calibration: 2`; 1 is read too), for links of that model only. Errors:
+/// kNotFound, kInvalidArgument (file, line, what was expected).
 Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model);
 /// Replaces the file as a whole. Errors: kUnavailable.
 Result<void> SaveCalibration(const std::string& path, const std::string& model_name,

@@ -19,14 +19,27 @@ constexpr const char* Name(CameraId id) {
   return id == CameraId::kTop ? "top" : "bottom";
 }
 
-/// Fisheye lens as a pinhole behind the division distortion model, (4.3) and (4.41):
-///   r_pinhole = f tan(theta) = r / (1 + k1 r^2 + k2 r^4),
-/// theta the angle off the optical axis, r the distance in the picture from the principal point.
+/// How a lens maps the angle theta off its axis to the distance r in the picture from the principal point.
+enum class LensKind : int {
+  /// A pinhole behind the division distortion model, (4.3) and (4.41):
+  ///   r_pinhole = f tan(theta) = r / (1 + k1 r^2 + k2 r^4).
+  kDivision = 0,
+  /// Kannala and Brandt's fisheye, in OpenCV's form: r = f theta (1 + k1 theta^2 + ... + k4 theta^8).
+  kKannalaBrandt = 1,
+};
+inline constexpr std::array<const char*, 2> kLensNames = {"division", "kannala_brandt"};
+constexpr const char* Name(LensKind kind) {
+  return kLensNames[static_cast<size_t>(kind)];
+}
+
+/// A lens that is round about its axis, on square pixels.
 struct LensModel {
-  double focal_px = 1;
+  double focal_px = 1;  ///< dr/dtheta on the axis, of either kind
   Vec2 principal_point_px = Vec2::Zero();
-  double k1_per_px2 = 0;
+  double k1_per_px2 = 0;  ///< of the division model
   double k2_per_px4 = 0;
+  LensKind kind = LensKind::kDivision;
+  std::array<double, 4> fisheye_k = {};  ///< of Kannala and Brandt's: k1 ... k4
 };
 
 /// A camera in its place. Camera frame: x right and y down in the picture as the camera sends it, z forward.

@@ -1,5 +1,6 @@
 #include "sensing/model/model_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <span>
@@ -148,8 +149,14 @@ CameraModel ReadCamera(YamlMap map, CameraId id) {
   camera.lens.focal_px = map.Number("focal_px", kPositive);
   const auto center = map.Numbers("principal_point_px", 2);
   camera.lens.principal_point_px = Vec2(center[0], center[1]);
-  camera.lens.k1_per_px2 = map.Number("k1_per_px2", 0.0);
-  camera.lens.k2_per_px4 = map.Number("k2_per_px4", 0.0);
+  camera.lens.kind = static_cast<LensKind>(map.Choice("lens", {kLensNames.begin(), kLensNames.end()}, 0));
+  if (camera.lens.kind == LensKind::kKannalaBrandt) {
+    const auto k = map.Numbers("fisheye_k", 4);
+    std::copy(k.begin(), k.end(), camera.lens.fisheye_k.begin());
+  } else {
+    camera.lens.k1_per_px2 = map.Number("k1_per_px2", 0.0);
+    camera.lens.k2_per_px4 = map.Number("k2_per_px4", 0.0);
+  }
   const auto p = map.Numbers("position_mm", 3);
   // Rotation vector in the camera's frame, on top of the designed orientation.
   Vec3 r = Vec3::Zero();
@@ -171,12 +178,18 @@ std::string CameraText(const CameraModel& camera, CameraId id, const std::string
   std::ostringstream out;
   out.precision(12);
   out << indent << "image_size_px: [" << camera.width_px << ", " << camera.height_px << "]\n"
+      << indent << "lens: " << Name(camera.lens.kind) << "\n"
       << indent << "focal_px: " << camera.lens.focal_px << "\n"
       << indent << "principal_point_px: [" << camera.lens.principal_point_px.x() << ", "
-      << camera.lens.principal_point_px.y() << "]\n"
-      << indent << "k1_per_px2: " << camera.lens.k1_per_px2 << "\n"
-      << indent << "k2_per_px4: " << camera.lens.k2_per_px4 << "\n"
-      << indent << "position_mm: [" << p.x() << ", " << p.y() << ", " << p.z() << "]\n"
+      << camera.lens.principal_point_px.y() << "]\n";
+  if (camera.lens.kind == LensKind::kKannalaBrandt) {
+    const auto& k = camera.lens.fisheye_k;
+    out << indent << "fisheye_k: [" << k[0] << ", " << k[1] << ", " << k[2] << ", " << k[3] << "]\n";
+  } else {
+    out << indent << "k1_per_px2: " << camera.lens.k1_per_px2 << "\n"
+        << indent << "k2_per_px4: " << camera.lens.k2_per_px4 << "\n";
+  }
+  out << indent << "position_mm: [" << p.x() << ", " << p.y() << ", " << p.z() << "]\n"
       << indent << "rotation_deg: [" << r.x() << ", " << r.y() << ", " << r.z() << "]\n";
   return out.str();
 }

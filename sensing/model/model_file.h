@@ -22,8 +22,9 @@ std::vector<std::string> ShippedModelNames();
 /// A shipped model's file, to copy and change. Empty: no such model.
 std::string_view ShippedModelText(const std::string& name);
 
-/// One camera as it stands in model and calibration files (keys: focal_px, principal_point_px, k1_per_px2,
-/// k2_per_px4, position_mm, rotation_deg, image_size_px).
+/// One camera as it stands in model and calibration files. Keys: image_size_px, lens (division, the default,
+/// or kannala_brandt), focal_px, principal_point_px, k1_per_px2 and k2_per_px4 (division) or fisheye_k (four
+/// numbers), position_mm, rotation_deg.
 CameraModel ReadCamera(YamlMap map, CameraId id);
 std::string CameraText(const CameraModel& camera, CameraId id, const std::string& indent);
 

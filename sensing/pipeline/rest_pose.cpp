@@ -5,6 +5,7 @@
 #include <string>
 
 #include "sensing/markers/rest_labels.h"
+#include "sensing/pipeline/rest_match.h"
 
 namespace taclink {
 namespace {
@@ -68,12 +69,25 @@ Result<void> RestPose::Begin(const std::array<Detections, kCameraCount>& detecti
     tracker_->Label(detections, labels_);
     return {};
   }
-  auto labels = LabelRestPair(model_, detections);
-  if (!labels) return labels.error();
-  labels_ = std::move(*labels);
-  const auto first = CalibrateFromRest(model_, labels_);
-  if (!first) return first.error();
-  tracker_.emplace(model_, first->rig);
+  StereoRig found;
+  std::array<RestMatch, kCameraCount> matches;
+  for (const CameraId id : kBothCameras) {
+    const auto labels = LabelRestPicture(model_, id, detections[Index(id)]);
+    if (!labels) return labels.error();
+    auto settled = SettleCamera(model_, id, *labels, detections[Index(id)], true);
+    if (!settled) {
+      return Error{ErrorCode::kInvalidArgument, std::string("no camera explains the ") + Name(id) +
+                                                    " camera's rest picture; check the link model and that "
+                                                    "nothing touches the skin"};
+    }
+    found[id] = settled->camera;
+    labels_.cameras[Index(id)] = settled->match.markers;
+    matches[Index(id)] = std::move(settled->match);
+  }
+  if (const std::string trouble = GridTrouble(model_, matches); !trouble.empty())
+    return Error{ErrorCode::kInvalidArgument,
+                 trouble + ": it is not this link's model, or something touches the skin"};
+  tracker_.emplace(model_, found);
   return {};
 }
 
@@ -127,7 +141,7 @@ Result<bool> RestPose::Finish() {
                  "the skin moved while its rest shape was taken; do not touch it"};
   }
   if (rig_) {
-    calibration_ = CalibrationSummary{.rig = *rig_};
+    calibration_.emplace().rig = *rig_;
     return true;
   }
   auto calibrated = CalibrateFromRest(model_, mean_);

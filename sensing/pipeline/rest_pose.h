@@ -43,10 +43,10 @@ class RestPose {
   const LinkModel model_;
   const std::optional<StereoRig> rig_;
   const int frames_;
-
-  std::optional<PathTracker> tracker_;  // from the first pair on
-  LabelledMarkers labels_;              // of the newest pair
   int taken_ = 0;
+
+  std::optional<PathTracker> tracker_;                     // from the first pair on
+  LabelledMarkers labels_;                                 // of the newest pair
   LabelledMarkers mean_;                                   // sums until complete
   std::array<std::vector<double>, kCameraCount> squares_;  // sums of the squared positions
   std::array<std::vector<int>, kCameraCount> counts_;      // how often each marker was seen

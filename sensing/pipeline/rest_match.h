@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sensing/core/link_model.h"
+#include "sensing/core/markers.h"
+
+namespace taclink {
+
+/// Labels of one rest picture by where a camera that is nearly known should see each marker.
+struct RestMatch {
+  std::vector<MarkerObservation> markers;  ///< by marker index
+  int unexplained = 0;                     ///< whole spots that are no marker's
+};
+
+/// A spot is a marker's if each is the other's nearest and the spot is closer than a third of the way to the
+/// marker's nearest neighbour in the picture. What is left is matched alike, up to that neighbour.
+RestMatch MatchRestPicture(const LinkModel& model, const CameraModel& camera, const Detections& detections,
+                           bool domes);
+
+/// The camera that a rest picture shows, and the labels by it. Fits the camera to labels and the labels to
+/// the camera, by turns, until they stay: a tilted or shifted camera sees no even star, so that the first
+/// labels may be partly wrong, or all wrong by one ring, which is tried too. None: no camera fits.
+struct SettledCamera {
+  CameraModel camera;
+  RestMatch match;
+};
+std::optional<SettledCamera> SettleCamera(const LinkModel& model, CameraId id,
+                                          std::span<const MarkerObservation> labels,
+                                          const Detections& detections, bool domes);
+
+/// Why the model's grid is not what the pictures show: rings or paths that no picture shows, or spots where
+/// the model has none. Empty: it is.
+std::string GridTrouble(const LinkModel& model, const std::array<RestMatch, kCameraCount>& matches);
+
+}  // namespace taclink
