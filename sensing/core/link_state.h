@@ -8,6 +8,7 @@
 #include "sensing/core/contact.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/skin_shape.h"
+#include "sensing/core/tracking_report.h"
 
 namespace taclink {
 
@@ -22,14 +23,14 @@ enum class LinkStatus : uint8_t {
 /// How long each stage of a frame took, ms; 0: did not run.
 struct StageTimes {
   double decode = 0;
-  double detect = 0;
-  double register_ = 0;  ///< detections to labels
+  double detect = 0;     ///< the pictures are read: markers followed in their windows, or spots found in all
+  double register_ = 0;  ///< labels: checked, or found anew; with a search of the full pictures after a loss
   double reconstruct = 0;
   double force = 0;  ///< forces and contacts
 };
 
 struct CameraCounts {
-  int detections = 0;
+  int detections = 0;  ///< spots in the full picture; while tracked, those of labelled markers
   int labelled = 0;
 };
 
@@ -42,6 +43,7 @@ struct LinkState {
   std::optional<double> pressure_mpa;
 
   std::array<CameraCounts, kCameraCount> cameras;
+  TrackingReport tracking;
   SkinShape shape;     ///< empty while nothing is measured
   NodalForces forces;  ///< empty while nothing is measured
   std::vector<Contact> contacts;

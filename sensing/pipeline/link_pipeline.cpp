@@ -8,6 +8,7 @@
 
 #include "sensing/capture/decode.h"
 #include "sensing/markers/detector.h"
+#include "sensing/markers/marker_tracker.h"
 #include "sensing/markers/path_tracker.h"
 #include "sensing/pipeline/rest_pose.h"
 #include "sensing/shape/reconstructor.h"
@@ -18,6 +19,8 @@ namespace {
 // Below these fractions of seen markers a link is called degraded, or lost.
 constexpr double kDegradedFraction = 0.7;
 constexpr double kLostFraction = 0.4;
+// Markers are followed across a gap of so many frames.
+constexpr uint64_t kMaxStep = 3;
 
 void SetStatus(LinkState& state, LinkStatus status, std::string reason) {
   state.status = status;
@@ -63,12 +66,17 @@ struct LinkPipeline::Stages {
   std::array<Detections, kCameraCount> detections;
   RestPose rest;
   // Made when the rest pose is known.
-  std::optional<PathTracker> tracker;
+  std::optional<PathTracker> acquirer;
+  std::optional<MarkerTracker> tracker;
   std::optional<ShapeReconstructor> reconstructor;
   int64_t baseline_ns = 0;
   double baseline_pressure_mpa = 0;
 
-  LabelledMarkers labels;
+  MarkerTracker::Pictures pictures;              // of the frame in work; empty where there is none
+  AcquireReason reason = AcquireReason::kFirst;  // of the frame in work
+  uint64_t sequence = 0;                         // of the frame before
+  LabelledMarkers acquired, labels;
+  std::vector<Vec3> predicted_mm;  // the shape of the last frame that had one
   LinearForceEstimator estimator;
   ContactFinder finder;
 
@@ -106,7 +114,27 @@ struct LinkPipeline::Stages {
       detections[i].clear();
       if (has_picture[i]) detector.Detect(gray[i], detections[i]);
       state.cameras[i].detections = static_cast<int>(detections[i].size());
+      state.tracking.cameras[i].share_read = has_picture[i] ? 1 : 0;
     }
+  }
+
+  // Before the first look at a frame; a loss shows later.
+  AcquireReason ReasonToAcquire(uint64_t next) const {
+    if (!tracker) return AcquireReason::kFirst;
+    if (options.always_acquire) return AcquireReason::kForced;
+    if (next < sequence || next > sequence + kMaxStep) return AcquireReason::kGap;
+    return tracker->WantsAcquire();
+  }
+
+  // Follows the markers in their windows, or finds the spots of the full pictures.
+  void Find(uint64_t next, LinkState& state) {
+    state.tracking = {};
+    reason = ReasonToAcquire(next);
+    sequence = next;
+    for (size_t i = 0; i < kCameraCount; ++i) pictures[i] = has_picture[i] ? gray[i] : cv::Mat();
+    if (reason == AcquireReason::kNone) return tracker->Follow(pictures, predicted_mm, state.tracking);
+    if (tracker) tracker->Forget();
+    Detect(state);
   }
 
   // A pair before the baseline is known.
@@ -117,7 +145,8 @@ struct LinkPipeline::Stages {
     if (!complete) return SetStatus(state, LinkStatus::kCalibrating, complete.error().message);
     SetStatus(state, LinkStatus::kCalibrating, "taking the rest shape; do not touch the skin");
     if (!*complete) return;
-    tracker.emplace(model, rest.calibration()->rig);
+    acquirer.emplace(model, rest.calibration()->rig);
+    tracker.emplace(model, rest.calibration()->rig, options.tracking);
     ShapeOptions shape_options;
     double& sigma_px = shape_options.cameras.camera_sigma_px;
     sigma_px = std::max(sigma_px, rest.noise_px());
@@ -145,11 +174,25 @@ struct LinkPipeline::Stages {
     }
   }
 
-  void Register(LinkState& state) {
-    tracker->Label(detections, labels);
-    for (size_t i = 0; i < kCameraCount; ++i) {
-      state.cameras[i].labelled = 0;
-      for (const auto& marker : labels.cameras[i]) state.cameras[i].labelled += marker.seen ? 1 : 0;
+  // Checks the labels of the markers followed; where that fails, finds them anew, in the same frame.
+  void Label(LinkState& state) {
+    TrackingReport& report = state.tracking;
+    report.mode = TrackingMode::kTracked;
+    if (reason == AcquireReason::kNone) {
+      tracker->Check(labels, report);
+      reason = tracker->WantsAcquire();
+      if (reason != AcquireReason::kNone) Detect(state);
+    }
+    if (reason != AcquireReason::kNone) {
+      report.mode = TrackingMode::kAcquired;
+      report.reason = reason;
+      acquirer->Label(detections, acquired);
+      tracker->Adopt(pictures, acquired, labels, report);
+    }
+    for (const CameraId id : kBothCameras) {
+      CameraCounts& counts = state.cameras[Index(id)];
+      counts.labelled = tracker->seen(id);
+      if (reason == AcquireReason::kNone) counts.detections = counts.labelled;
     }
   }
 };
@@ -161,7 +204,9 @@ LinkPipeline::LinkPipeline(LinkPipeline&&) noexcept = default;
 
 void LinkPipeline::Restart() {
   stages_->rest.Restart();
+  stages_->acquirer.reset();
   stages_->tracker.reset();
+  stages_->predicted_mm.clear();
   stages_->reconstructor.reset();
   stages_->finder = ContactFinder(stages_->model, stages_->options.contact);
 }
@@ -190,15 +235,16 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
     stage_ms = s.MsSince(start);
   };
   timed(state.stage_ms.decode, [&] { s.Decode(frame); });
-  timed(state.stage_ms.detect, [&] { s.Detect(state); });
+  timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });
   if (!s.reconstructor) {
     s.TakeRest(pressure_mpa, state);
     return;
   }
-  timed(state.stage_ms.register_, [&] { s.Register(state); });
+  timed(state.stage_ms.register_, [&] { s.Label(state); });
   state.times.tracked_ns = s.clock.MonotonicNs();
   timed(state.stage_ms.reconstruct,
         [&] { s.reconstructor->Reconstruct(s.labels, pressure_mpa, state.shape); });
+  s.predicted_mm = state.shape.positions_mm;
   timed(state.stage_ms.force, [&] {
     const double pressure_change_mpa = pressure_mpa - s.baseline_pressure_mpa;
     s.estimator.Estimate(state.shape, pressure_change_mpa, state.forces);

@@ -12,6 +12,7 @@
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
 #include "sensing/force/linear_estimator.h"
+#include "sensing/markers/marker_tracker.h"
 
 namespace taclink {
 
@@ -22,6 +23,9 @@ struct PipelineOptions {
   double pressure_mpa = 0;
   /// The baseline is the mean of so many rest pairs. They must be untouched.
   int rest_frames = 8;
+  /// Search the full pictures in every frame instead of following the markers.
+  bool always_acquire = false;
+  MarkerTrackerOptions tracking;
   LinearEstimatorOptions force;
   ContactOptions contact;
 };

@@ -13,7 +13,9 @@ namespace taclink {
 /// Labels of one rest picture by where a camera that is nearly known should see each marker.
 struct RestMatch {
   std::vector<MarkerObservation> markers;  ///< by marker index
-  int unexplained = 0;                     ///< whole spots that are no marker's
+  /// Of the whole spots that are no marker's, the most that lie equally far from the principal point: dirt
+  /// lies anywhere, a ring that the model does not have all around.
+  int unexplained = 0;
 };
 
 /// A spot is a marker's if each is the other's nearest and the spot is closer than a third of the way to the

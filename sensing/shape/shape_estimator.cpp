@@ -11,6 +11,8 @@ constexpr int kMaxSteps = 5, kMaxReadmissions = 2, kMaxOpenings = 4;
 constexpr double kOpenedKept = 0.7;  // of the slack that opened, to the next frame
 constexpr double kLonely = 40;       // an outlier's chi^2 against that per number around it
 constexpr double kConvergedMm = 0.01;
+constexpr double kMostOpenedMm2 =
+    400;  // slack as good as unlimited; more would only grow from frame to frame
 
 }  // namespace
 
@@ -114,7 +116,8 @@ bool ShapeEstimator::OpenSlack() {
     if (one.numbers == 0) continue;
     const double misfit = Neighbourhood(m, true);
     if (misfit <= options_.misfit_allowed) continue;
-    opened_mm2_[static_cast<size_t>(m)] += (misfit - 1) * 3 / one.information.trace();
+    double& opened_mm2 = opened_mm2_[static_cast<size_t>(m)];
+    opened_mm2 = std::min(kMostOpenedMm2, opened_mm2 + (misfit - 1) * 3 / one.information.trace());
     opened = true;
   }
   return opened;

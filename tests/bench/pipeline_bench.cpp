@@ -10,6 +10,7 @@
 #include "sensing/contact/contact_finder.h"
 #include "sensing/force/linear_estimator.h"
 #include "sensing/markers/detector.h"
+#include "sensing/markers/marker_tracker.h"
 #include "sensing/markers/path_tracker.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/link_pipeline.h"
@@ -117,6 +118,54 @@ void Register(benchmark::State& state) {
   for (auto _ : state) s.tracker.Label(s.detections, s.labels);
 }
 
+// Frames that follow one another: nothing moves, or a dent of 8 mm comes, slides at 30 mm/s and goes.
+void Track(benchmark::State& state, bool moving) {
+  Bench& bench = For(state);
+  Scene scene = bench.scene;
+  scene.contacts.clear();
+  if (moving) {
+    SceneContact contact;
+    contact.at = {.angle_rad = 1, .z_mm = 60};
+    contact.move_to = SkinPlace{.angle_rad = 1.3, .z_mm = 130};
+    contact.patch_diameter_mm = 12;
+    contact.depth_mm = 8;
+    contact.begin_s = 0.2, contact.end_s = 2.6, contact.ramp_s = 0.4;
+    scene.contacts.push_back(contact);
+  }
+  const auto skin = SimulatedSkin::Make(bench.model, scene).value();
+  LinkPipeline pipeline = bench.CalibratedPipeline();
+  MarkerDetector detector;
+  PathTracker acquirer(bench.model, pipeline.calibration()->rig);
+  MarkerTracker tracker(bench.model, pipeline.calibration()->rig);
+  std::vector<MarkerTracker::Pictures> frames;
+  for (int k = 0; k < 84; ++k) {
+    MarkerTracker::Pictures pictures;
+    skin->Evaluate(k / 30.0, bench.truth);
+    for (const CameraId id : kBothCameras) bench.renderer.Render(bench.truth, id, pictures[Index(id)]);
+    frames.push_back(pictures);
+  }
+  std::array<Detections, kCameraCount> detections;
+  LabelledMarkers acquired, labels;
+  TrackingReport report;
+  for (size_t i = 0; i < kCameraCount; ++i) detector.Detect(frames[0][i], detections[i]);
+  acquirer.Label(detections, acquired);
+  tracker.Adopt(frames[0], acquired, labels, report);
+  double share = 0, measured = 0, count = 0;
+  size_t next = 0;
+  for (auto _ : state) {
+    tracker.Follow(frames[next], {}, report);
+    tracker.Check(labels, report);
+    next = (next + 1) % frames.size();
+    count += kCameraCount;
+    for (const CameraTracking& camera : report.cameras) {
+      share += camera.share_read;
+      measured += camera.measured;
+    }
+  }
+  state.counters["share_read"] = share / count;
+  state.counters["measured"] = measured / count;
+}
+
 void Reconstruct(benchmark::State& state) {
   Stages s(For(state));
   for (auto _ : state) s.reconstructor.Reconstruct(s.labels, 0, s.shape);
@@ -158,6 +207,8 @@ void BothModels(benchmark::internal::Benchmark* benchmark) {
 BENCHMARK(Decode)->Apply(BothModels);
 BENCHMARK(Detect)->Apply(BothModels);
 BENCHMARK(Register)->Apply(BothModels);
+BENCHMARK_CAPTURE(Track, rest, false)->Apply(BothModels);
+BENCHMARK_CAPTURE(Track, moving, true)->Apply(BothModels);
 BENCHMARK(Reconstruct)->Apply(BothModels);
 BENCHMARK(ForceAndContacts)->Apply(BothModels);
 BENCHMARK_CAPTURE(Whole, rest, &Bench::rest)->Apply(BothModels);
