@@ -181,6 +181,27 @@ Result<Arm> Client::GetArm(milliseconds timeout) {
   return FromMessage(response.arm());
 }
 
+Result<CalibrationResult> Client::Calibrate(const CalibrateOptions& options,
+                                            const CalibrateProgress& progress, milliseconds timeout) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + timeout);
+  const auto reader = connection_->stub->Calibrate(&context, ToMessage(options));
+  v1::CalibrateResponse response;
+  std::optional<CalibrationResult> result;
+  bool cancelled = false;
+  while (reader->Read(&response)) {
+    if (response.has_result()) result = FromMessage(response.result());
+    if (!response.has_progress() || !progress || cancelled) continue;
+    const auto& counts = response.progress();
+    cancelled = !progress(static_cast<int>(counts.pairs_taken()), static_cast<int>(counts.pairs_wanted()));
+    if (cancelled) context.TryCancel();
+  }
+  const grpc::Status status = reader->Finish();
+  if (!status.ok()) return FromStatus(status, connection_->address);
+  if (!result) return Error{ErrorCode::kInternal, "the server ended the calibration without a result"};
+  return *std::move(result);
+}
+
 Result<std::unique_ptr<FrameReader>> Client::StreamFrames(const StreamOptions& options,
                                                           milliseconds timeout) {
   auto call = std::make_unique<FrameReader::Call>();

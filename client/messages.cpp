@@ -189,6 +189,9 @@ Frame FromMessage(const v1::LinkFrame& message) {
   frame.force_model =
       message.force_model() == v1::FORCE_MODEL_LINEAR ? ForceModel::kLinear : ForceModel::kUnknown;
   frame.baseline_age_s = message.baseline_age_s();
+  frame.tracked = message.tracking_mode() == v1::TRACKING_MODE_TRACKED;
+  for (const auto& camera : message.cameras())
+    frame.picture_share += static_cast<double>(camera.share_read()) / message.cameras_size();
   const v1::StageTimes& stages = message.stage_times();
   frame.stage_times = {.decode_s = stages.decode_s(),
                        .detect_s = stages.detect_s(),
@@ -224,6 +227,25 @@ v1::StreamFramesRequest ToMessage(const StreamOptions& options) {
   request.set_max_rate_hz(options.max_rate_hz);
   request.set_delivery(options.delivery == Delivery::kEvery ? v1::DELIVERY_EVERY : v1::DELIVERY_LATEST);
   return request;
+}
+
+CalibrationResult FromMessage(const v1::CalibrationResult& message) {
+  return {.markers_used = static_cast<int>(message.markers_used()),
+          .rms_px = message.rms_px(),
+          .rmse_r_m = message.rmse_r_m(),
+          .rmse_tangential_m = message.rmse_tangential_m(),
+          .rmse_z_m = message.rmse_z_m(),
+          .file_text = message.file_text(),
+          .saved_to = message.saved_to()};
+}
+
+v1::CalibrateRequest ToMessage(const CalibrateOptions& options) {
+  v1::CalibrateRequest message;
+  message.set_link(options.link);
+  message.set_pairs(static_cast<uint32_t>(options.pairs));
+  message.set_save(options.save);
+  message.set_force(options.force);
+  return message;
 }
 
 }  // namespace taclink::client

@@ -11,7 +11,7 @@ Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, C
     const size_t link = links_.size();
     links_.push_back(std::move(parts.description));
     workers_.push_back(std::make_unique<LinkWorker>(link, links_.back().name, std::move(parts.source),
-                                                    std::move(parts.process), hub_, clock, options));
+                                                    std::move(parts.processor), hub_, clock, options));
   }
 }
 

@@ -26,7 +26,7 @@ struct LinkDescription {
 struct LinkParts {
   LinkDescription description;
   std::unique_ptr<FrameSource> source;
-  FrameProcessor process;
+  std::unique_ptr<LinkProcessor> processor;
 };
 
 /// All links of an arm, running, and the hub that hands out what they feel.
@@ -40,6 +40,7 @@ class Arm {
 
   const std::string& name() const { return name_; }
   const std::vector<LinkDescription>& links() const { return links_; }
+  LinkWorker& worker(size_t link) { return *workers_[link]; }
   const LinkWorker& worker(size_t link) const { return *workers_[link]; }
   Hub& hub() { return hub_; }
   const Hub& hub() const { return hub_; }

@@ -16,10 +16,13 @@ void ResetTo(LinkState& state, LinkStatus status, std::string reason) {
   state.status_reason = std::move(reason);
   state.pressure_mpa.reset();
   state.cameras = {};
+  state.tracking = {};
   state.shape.positions_mm.clear();
   state.shape.displacements_mm.clear();
   state.shape.covariances_mm2.clear();
   state.shape.sources.clear();
+  state.shape.measured.clear();
+  state.shape.rejected.clear();
   state.forces.forces_n.clear();
   state.forces.sigmas_n.clear();
   state.forces.residual = 0;
@@ -33,14 +36,15 @@ void ResetTo(LinkState& state, LinkStatus status, std::string reason) {
 }  // namespace
 
 LinkWorker::LinkWorker(size_t link, std::string name, std::unique_ptr<FrameSource> source,
-                       FrameProcessor process, Hub& hub, Clock& clock, LinkWorkerOptions options)
+                       std::unique_ptr<LinkProcessor> processor, Hub& hub, Clock& clock,
+                       LinkWorkerOptions options)
     : link_(link),
       name_(std::move(name)),
-      process_(std::move(process)),
       hub_(hub),
       clock_(clock),
       options_(options),
-      supervisor_(name_, std::move(source), clock, options.supervisor) {}
+      supervisor_(name_, std::move(source), clock, options.supervisor),
+      processor_(std::move(processor)) {}
 
 LinkWorker::~LinkWorker() {
   Stop();
@@ -72,18 +76,71 @@ void LinkWorker::Capture(const std::stop_token& stop) {
 void LinkWorker::Solve(const std::stop_token& stop) {
   StereoFrame frame;
   while (!stop.stop_requested()) {
-    if (mailbox_.Take(frame, options_.poll)) {
+    const bool any = mailbox_.Take(frame, options_.poll);
+    TakeCalibrationOrder();
+    if (any) {
       SolveOne(frame);
+      TellCalibration();
     } else {
       PublishStatusIfDue();
+      if (job_ && clock_.MonotonicNs() - job_frame_ns_ >
+                      std::chrono::nanoseconds(options_.calibration_patience).count())
+        EndCalibrationWithout({ErrorCode::kUnavailable, "no pictures come from the link's cameras"});
     }
   }
+  TakeCalibrationOrder();
+  if (job_) EndCalibrationWithout({ErrorCode::kUnavailable, "server is shutting down"});
+}
+
+Result<void> LinkWorker::Calibrate(const CalibrationOrder& order, CalibrationObserver observer) {
+  const std::lock_guard lock(calibration_mutex_);
+  if (calibrating_)
+    return Error{ErrorCode::kFailedPrecondition, "a calibration of link '" + name_ + "' is under way"};
+  calibrating_ = true;
+  ordered_ = CalibrationJob{order, std::move(observer)};
+  return {};
+}
+
+void LinkWorker::TakeCalibrationOrder() {
+  {
+    const std::lock_guard lock(calibration_mutex_);
+    if (!ordered_) return;
+    job_ = std::exchange(ordered_, std::nullopt);
+  }
+  job_frame_ns_ = clock_.MonotonicNs();
+  const auto begun = processor_->BeginCalibration(job_->order);
+  if (!begun) EndCalibrationWithout(begun.error());
+}
+
+void LinkWorker::TellCalibration() {
+  if (!job_) return;
+  job_frame_ns_ = clock_.MonotonicNs();
+  const CalibrationProgress progress = processor_->PollCalibration();
+  const bool go_on = job_->observer(progress);
+  if (go_on && !progress.end) return;
+  if (!progress.end) processor_->CancelCalibration();
+  spdlog::info("link {}: calibration {}", name_,
+               !progress.end   ? "cancelled"
+               : *progress.end ? "done"
+                               : progress.end->error().message);
+  job_.reset();
+  const std::lock_guard lock(calibration_mutex_);
+  calibrating_ = false;
+}
+
+void LinkWorker::EndCalibrationWithout(const Error& error) {
+  processor_->CancelCalibration();
+  job_->observer({.end = error});
+  spdlog::info("link {}: calibration: {}", name_, error.message);
+  job_.reset();
+  const std::lock_guard lock(calibration_mutex_);
+  calibrating_ = false;
 }
 
 void LinkWorker::SolveOne(const StereoFrame& frame) {
   auto state = pool_.Acquire();
   try {
-    process_(frame, *state);
+    processor_->Process(frame, *state);
     failing_ = false;
   } catch (const std::exception& e) {
     if (!failing_)

@@ -154,4 +154,24 @@ void Fill(const LinkModel& model, v1::LinkModel& out) {
   }
 }
 
+// Both are numbered alike.
+static_assert(static_cast<int>(TrackingMode::kTracked) == v1::TRACKING_MODE_TRACKED);
+static_assert(static_cast<int>(AcquireReason::kForced) == v1::ACQUIRE_REASON_FORCED);
+
+v1::TrackingMode ToWire(TrackingMode mode) {
+  return static_cast<v1::TrackingMode>(mode);
+}
+
+TrackingMode FromWire(v1::TrackingMode mode) {
+  return v1::TrackingMode_IsValid(mode) ? static_cast<TrackingMode>(mode) : TrackingMode::kNone;
+}
+
+v1::AcquireReason ToWire(AcquireReason reason) {
+  return static_cast<v1::AcquireReason>(reason);
+}
+
+AcquireReason FromWire(v1::AcquireReason reason) {
+  return v1::AcquireReason_IsValid(reason) ? static_cast<AcquireReason>(reason) : AcquireReason::kNone;
+}
+
 }  // namespace taclink::wire

@@ -13,6 +13,10 @@ namespace taclink::wire {
 
 v1::Detail ToWire(Detail detail);
 v1::LinkStatus ToWire(LinkStatus status);
+v1::TrackingMode ToWire(TrackingMode mode);
+TrackingMode FromWire(v1::TrackingMode mode);
+v1::AcquireReason ToWire(AcquireReason reason);
+AcquireReason FromWire(v1::AcquireReason reason);
 v1::ForceModel ToWire(ForceModel model);
 v1::MarkerSource ToWire(MarkerSource source);
 

@@ -143,6 +143,27 @@ bool LengthsFit(const v1::LinkFrame& frame) {
          Fits(frame.nodal_force_sigmas_n_size(), 1, markers) && Fits(frame.marker_sources_size(), 1, markers);
 }
 
+void FillCamera(const CameraCounts& counts, const CameraTracking& tracking, v1::CameraCounts& out) {
+  out.set_detections(static_cast<uint32_t>(counts.detections));
+  out.set_labelled(static_cast<uint32_t>(counts.labelled));
+  out.set_share_read(static_cast<float>(tracking.share_read));
+  out.set_verified(static_cast<uint32_t>(tracking.verified));
+  out.set_measured(static_cast<uint32_t>(tracking.measured));
+  out.set_searched(static_cast<uint32_t>(tracking.searched));
+  out.set_found(static_cast<uint32_t>(tracking.found));
+  out.set_dropped(static_cast<uint32_t>(tracking.dropped));
+}
+
+void ReadCamera(const v1::CameraCounts& camera, CameraCounts& counts, CameraTracking& tracking) {
+  counts = {static_cast<int>(camera.detections()), static_cast<int>(camera.labelled())};
+  tracking = {.share_read = camera.share_read(),
+              .verified = static_cast<int>(camera.verified()),
+              .measured = static_cast<int>(camera.measured()),
+              .searched = static_cast<int>(camera.searched()),
+              .found = static_cast<int>(camera.found()),
+              .dropped = static_cast<int>(camera.dropped())};
+}
+
 }  // namespace
 
 void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFrame& out) {
@@ -162,11 +183,11 @@ void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFra
   out.set_force_model(ToWire(state.forces.model));
   out.set_baseline_age_s(state.baseline_age_s);
   FillStageTimes(state.stage_ms, *out.mutable_stage_times());
-  for (const CameraCounts& counts : state.cameras) {
-    auto& camera = *out.add_cameras();
-    camera.set_detections(static_cast<uint32_t>(counts.detections));
-    camera.set_labelled(static_cast<uint32_t>(counts.labelled));
-  }
+  for (size_t i = 0; i < kCameraCount; ++i)
+    FillCamera(state.cameras[i], state.tracking.cameras[i], *out.add_cameras());
+  out.set_tracking_mode(ToWire(state.tracking.mode));
+  out.set_acquire_reason(ToWire(state.tracking.reason));
+  out.set_labels_rejected(static_cast<uint32_t>(state.shape.rejected.size()));
   if (detail >= Detail::kGeometry)
     FillVectors(state.shape.positions_mm, kMetresPerMm, *out.mutable_positions_m());
   if (detail >= Detail::kFull) FillFull(state, out);
@@ -208,9 +229,10 @@ Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
   state.baseline_age_s = frame.baseline_age_s();
   state.stage_ms = StageTimesFrom(frame.stage_times());
   for (size_t i = 0; i < kCameraCount && static_cast<int>(i) < frame.cameras_size(); ++i) {
-    const auto& camera = frame.cameras(static_cast<int>(i));
-    state.cameras[i] = {static_cast<int>(camera.detections()), static_cast<int>(camera.labelled())};
+    ReadCamera(frame.cameras(static_cast<int>(i)), state.cameras[i], state.tracking.cameras[i]);
   }
+  state.tracking.mode = FromWire(frame.tracking_mode());
+  state.tracking.reason = FromWire(frame.acquire_reason());
   state.shape.positions_mm = VectorsFrom(frame.positions_m(), 1 / kMetresPerMm);
   ReadFull(frame, state);
   return decoded;

@@ -42,7 +42,9 @@ Json NeesJson(const VisionScore& score) {
 
 Json ScoreJson(const VisionScore& score) {
   const auto mean = [&](double squares) {
-    return score.split_count == 0 ? 0 : std::sqrt(std::max(0.0, squares) / static_cast<double>(score.split_count));
+    return score.split_count == 0
+               ? 0
+               : std::sqrt(std::max(0.0, squares) / static_cast<double>(score.split_count));
   };
   const auto errors = [](const std::array<ErrorSums, 3>& by_cameras) {
     return Json{{"both", ErrorsJson(by_cameras[2])},

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "client/command/calibrate_link.h"
 #include "client/command/calibrate_picture.h"
 #include "client/command/commands.h"
 #include "client/command/json.h"
@@ -23,6 +24,7 @@ struct CalibrateOptions {
   std::string residuals;
   double mould_tolerance_mm = BuildTolerance{}.marker_mm;
   bool json = false;
+  LinkCalibration live;  // instead, if it names a link
 };
 
 // Names and units of what a CameraStep holds, for people.
@@ -162,6 +164,14 @@ Result<std::vector<RestPictures>> ReadPairs(const std::vector<std::string>& path
 }
 
 Result<void> Calibrate(const CalibrateOptions& options) {
+  if (!options.live.options.link.empty()) {
+    LinkCalibration live = options.live;
+    live.out = options.out;
+    live.json = options.json;
+    return CalibrateLink(live);
+  }
+  if (options.model.empty() || options.rest.empty() || options.out.empty())
+    return Error{ErrorCode::kInvalidArgument, "give --model, --rest and --out, or the --link of a server"};
   const auto model = LoadLinkModel(options.model);
   if (!model) return model.error();
   const auto pairs = ReadPairs(options.rest);
@@ -193,19 +203,33 @@ Result<void> Calibrate(const CalibrateOptions& options) {
 
 void AddCalibrate(CLI::App& app, Selected& selected) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App* command =
-      app.add_subcommand("calibrate", "Camera parameters from pictures of the untouched skin");
-  command->add_option("--model", options->model, "Link model: a shipped name or a YAML file")->required();
+  CLI::App* command = app.add_subcommand(
+      "calibrate",
+      "Camera parameters from pictures of the untouched skin, or of a server's link as it is now");
+  command->add_option("--model", options->model, "Link model: a shipped name or a YAML file");
   command
       ->add_option(
           "--rest", options->rest,
           "TOP and BOTTOM picture of the untouched, unpressurised skin; again for more pairs, which are "
           "averaged")
-      ->required()
       ->expected(2, 2 * 1000);
   command->add_option("--lens", options->lens, "Lens model to fit; without, the link model's")
       ->check(CLI::IsMember({"division", "kannala_brandt"}));
-  command->add_option("-o,--out", options->out, "Calibration file to write (YAML)")->required();
+  command->add_option("-o,--out", options->out, "Calibration file to write (YAML)");
+  CLI::Option* link =
+      command->add_option("--link", options->live.options.link,
+                          "Instead of pictures: a link of a running server, which then uses the result");
+  AddServerOption(*command, options->live.server);
+  command->add_option("--pairs", options->live.options.pairs, "Rest pairs that the server takes")
+      ->check(Within(1, 300))
+      ->capture_default_str()
+      ->needs(link);
+  command
+      ->add_flag("--save", options->live.options.save,
+                 "The server writes the link's configured calibration file")
+      ->needs(link);
+  command->add_flag("--force", options->live.options.force, "Even while the link shows contacts")
+      ->needs(link);
   command->add_option("--residuals", options->residuals,
                       "Picture of the residuals to write (PNG); without, beside the calibration file");
   command

@@ -34,6 +34,8 @@ std::string FrameJson(const client::Frame& frame) {
                {"pressure_kpa", frame.pressure_pa ? Json(*frame.pressure_pa * kKpaPerPascal) : Json(nullptr)},
                {"force_model", client::Name(frame.force_model)},
                {"markers", {{"seen", frame.markers_seen}, {"inferred", frame.markers_inferred}}},
+               {"tracked", frame.tracked},
+               {"picture_share", frame.picture_share},
                {"contacts", std::move(contacts)},
                {"total_force_n", frame.total_force_n}};
   if (!frame.positions_m.empty()) json["positions_mm"] = ToJson(frame.positions_m, kMmPerMetre);

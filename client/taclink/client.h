@@ -3,6 +3,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -128,6 +129,8 @@ struct Frame {
   ForceModel force_model = ForceModel::kUnknown;
   double baseline_age_s = 0;
   StageTimes stage_times;
+  bool tracked = false;      ///< markers were followed; else the full pictures were searched
+  double picture_share = 0;  ///< part of both pictures' pixels that were read
 
   // kGeometry
   std::vector<Vector3> positions_m;
@@ -161,6 +164,25 @@ struct StreamCounts {
   uint64_t frames_sent = 0;
   uint64_t frames_dropped = 0;  ///< because this client was too slow
 };
+
+struct CalibrateOptions {
+  std::string link;
+  int pairs = 8;       ///< rest pairs to average over
+  bool save = false;   ///< also write the link's configured calibration file on the server
+  bool force = false;  ///< even if the newest frame shows contacts
+};
+
+/// How well a link's cameras fit its rest markers. RMS.
+struct CalibrationResult {
+  int markers_used = 0;  ///< seen by both cameras
+  double rms_px = 0;     ///< of the reprojection, each axis
+  double rmse_r_m = 0, rmse_tangential_m = 0, rmse_z_m = 0;
+  std::string file_text;  ///< of the calibration file (YAML)
+  std::string saved_to;   ///< on the server; empty: nowhere
+};
+
+/// Pairs taken so far, and wanted. False: cancel.
+using CalibrateProgress = std::function<bool(int taken, int wanted)>;
 
 /// A running stream; ends when destroyed. Next from one thread, Cancel from any.
 class FrameReader {
@@ -203,6 +225,12 @@ class Client {
   /// kResourceExhausted, kUnavailable.
   Result<std::unique_ptr<FrameReader>> StreamFrames(
       const StreamOptions& options, std::chrono::milliseconds timeout = std::chrono::seconds(10));
+
+  /// Finds the link's cameras and rest shape anew; nothing may touch the skin. Waits for the end. Errors:
+  /// kNotFound, kFailedPrecondition (touched, moved, does not fit: the message says), kUnavailable,
+  /// kEndOfData (cancelled); then the link stays as it was.
+  Result<CalibrationResult> Calibrate(const CalibrateOptions& options, const CalibrateProgress& progress = {},
+                                      std::chrono::milliseconds timeout = std::chrono::seconds(60));
 
  private:
   struct Connection;

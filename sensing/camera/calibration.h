@@ -91,6 +91,8 @@ Result<CalibrationSummary> CalibrateFromRest(const LinkModel& model, const Label
 /// Calibration files (YAML, `taclink_calibration: 2`; 1 is read too), for links of that model only. Errors:
 /// kNotFound, kInvalidArgument (file, line, what was expected).
 Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model);
+/// The file's text.
+std::string CalibrationText(const std::string& model_name, const CalibrationSummary& summary);
 /// Replaces the file as a whole. Errors: kUnavailable.
 Result<void> SaveCalibration(const std::string& path, const std::string& model_name,
                              const CalibrationSummary& summary);

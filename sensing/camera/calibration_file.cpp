@@ -77,10 +77,8 @@ Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& mode
   return rig;
 }
 
-Result<void> SaveCalibration(const std::string& path, const std::string& model_name,
-                             const CalibrationSummary& summary) {
-  const std::string part = path + ".part";
-  std::ofstream out(part, std::ios::trunc);
+std::string CalibrationText(const std::string& model_name, const CalibrationSummary& summary) {
+  std::ostringstream out;
   out << "taclink_calibration: " << kFormatVersion << "\nmodel: " << model_name
       << "\nmarkers_used: " << summary.markers_used << "\nquality:  # rest markers against the model"
       << "\n  pairs: " << summary.pairs << "\n  rms_px: " << summary.rms_px
@@ -95,6 +93,14 @@ Result<void> SaveCalibration(const std::string& path, const std::string& model_n
       out << "  " << Name(id) << ":\n" << SigmasText(summary.cameras[Index(id)], "    ");
     }
   }
+  return out.str();
+}
+
+Result<void> SaveCalibration(const std::string& path, const std::string& model_name,
+                             const CalibrationSummary& summary) {
+  const std::string part = path + ".part";
+  std::ofstream out(part, std::ios::trunc);
+  out << CalibrationText(model_name, summary);
   out.close();
   std::error_code error;
   if (out) std::filesystem::rename(part, path, error);

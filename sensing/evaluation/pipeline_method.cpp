@@ -24,14 +24,21 @@ LinkModel HalfResolution(LinkModel model) {
   return model;
 }
 
+PipelineOptions OptionsOf(PipelineVariant variant) {
+  PipelineOptions options;
+  options.always_acquire = variant == PipelineVariant::kAcquiring;
+  return options;
+}
+
 class PipelineMethod final : public VisionMethod {
  public:
   PipelineMethod(const LinkModel& model, PipelineVariant variant)
       : variant_(variant),
-        pipeline_(variant == PipelineVariant::kHalf ? HalfResolution(model) : model, {}, ThreadCpuClock()) {}
+        pipeline_(variant == PipelineVariant::kHalf ? HalfResolution(model) : model, OptionsOf(variant),
+                  ThreadCpuClock()) {}
 
   void Process(const StereoFrame& frame, VisionResult& result) override {
-    if (variant_ == PipelineVariant::kWhole) {
+    if (variant_ == PipelineVariant::kWhole || variant_ == PipelineVariant::kAcquiring) {
       pipeline_.Process(frame, state_);
     } else {
       Reduce(frame);

@@ -9,7 +9,8 @@ namespace taclink {
 
 /// The product, or a variant of it that works less.
 enum class PipelineVariant {
-  kWhole,      ///< as it runs
+  kWhole,      ///< as it runs: markers are followed in small windows
+  kAcquiring,  ///< the full pictures are searched in every frame
   kHalf,       ///< pictures and cameras of half the resolution; making them is not counted
   kOneCamera,  ///< the bottom camera fails once the rest shape is known
 };

@@ -10,6 +10,7 @@ const std::vector<VisionMethodKind>& VisionMethodKinds() {
   };
   static const std::vector<VisionMethodKind> kinds = {
       {"tracked", "ours as it runs", pipeline(PipelineVariant::kWhole)},
+      {"acquiring", "ours, the full pictures searched in every frame", pipeline(PipelineVariant::kAcquiring)},
       {"half", "ours, pictures of half the width and height", pipeline(PipelineVariant::kHalf)},
       {"one-camera", "ours, the bottom camera fails after the rest frames",
        pipeline(PipelineVariant::kOneCamera)},

@@ -59,6 +59,8 @@ class MarkerTracker {
   /// If the frame was followed too, the better of both results is kept, without labels in which they differ.
   void Adopt(const Pictures& gray, const LabelledMarkers& acquired, LabelledMarkers& labels,
              TrackingReport& report);
+  /// A label that later stages don't believe: it is looked for anew, where the prediction has it.
+  void Reject(CameraId id, int marker) { Drop(cameras_[Index(id)].tracks[static_cast<size_t>(marker)]); }
   /// Nothing is known of where the markers are.
   void Forget();
 

@@ -51,9 +51,10 @@ struct LinkPipeline::Stages {
       : model(link_model),
         options(pipeline_options),
         clock(pipeline_clock),
-        rest(link_model, pipeline_options.rig, pipeline_options.rest_frames),
         estimator(link_model, pipeline_options.force),
-        finder(link_model, pipeline_options.contact) {}
+        finder(link_model, pipeline_options.contact) {
+    BeginRest(options.rig, options.rest_frames);
+  }
 
   const LinkModel model;
   const PipelineOptions options;
@@ -64,8 +65,10 @@ struct LinkPipeline::Stages {
   std::array<bool, kCameraCount> has_picture{};
   MarkerDetector detector;
   std::array<Detections, kCameraCount> detections;
-  RestPose rest;
+  std::optional<RestPose> rest;  // while rest pairs are taken
+  RestProgress rest_progress;
   // Made when the rest pose is known.
+  std::optional<CalibrationSummary> calibration;
   std::optional<PathTracker> acquirer;
   std::optional<MarkerTracker> tracker;
   std::optional<ShapeReconstructor> reconstructor;
@@ -86,6 +89,11 @@ struct LinkPipeline::Stages {
     return static_cast<double>(clock.MonotonicNs() - start_ns) * 1e-6;
   }
 
+  const StereoRig& CurrentRig() const {
+    if (calibration) return calibration->rig;
+    return options.rig ? *options.rig : model.nominal_rig;
+  }
+
   void Decode(const StereoFrame& frame) {
     camera_trouble.clear();
     for (const CameraId id : kBothCameras) {
@@ -99,7 +107,7 @@ struct LinkPipeline::Stages {
         camera_trouble = std::string(Name(id)) + " camera: " + decoded.error().message;
         continue;
       }
-      const CameraModel& expected = (rest.calibration() ? rest.calibration()->rig : model.nominal_rig)[id];
+      const CameraModel& expected = CurrentRig()[id];
       has_picture[i] = gray[i].cols == expected.width_px && gray[i].rows == expected.height_px;
       if (!has_picture[i]) {
         camera_trouble = std::string(Name(id)) + " camera: the picture is " + std::to_string(gray[i].cols) +
@@ -120,7 +128,7 @@ struct LinkPipeline::Stages {
 
   // Before the first look at a frame; a loss shows later.
   AcquireReason ReasonToAcquire(uint64_t next) const {
-    if (!tracker) return AcquireReason::kFirst;
+    if (!tracker || rest) return AcquireReason::kFirst;
     if (options.always_acquire) return AcquireReason::kForced;
     if (next < sequence || next > sequence + kMaxStep) return AcquireReason::kGap;
     return tracker->WantsAcquire();
@@ -137,24 +145,34 @@ struct LinkPipeline::Stages {
     Detect(state);
   }
 
+  void BeginRest(const std::optional<StereoRig>& rig, int pairs) {
+    rest.emplace(model, rig, pairs);
+    rest_progress = {.taken = 0, .wanted = pairs, .refusal = {}};
+  }
+
   // A pair before the baseline is known.
   void TakeRest(double pressure_mpa, LinkState& state) {
     ClearMeasurement(state);
     if (!camera_trouble.empty()) return SetStatus(state, LinkStatus::kCalibrating, camera_trouble);
-    const auto complete = rest.Add(detections);
+    const auto complete = rest->Add(detections);
+    rest_progress.taken = rest->taken();
+    rest_progress.refusal = complete ? std::nullopt : std::optional(complete.error());
     if (!complete) return SetStatus(state, LinkStatus::kCalibrating, complete.error().message);
     SetStatus(state, LinkStatus::kCalibrating, "taking the rest shape; do not touch the skin");
     if (!*complete) return;
-    acquirer.emplace(model, rest.calibration()->rig);
-    tracker.emplace(model, rest.calibration()->rig, options.tracking);
+    calibration = rest->calibration();
+    acquirer.emplace(model, calibration->rig);
+    tracker.emplace(model, calibration->rig, options.tracking);
     ShapeOptions shape_options;
     double& sigma_px = shape_options.cameras.camera_sigma_px;
-    sigma_px = std::max(sigma_px, rest.noise_px());
-    shape_options.cameras.rest_sigma_px = rest.noise_px() / std::sqrt(std::max(1, options.rest_frames));
-    reconstructor.emplace(model, rest.calibration()->rig, shape_options);
-    reconstructor->SetBaseline(rest.markers(), pressure_mpa);
+    sigma_px = std::max(sigma_px, rest->noise_px());
+    shape_options.cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
+    reconstructor.emplace(model, calibration->rig, shape_options);
+    reconstructor->SetBaseline(rest->markers(), pressure_mpa);
     baseline_ns = clock.MonotonicNs();
     baseline_pressure_mpa = pressure_mpa;
+    predicted_mm.clear();
+    rest.reset();
   }
 
   void Judge(LinkState& state) const {
@@ -171,6 +189,17 @@ struct LinkPipeline::Stages {
       SetStatus(state, LinkStatus::kDegraded, "more loads than the force model takes");
     } else {
       SetStatus(state, LinkStatus::kOk, "");
+    }
+  }
+
+  // Labels that contradict the shape are no labels.
+  void TakeBackRejected(LinkState& state) {
+    for (const RejectedMarker& rejected : state.shape.rejected) {
+      const auto i = Index(rejected.camera);
+      labels.cameras[i][static_cast<size_t>(rejected.marker)].seen = false;
+      tracker->Reject(rejected.camera, rejected.marker);
+      ++state.tracking.cameras[i].dropped;
+      --state.cameras[i].labelled;
     }
   }
 
@@ -203,7 +232,8 @@ LinkPipeline::~LinkPipeline() = default;
 LinkPipeline::LinkPipeline(LinkPipeline&&) noexcept = default;
 
 void LinkPipeline::Restart() {
-  stages_->rest.Restart();
+  stages_->BeginRest(stages_->options.rig, stages_->options.rest_frames);
+  stages_->calibration.reset();
   stages_->acquirer.reset();
   stages_->tracker.reset();
   stages_->predicted_mm.clear();
@@ -218,7 +248,17 @@ const LabelledMarkers& LinkPipeline::labels() const {
   return stages_->labels;
 }
 const std::optional<CalibrationSummary>& LinkPipeline::calibration() const {
-  return stages_->rest.calibration();
+  return stages_->calibration;
+}
+
+void LinkPipeline::BeginRest(int pairs) {
+  stages_->BeginRest(std::nullopt, pairs);
+}
+void LinkPipeline::CancelRest() {
+  if (stages_->reconstructor) stages_->rest.reset();
+}
+const RestProgress& LinkPipeline::rest_progress() const {
+  return stages_->rest_progress;
 }
 
 void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
@@ -236,7 +276,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   };
   timed(state.stage_ms.decode, [&] { s.Decode(frame); });
   timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });
-  if (!s.reconstructor) {
+  if (s.rest) {
     s.TakeRest(pressure_mpa, state);
     return;
   }
@@ -244,6 +284,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.times.tracked_ns = s.clock.MonotonicNs();
   timed(state.stage_ms.reconstruct,
         [&] { s.reconstructor->Reconstruct(s.labels, pressure_mpa, state.shape); });
+  s.TakeBackRejected(state);
   s.predicted_mm = state.shape.positions_mm;
   timed(state.stage_ms.force, [&] {
     const double pressure_change_mpa = pressure_mpa - s.baseline_pressure_mpa;

@@ -30,6 +30,12 @@ struct PipelineOptions {
   ContactOptions contact;
 };
 
+/// How the taking of rest pairs goes.
+struct RestProgress {
+  int taken = 0, wanted = 0;
+  std::optional<Error> refusal;  ///< of the newest pair: collecting has started again
+};
+
 /// The whole way from two pictures to contacts, for one link: the list of its stages is `Process`. One
 /// thread.
 class LinkPipeline {
@@ -46,6 +52,13 @@ class LinkPipeline {
   /// Forgets the rest shape and all that followed: the next pairs are taken as rest pictures, as after
   /// construction.
   void Restart();
+
+  /// Takes the next pairs as rest pictures: finds the cameras and the baseline anew. Until they are complete
+  /// nothing is measured (status kCalibrating).
+  void BeginRest(int pairs);
+  /// Gives that up, if it was not complete: goes on as before, where there is a baseline.
+  void CancelRest();
+  const RestProgress& rest_progress() const;
 
   const LinkModel& model() const;
   /// Of the last pair that was measured: which detection is which marker.

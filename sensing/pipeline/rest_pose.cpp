@@ -39,12 +39,6 @@ void RestPose::StartAgain() {
   }
 }
 
-void RestPose::Restart() {
-  StartAgain();
-  calibration_.reset();
-  noise_px_ = 0;
-}
-
 Result<bool> RestPose::Add(const std::array<Detections, kCameraCount>& detections) {
   Result<void> good;
   if (!tracker_) {

@@ -22,9 +22,8 @@ class RestPose {
   /// reason; collecting starts again.
   Result<bool> Add(const std::array<Detections, kCameraCount>& detections);
 
-  /// As after construction.
-  void Restart();
-
+  /// Pairs so far.
+  int taken() const { return taken_; }
   /// Set once complete.
   const std::optional<CalibrationSummary>& calibration() const { return calibration_; }
   /// The mean over the pairs. Valid once complete.

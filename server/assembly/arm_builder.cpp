@@ -15,14 +15,14 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
   if (!model) return model.error();
   auto source = MakeSource(link, *model, clock);
   if (!source) return source.error();
-  auto process = MakeProcessor(link, *model);
-  if (!process) return process.error();
+  auto processor = MakeProcessor(link, *model);
+  if (!processor) return processor.error();
   return LinkParts{.description = {.name = link.name,
                                    .model = std::move(*model),
                                    .base_from_link = link.BaseFromLink(),
                                    .source = static_cast<SourceKind>(link.source.index())},
                    .source = std::move(*source),
-                   .process = std::move(*process)};
+                   .processor = std::move(*processor)};
 }
 
 }  // namespace

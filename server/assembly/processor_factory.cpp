@@ -1,6 +1,6 @@
 #include "server/assembly/processor_factory.h"
 
-#include <memory>
+#include <utility>
 
 #include "sensing/camera/calibration.h"
 #include "sensing/pipeline/link_pipeline.h"
@@ -10,9 +10,69 @@ namespace {
 
 constexpr double kMpaPerKpa = 1e-3;
 
+/// Frames through a LinkPipeline, which a calibration gives new cameras and a new rest shape.
+class PipelineProcessor final : public LinkProcessor {
+ public:
+  PipelineProcessor(const LinkModel& model, const PipelineOptions& options, std::optional<std::string> file)
+      : pipeline_(model, options), file_(std::move(file)) {}
+
+  void Process(const StereoFrame& frame, LinkState& state) override {
+    pipeline_.Process(frame, state);
+    touched_ = !state.contacts.empty();
+  }
+
+  Result<void> BeginCalibration(const CalibrationOrder& order) override {
+    if (touched_ && !order.force)
+      return Error{ErrorCode::kFailedPrecondition, "the skin is touched; let go of it, or ask with force"};
+    if (order.save && !file_)
+      return Error{ErrorCode::kFailedPrecondition,
+                   "no file to save to: the link's configuration has no 'calibration'"};
+    save_ = order.save;
+    pipeline_.BeginRest(order.pairs);
+    return {};
+  }
+
+  CalibrationProgress PollCalibration() override {
+    const RestProgress& rest = pipeline_.rest_progress();
+    CalibrationProgress progress{.taken = rest.taken, .wanted = rest.wanted, .end = {}};
+    if (rest.refusal) {
+      pipeline_.CancelRest();
+      progress.end = Error{ErrorCode::kFailedPrecondition, rest.refusal->message};
+    } else if (rest.taken == rest.wanted) {
+      progress.end = Finish();
+    }
+    return progress;
+  }
+
+  void CancelCalibration() override { pipeline_.CancelRest(); }
+
+ private:
+  Result<CalibrationResult> Finish() const {
+    const CalibrationSummary& found = *pipeline_.calibration();
+    CalibrationResult result{.markers_used = found.markers_used,
+                             .rms_px = found.rms_px,
+                             .rmse_r_mm = found.rmse_r_mm,
+                             .rmse_tangential_mm = found.rmse_phi_r_mm,
+                             .rmse_z_mm = found.rmse_z_mm,
+                             .file_text = CalibrationText(pipeline_.model().name, found),
+                             .saved_to = {}};
+    if (save_) {
+      const auto saved = SaveCalibration(*file_, pipeline_.model().name, found);
+      if (!saved) return saved.error();
+      result.saved_to = *file_;
+    }
+    return result;
+  }
+
+  LinkPipeline pipeline_;
+  const std::optional<std::string> file_;
+  bool touched_ = false;  // in the newest frame
+  bool save_ = false;
+};
+
 }  // namespace
 
-Result<FrameProcessor> MakeProcessor(const LinkConfig& link, const LinkModel& model) {
+Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model) {
   PipelineOptions options;
   if (link.pressure_kpa) options.pressure_mpa = *link.pressure_kpa * kMpaPerKpa;
   if (link.calibration) {
@@ -20,9 +80,8 @@ Result<FrameProcessor> MakeProcessor(const LinkConfig& link, const LinkModel& mo
     if (!rig) return rig.error();
     options.rig = *rig;
   }
-  auto pipeline = std::make_shared<LinkPipeline>(model, options);
-  return FrameProcessor(
-      [pipeline](const StereoFrame& frame, LinkState& state) { pipeline->Process(frame, state); });
+  return std::unique_ptr<LinkProcessor>(
+      std::make_unique<PipelineProcessor>(model, options, link.calibration));
 }
 
 }  // namespace taclink::server

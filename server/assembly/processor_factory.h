@@ -1,12 +1,14 @@
 #pragma once
 
+#include <memory>
+
 #include "sensing/core/link_model.h"
 #include "server/config.h"
-#include "server/link_worker.h"
+#include "server/link_processor.h"
 
 namespace taclink::server {
 
 /// The link's pipeline, ready for its first frame. Errors: a calibration file that can't be read.
-Result<FrameProcessor> MakeProcessor(const LinkConfig& link, const LinkModel& model);
+Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model);
 
 }  // namespace taclink::server

@@ -13,6 +13,8 @@
 namespace taclink::server {
 namespace {
 
+constexpr uint32_t kDefaultPairs = 8, kMaxPairs = 300;
+
 using StreamReactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
 
 /// A call that is refused before it began.
@@ -37,8 +39,20 @@ Error Invalid(std::string message) {
 
 TactileService::TactileService(Arm& arm, ServiceLimits limits,
                                std::shared_ptr<boost::asio::thread_pool> senders)
-    : arm_(arm), limits_(limits), senders_(std::move(senders)), registry_(limits.max_streams) {
+    : arm_(arm),
+      limits_(limits),
+      senders_(std::move(senders)),
+      registry_(limits.max_streams),
+      calibrations_(arm.links().size()) {
   for (const LinkDescription& link : arm.links()) link_names_.push_back(link.name);
+}
+
+void TactileService::EndStreams(const std::string& reason) {
+  registry_.Close(reason);
+  const std::lock_guard lock(calibrations_mutex_);
+  for (const auto& calibration : calibrations_) {
+    if (const auto stream = calibration.lock()) stream->Refuse({ErrorCode::kUnavailable, reason});
+  }
 }
 
 grpc::ServerUnaryReactor* TactileService::GetArm(grpc::CallbackServerContext* context,
@@ -68,18 +82,48 @@ StreamReactor* TactileService::StreamFrames(grpc::CallbackServerContext* context
   return stream.get();  // the registry holds it until gRPC is done
 }
 
+grpc::ServerWriteReactor<v1::CalibrateResponse>* TactileService::Calibrate(
+    grpc::CallbackServerContext* context, const v1::CalibrateRequest* request) {
+  const auto stream = CalibrateStream::Make();
+  const uint32_t pairs = request->pairs() == 0 ? kDefaultPairs : request->pairs();
+  const auto link = FindLink(request->link());
+  Result<void> ordered;
+  if (!link) {
+    ordered = link.error();
+  } else if (pairs > kMaxPairs) {
+    ordered = Invalid("pairs must be 1 to " + std::to_string(kMaxPairs) + ", or 0 for " +
+                      std::to_string(kDefaultPairs));
+  } else {
+    ordered = arm_.worker(*link).Calibrate(
+        {.pairs = static_cast<int>(pairs), .save = request->save(), .force = request->force()},
+        [stream](const CalibrationProgress& progress) { return stream->Tell(progress); });
+  }
+  if (!ordered) {
+    spdlog::info("{}: Calibrate refused: {}", context->peer(), ordered.error().message);
+    stream->Refuse(ordered.error());
+  } else {
+    const std::lock_guard lock(calibrations_mutex_);
+    calibrations_[*link] = stream;
+  }
+  return stream.get();  // holds itself until gRPC is done
+}
+
+Result<size_t> TactileService::FindLink(const std::string& name) const {
+  const auto at = std::find(link_names_.begin(), link_names_.end(), name);
+  if (at != link_names_.end()) return static_cast<size_t>(at - link_names_.begin());
+  std::string known;
+  for (const auto& link : link_names_) known += (known.empty() ? "" : ", ") + link;
+  return Error{ErrorCode::kNotFound, "no link '" + name + "'; this arm has " + known};
+}
+
 Result<std::vector<bool>> TactileService::FindLinks(const v1::StreamFramesRequest& request) const {
   std::vector<bool> wanted;
   if (request.links().empty()) return wanted;
   wanted.assign(link_names_.size(), false);
   for (const std::string& name : request.links()) {
-    const auto at = std::find(link_names_.begin(), link_names_.end(), name);
-    if (at == link_names_.end()) {
-      std::string known;
-      for (const auto& link : link_names_) known += (known.empty() ? "" : ", ") + link;
-      return Error{ErrorCode::kNotFound, "no link '" + name + "'; this arm has " + known};
-    }
-    wanted[static_cast<size_t>(at - link_names_.begin())] = true;
+    const auto link = FindLink(name);
+    if (!link) return link.error();
+    wanted[*link] = true;
   }
   return wanted;
 }

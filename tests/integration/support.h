@@ -94,10 +94,10 @@ class TestServer {
                         .base_from_link = {Mat3::Identity(), Vec3(0, 0, 250.0 * static_cast<double>(link))},
                         .source = SourceKind::kSimulated},
         .source = std::make_unique<FakeSource>(scripts_.back()),
-        .process = [link](const StereoFrame& frame, LinkState& state) {
+        .processor = std::make_unique<FakeProcessor>([link](const StereoFrame& frame, LinkState& state) {
           FillTestState(link, frame.sequence, state);
           state.times = frame.times;
-        }};
+        })};
   }
 
   ManualClock clock_;

@@ -48,9 +48,10 @@ void Copy(const StereoFrame& frame, LinkState& state) {
 
 class LinkWorkerTest : public testing::Test {
  protected:
-  void Run(FrameProcessor process) {
+  void Run(FakeProcessor::Function process, std::optional<Error> calibration_refusal = {}) {
+    auto processor = std::make_unique<FakeProcessor>(std::move(process), std::move(calibration_refusal));
     worker_ =
-        std::make_unique<LinkWorker>(0, "arm", std::make_unique<FakeSource>(script_), std::move(process),
+        std::make_unique<LinkWorker>(0, "arm", std::make_unique<FakeSource>(script_), std::move(processor),
                                      hub_, clock_, LinkWorkerOptions{.poll = milliseconds(5)});
     worker_->Start();
   }
@@ -182,6 +183,90 @@ TEST_F(LinkWorkerTest, StopsWhileTheSourceIsLost) {
   ASSERT_NE(NextStatus(LinkStatus::kLost), nullptr);
   worker_->Stop();
   worker_->Stop();
+}
+
+/// What a calibration told, in order.
+struct CalibrationLog {
+  CalibrationObserver Observer(int cancel_at = -1) {
+    return [this, cancel_at](const CalibrationProgress& progress) {
+      const std::lock_guard lock(mutex);
+      told.push_back(progress);
+      changed.notify_all();
+      return progress.end || progress.taken != cancel_at;
+    };
+  }
+  CalibrationProgress Wait(size_t count) {
+    std::unique_lock lock(mutex);
+    EXPECT_TRUE(changed.wait_for(lock, kForever, [&] { return told.size() >= count; }));
+    return told[count - 1];
+  }
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<CalibrationProgress> told;
+};
+
+TEST_F(LinkWorkerTest, CalibrationTellsItsProgressAndItsEnd) {
+  Run(Copy);
+  CalibrationLog log;
+  ASSERT_TRUE(worker_->Calibrate({.pairs = 3}, log.Observer()).ok());
+  EXPECT_EQ(worker_->Calibrate({}, log.Observer()).error().code, ErrorCode::kFailedPrecondition);
+  for (size_t i = 1; i <= 3; ++i) {
+    script_->Push(i);
+    const CalibrationProgress progress = log.Wait(i);
+    EXPECT_EQ(progress.taken, static_cast<int>(i));
+    EXPECT_EQ(progress.wanted, 3);
+    ASSERT_EQ(progress.end.has_value(), i == 3);
+  }
+  EXPECT_EQ((*log.told.back().end)->markers_used, 200);
+  script_->Push(4);
+  ASSERT_EQ(NextFrame()->state().status, LinkStatus::kOk);
+}
+
+TEST_F(LinkWorkerTest, ACancelledCalibrationMakesRoomForTheNext) {
+  Run(Copy);
+  CalibrationLog log, second;
+  ASSERT_TRUE(worker_->Calibrate({.pairs = 100}, log.Observer(2)).ok());
+  for (uint64_t i = 1; i <= 2; ++i) {
+    script_->Push(i);
+    log.Wait(i);
+  }
+  while (!worker_->Calibrate({.pairs = 1}, second.Observer())) std::this_thread::yield();
+  script_->Push(3);
+  EXPECT_TRUE(second.Wait(1).end.has_value());
+  EXPECT_EQ(log.told.size(), 2u);
+}
+
+TEST_F(LinkWorkerTest, CalibrationWithoutPicturesEnds) {
+  Run(Copy);
+  CalibrationLog log;
+  ASSERT_TRUE(worker_->Calibrate({}, log.Observer()).ok());
+  std::thread time([&] {
+    while (true) {
+      const std::lock_guard lock(log.mutex);
+      if (!log.told.empty()) return;
+      clock_.Advance(std::chrono::seconds(1));
+    }
+  });
+  const auto end = log.Wait(1).end;
+  time.join();
+  ASSERT_TRUE(end.has_value());
+  EXPECT_EQ(end->error().code, ErrorCode::kUnavailable);
+}
+
+TEST_F(LinkWorkerTest, CalibrationMayBeRefused) {
+  Run(Copy, Error{ErrorCode::kFailedPrecondition, "touched"});
+  CalibrationLog log;
+  ASSERT_TRUE(worker_->Calibrate({}, log.Observer()).ok());
+  EXPECT_EQ(log.Wait(1).end->error().message, "touched");
+}
+
+TEST_F(LinkWorkerTest, StoppingEndsACalibration) {
+  Run(Copy);
+  CalibrationLog log;
+  ASSERT_TRUE(worker_->Calibrate({}, log.Observer()).ok());
+  worker_->Stop();
+  EXPECT_EQ(log.Wait(1).end->error().code, ErrorCode::kUnavailable);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "sensing/core/clock.h"
 #include "sensing/core/link_state.h"
 #include "server/hub.h"
+#include "server/link_processor.h"
 
 namespace taclink::server {
 
@@ -133,6 +134,41 @@ class FakeSource final : public FrameSource {
 
  private:
   const std::shared_ptr<SourceScript> script_;
+};
+
+/// Processes with a function, and calibrates as the test says.
+class FakeProcessor final : public LinkProcessor {
+ public:
+  using Function = std::function<void(const StereoFrame&, LinkState&)>;
+  explicit FakeProcessor(Function process, std::optional<Error> refusal = {})
+      : process_(std::move(process)), refusal_(std::move(refusal)) {}
+
+  void Process(const StereoFrame& frame, LinkState& state) override {
+    if (calibrating_) ++taken_;
+    process_(frame, state);
+  }
+  Result<void> BeginCalibration(const CalibrationOrder& order) override {
+    if (refusal_) return *refusal_;
+    wanted_ = order.pairs;
+    taken_ = 0;
+    calibrating_ = true;
+    return {};
+  }
+  CalibrationProgress PollCalibration() override {
+    CalibrationProgress progress{.taken = taken_, .wanted = wanted_, .end = {}};
+    if (taken_ < wanted_) return progress;
+    calibrating_ = false;
+    progress.end =
+        CalibrationResult{.markers_used = 200, .rms_px = 0.25, .rmse_r_mm = 0.5, .file_text = "text"};
+    return progress;
+  }
+  void CancelCalibration() override { calibrating_ = false; }
+
+ private:
+  const Function process_;
+  const std::optional<Error> refusal_;
+  bool calibrating_ = false;
+  int taken_ = 0, wanted_ = 0;
 };
 
 /// Takes a subscription's states one by one, waiting for them.

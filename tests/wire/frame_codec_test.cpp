@@ -28,6 +28,9 @@ LinkState MakeState(int markers) {
   state.status_reason = "bottom camera lost; check its cable";
   state.pressure_mpa = 0.002;
   state.cameras = {{{240, 230}, {239, 228}}};
+  state.tracking = {.mode = TrackingMode::kTracked,
+                    .reason = AcquireReason::kLoss,
+                    .cameras = {{{0.25, 1, 2, 3, 4, 5}, {0.5, 6, 7, 8, 9, 10}}}};
   for (int i = 0; i < markers; ++i) {
     state.shape.positions_mm.push_back(Random3(random, 100));
     state.shape.displacements_mm.push_back(Random3(random, 5));
@@ -81,6 +84,14 @@ TEST(FrameCodec, FullComesBack) {
   EXPECT_EQ(back.status_reason, state.status_reason);
   EXPECT_DOUBLE_EQ(back.pressure_mpa.value(), 0.002);
   EXPECT_EQ(back.cameras[1].labelled, 228);
+  EXPECT_EQ(back.tracking.mode, TrackingMode::kTracked);
+  EXPECT_EQ(back.tracking.reason, AcquireReason::kLoss);
+  EXPECT_EQ(back.tracking.cameras[0].share_read, 0.25);
+  EXPECT_EQ(back.tracking.cameras[0].dropped, 5);
+  EXPECT_EQ(back.tracking.cameras[1].verified, 6);
+  EXPECT_EQ(back.tracking.cameras[1].measured, 7);
+  EXPECT_EQ(back.tracking.cameras[1].searched, 8);
+  EXPECT_EQ(back.tracking.cameras[1].found, 9);
   ExpectNear(back.shape.positions_mm, state.shape.positions_mm, 1e-4);
   ExpectNear(back.shape.displacements_mm, state.shape.displacements_mm, 1e-5);
   ExpectNear(back.forces.forces_n, state.forces.forces_n, 1e-6);

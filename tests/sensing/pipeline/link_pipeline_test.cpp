@@ -61,6 +61,39 @@ TEST_F(LinkPipelineTest, CalibratesThenMeasures) {
   EXPECT_GE(state_.times.solved_ns, state_.times.tracked_ns);
 }
 
+TEST_F(LinkPipelineTest, RestIsTakenAgainOnDemand) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  pipeline.BeginRest(3);
+  for (int k = 1; k <= 3; ++k) {
+    EXPECT_EQ(pipeline.rest_progress().taken, k - 1);
+    pipeline.Process(Frame(k / 30.0), state_);
+    EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+    EXPECT_FALSE(state_.measured());
+  }
+  EXPECT_EQ(pipeline.rest_progress().taken, 3);
+  EXPECT_FALSE(pipeline.rest_progress().refusal.has_value());
+  pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  EXPECT_EQ(state_.contacts.size(), 1u);
+}
+
+TEST_F(LinkPipelineTest, RestGivenUpLeavesAllAsItWas) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  const double before = pipeline.calibration()->rms_px;
+  pipeline.BeginRest(3);
+  StereoFrame dark = Frame(0.5);
+  for (auto& image : dark.images) std::fill(image.bytes.begin(), image.bytes.end(), uint8_t{16});
+  pipeline.Process(dark, state_);
+  EXPECT_TRUE(pipeline.rest_progress().refusal.has_value());
+  pipeline.CancelRest();
+  pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  EXPECT_EQ(state_.contacts.size(), 1u);
+  EXPECT_EQ(pipeline.calibration()->rms_px, before);
+}
+
 TEST_F(LinkPipelineTest, LostCameraIsDegradedAndSaysWhich) {
   LinkPipeline pipeline(model_, options_);
   TakeRest(pipeline);

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "sensing/core/frame.h"
+#include "sensing/core/link_state.h"
+#include "sensing/core/result.h"
+
+namespace taclink::server {
+
+struct CalibrationOrder {
+  int pairs = 8;       ///< rest pairs to average over
+  bool save = false;   ///< write the configured calibration file
+  bool force = false;  ///< even while touched
+};
+
+/// How well the cameras fit the rest markers. RMS.
+struct CalibrationResult {
+  int markers_used = 0;  ///< seen by both cameras
+  double rms_px = 0;     ///< of the reprojection, each axis
+  double rmse_r_mm = 0, rmse_tangential_mm = 0, rmse_z_mm = 0;
+  std::string file_text = {};  ///< of the calibration file
+  std::string saved_to = {};   ///< empty: nowhere
+};
+
+struct CalibrationProgress {
+  int taken = 0, wanted = 0;  ///< rest pairs
+  /// Set once: the end. An error leaves the link as it was.
+  std::optional<Result<CalibrationResult>> end;
+};
+
+/// What a worker takes a link's frames through. One thread.
+class LinkProcessor {
+ public:
+  virtual ~LinkProcessor() = default;
+
+  /// The whole way; fills all of the state, whose buffers it reuses.
+  virtual void Process(const StereoFrame& frame, LinkState& state) = 0;
+
+  /// Takes the next frames as rest pairs. Errors: kFailedPrecondition (touched; no file to save to).
+  virtual Result<void> BeginCalibration(const CalibrationOrder& order) = 0;
+  /// After each Process since BeginCalibration, until it has told the end.
+  virtual CalibrationProgress PollCalibration() = 0;
+  /// Back to how it was.
+  virtual void CancelCalibration() = 0;
+};
+
+}  // namespace taclink::server
