@@ -38,7 +38,8 @@ TEST(ShapeAllocation, NoneOnceRunning) {
   outlier.cameras[0][50].center_px += Vec2(20, 0);
   reconstructor.Reconstruct(outlier, 0, shape);
   const int before = allocations;
-  for (const LabelledMarkers* labels : {&still, &touched, static_cast<const LabelledMarkers*>(&outlier)}) reconstructor.Reconstruct(*labels, 0, shape);
+  for (const LabelledMarkers* labels : {&still, &touched, static_cast<const LabelledMarkers*>(&outlier)})
+    reconstructor.Reconstruct(*labels, 0, shape);
   EXPECT_GT(before, 0);
   EXPECT_EQ(allocations - before, 0);
 #else
