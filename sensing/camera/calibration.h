@@ -50,8 +50,8 @@ struct CameraCalibration {
   CameraModel camera;
   CameraStep sigmas = CameraStep::Zero();  ///< standard deviations of its parameters (see CameraStep)
   int markers_used = 0;
-  int outliers = 0;                            ///< seen, but left out
-  double rms_px = 0;                           ///< of the reprojection, per axis, over the used ones
+  int outliers = 0;                       ///< seen, but left out
+  double rms_px = 0;                      ///< of the reprojection, per axis, over the used ones
   std::vector<MarkerResidual> residuals;  ///< by marker
 };
 
