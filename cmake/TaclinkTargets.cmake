@@ -8,6 +8,8 @@ add_library(taclink_flags INTERFACE)
 target_compile_options(taclink_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -Werror)
 target_include_directories(taclink_flags INTERFACE "${PROJECT_SOURCE_DIR}")
 if(TACLINK_SANITIZER)
+  # Eigen aligns by hand under a sanitizer, but not in Ceres' library, whose copies of Eigen's functions may be linked.
+  target_compile_definitions(taclink_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
   # GCC warns of uninitialised values that are not there once the sanitizers change the code.
   target_compile_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER} -fno-sanitize-recover=all
                                                  -Wno-maybe-uninitialized)

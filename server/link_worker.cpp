@@ -119,7 +119,7 @@ void LinkWorker::TellCalibration() {
   const bool go_on = job_->observer(progress);
   if (go_on && !progress.end) return;
   if (!progress.end) processor_->CancelCalibration();
-  spdlog::info("link {}: calibration {}", name_,
+  spdlog::info("link {}: calibration: {}", name_,
                !progress.end   ? "cancelled"
                : *progress.end ? "done"
                                : progress.end->error().message);

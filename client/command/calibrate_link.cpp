@@ -39,11 +39,13 @@ void PrintJson(const std::string& link, const client::CalibrationResult& result)
 Result<void> CalibrateLink(const LinkCalibration& calibration) {
   auto connection = client::Client::Connect(calibration.server);
   if (!connection) return connection.error();
-  const auto result = connection->Calibrate(calibration.options, [](int taken, int wanted) {
+  bool told = false;
+  const auto result = connection->Calibrate(calibration.options, [&told](int taken, int wanted) {
+    told = true;
     fmt::print(stderr, "\r{} of {} rest pairs", taken, wanted);
     return true;
   });
-  fmt::print(stderr, "\n");
+  if (told) fmt::print(stderr, "\n");
   if (!result) return result.error();
   if (!calibration.out.empty()) {
     std::ofstream file(calibration.out, std::ios::trunc);

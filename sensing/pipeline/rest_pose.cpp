@@ -144,6 +144,7 @@ Result<bool> RestPose::Finish() {
     return calibrated.error();
   }
   calibration_ = *calibrated;
+  calibration_->pairs = taken_;
   if (variances.empty()) noise_px_ = calibrated->rms_px;
   return true;
 }

@@ -73,6 +73,7 @@ TEST_F(LinkPipelineTest, RestIsTakenAgainOnDemand) {
   }
   EXPECT_EQ(pipeline.rest_progress().taken, 3);
   EXPECT_FALSE(pipeline.rest_progress().refusal.has_value());
+  EXPECT_EQ(pipeline.calibration()->pairs, 3);
   pipeline.Process(Frame(kTouchedS), state_);
   EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
   EXPECT_EQ(state_.contacts.size(), 1u);
