@@ -1,5 +1,8 @@
 #include "server/assembly/processor_factory.h"
 
+#include <spdlog/spdlog.h>
+
+#include <filesystem>
 #include <utility>
 
 #include "sensing/camera/calibration.h"
@@ -9,6 +12,11 @@ namespace taclink::server {
 namespace {
 
 constexpr double kMpaPerKpa = 1e-3;
+
+bool IsMissing(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::status(path, ignored).type() == std::filesystem::file_type::not_found;
+}
 
 /// Frames through a LinkPipeline, which a calibration gives new cameras and a new rest shape.
 class PipelineProcessor final : public LinkProcessor {
@@ -75,7 +83,12 @@ class PipelineProcessor final : public LinkProcessor {
 Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model) {
   PipelineOptions options;
   if (link.pressure_kpa) options.pressure_mpa = *link.pressure_kpa * kMpaPerKpa;
-  if (link.calibration) {
+  if (link.calibration && IsMissing(*link.calibration)) {
+    spdlog::warn(
+        "link {}: {} does not exist yet; the first pictures calibrate the cameras instead. "
+        "'taclink calibrate --link {} --save' writes it",
+        link.name, *link.calibration, link.name);
+  } else if (link.calibration) {
     auto rig = LoadCalibration(*link.calibration, model);
     if (!rig) return rig.error();
     options.rig = *rig;

@@ -3,6 +3,8 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include "sensing/camera/calibration.h"
+#include "sensing/model/model_file.h"
 #include "tests/end_to_end/support.h"
 
 namespace taclink::testing {
@@ -124,6 +126,28 @@ TEST_F(ServerTest, PicturesOfAFolderAreServed) {
   Process watch(Watch({}));
   const json frame = FrameWithContacts(watch, 1);
   EXPECT_EQ(frame.at("link"), "taped");
+}
+
+TEST_F(ServerTest, CalibrationIsSavedAndUsedFromTheNextStartOn) {
+  Write("rest.yaml", "taclink_scene: 1\nname: rest\nmodel: cylinder\nframe_rate_hz: 20\nduration_s: 600\n");
+  const std::string config =
+      "taclink_config: 1\narm:\n  name: test\n  links:\n"
+      "    - {name: a, model: cylinder, source: simulated, scene: rest.yaml, calibration: a_cameras.yaml}\n";
+  StartServer(config);  // the file does not exist yet
+  const Finished saved =
+      Taclink({"calibrate", "--link", "a", "--pairs", "3", "--save", "--server", address_});
+  ASSERT_EQ(saved.exit_code, 0) << saved.err;
+  EXPECT_THAT(saved.out, HasSubstr("a_cameras.yaml"));
+  const auto rig = LoadCalibration(Path("a_cameras.yaml"), LoadLinkModel("cylinder").value());
+  ASSERT_TRUE(rig.ok()) << rig.error().message;
+
+  StartServer(config);
+  Process watch(Watch({}));
+  EXPECT_TRUE(watch.ReadLine(seconds(60)).has_value());
+  Write("a_cameras.yaml", "taclink_calibration: nonsense\n");
+  const Finished refused = RunToEnd({TACLINKD, "--config", Path("arm.yaml"), "--listen", "127.0.0.1:0"});
+  EXPECT_NE(refused.exit_code, 0);
+  EXPECT_THAT(refused.err, HasSubstr("a_cameras.yaml:1"));
 }
 
 TEST_F(ServerTest, MissingCameraIsAStatusAndNoOtherLinkMinds) {
