@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sensing/camera/projection.h"
+#include "sensing/core/median.h"
 
 namespace taclink {
 namespace {
@@ -15,12 +16,6 @@ constexpr size_t kLeastNeighbours = 5;  // of a marker and the 8 around it
 // errors, or is deeper than any.
 constexpr double kStandsOut = 3.5;
 constexpr double kNoMouldMm = 1.4;
-
-double Median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // How far each marker lies further in than the model has it, if it moved along the radius only: least squares
 // over the pictures that show it. None: unseen.

@@ -45,6 +45,9 @@ class LabelCheck {
     return options_.min_apart * views_[Index(id)].sizes_px[static_cast<size_t>(marker)] + 1;
   }
 
+  double middle_z_mm() const {
+    return 0.5 * (views_[0].projector.center_in_link().z() + views_[1].projector.center_in_link().z());
+  }
   const Projector& projector(CameraId id) const { return views_[Index(id)].projector; }
 
  private:

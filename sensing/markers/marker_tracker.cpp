@@ -37,6 +37,9 @@ MarkerTracker::MarkerTracker(const LinkModel& model, const StereoRig& rig, Marke
     PrepareCamera(model, id);
     doubtful_[Index(id)].assign(static_cast<size_t>(count_), 0);
     fresh_[Index(id)].assign(static_cast<size_t>(count_), 0);
+    places_[Index(id)].resize(static_cast<size_t>(count_));
+    place_known_[Index(id)].assign(static_cast<size_t>(count_), 0);
+    labelled_[Index(id)].assign(static_cast<size_t>(count_), 0);
   }
 }
 
@@ -69,6 +72,7 @@ void MarkerTracker::PrepareCamera(const LinkModel& model, CameraId id) {
   for (int i = 0; i < count_; ++i) {
     Track& track = camera.tracks[static_cast<size_t>(i)];
     track.pixel = pixels[static_cast<size_t>(i)].value_or(track.pixel);
+    camera.rest_px.push_back(track.pixel);
   }
   for (int i = 0; i < count_; ++i) {
     double pitch = 40;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,6 +27,15 @@ struct MarkerTrackerOptions {
   /// one camera had taken the next ring's marker for it: one just found again, and one that was followed.
   double max_slip_found = 0.35;
   double max_slip_followed = 0.6;
+  double max_slip_from_rest = 0.75;  ///< the same, off its z at rest
+  /// How far off a marker may be from where it is expected in a picture: this, and that part of what is
+  /// displaced there in the picture, where the other camera sees it and where it does not.
+  double prediction_px = 0.4, prediction_part_seen = 0.1, prediction_part = 0.3;
+  /// On the ray of a camera that sees it: along z, that part of what is displaced there.
+  double prediction_z_part = 0.3, max_prediction_z_mm = 3;
+  /// One that no camera sees may be pushed in further than predicted, and stands for a displacement.
+  double unseen_push_mm = 8, unseen_mm = 4;
+  double found_px = 0.6;  ///< more than all that where a label was just found
   LabelCheckOptions check;
 };
 
@@ -37,7 +47,8 @@ struct MarkerTrackerOptions {
 /// 3. Search. One without a label is looked for where the predicted shape has it, often at first, then less.
 /// 4. Check. Labels that contradict the geometry are dropped: those out of order along their path, two on one
 ///    spot, rays that do not meet on the marker's ring; one that is found again must be where it is
-///    predicted.
+///    predicted. So are labels that the next markers of the path without a label would explain as well, or
+///    share: those are taken to be anywhere on the other camera's ray near their ring, or on the way in.
 ///
 /// A centre means what it means for the detector that gave the labels. Allocates at construction only. One
 /// thread.
@@ -90,6 +101,7 @@ class MarkerTracker {
   struct Camera {
     std::vector<Track> tracks;  // by marker
     std::vector<Size> rest_sizes;
+    std::vector<Vec2> rest_px;
     std::vector<double> scale_px_per_mm, rest_pitch_px, max_spread_px2;
     int seen_before = 0;
     int64_t pixels_read = 0;
@@ -127,10 +139,32 @@ class MarkerTracker {
   static void Drop(Track& track);
   static int CountSeen(const Camera& camera);
 
-  void WriteLabels(LabelledMarkers& labels) const;
+  void WriteLabels(LabelledMarkers& labels);
   void CheckAll(LabelledMarkers& labels, TrackingReport& report);
   void CheckMarker(int marker);
   bool IsAmbiguous(const Camera& camera, int marker) const;
+  struct Place {  // where a marker should be in a picture: between these two, but for the error
+    Vec2 begin = Vec2::Zero(), end = Vec2::Zero();
+    double error_px = 0;
+    bool valid = false;
+  };
+  bool HasLabel(CameraId id, int marker) const {
+    const auto m = static_cast<size_t>(marker);
+    return labelled_[Index(id)][m] != 0 && doubtful_[Index(id)][m] == 0;
+  }
+  double DisplacedPx(CameraId id, int marker) const;
+  Place FindPlace(CameraId id, int marker) const;
+  Place Along(CameraId id, int marker, const Vec3& at, const Vec3& begin, const Vec3& end,
+              double error_px) const;
+  double ZSlackMm(const Camera& camera, int marker, double displaced_px) const;
+  bool IsFar(CameraId id, int rival, const Vec2& pixel, double touching_px) const;
+  const Place& PlaceOf(CameraId id, int marker);
+  bool IsSureOfRay(CameraId id, int marker) const;
+  void DoubtRivalled();
+  int DoubtRivalled(CameraId id, int path);
+  bool MayBeAnother(CameraId id, int marker);
+  void PredictFromLabels();
+  std::optional<Vec3> OnItsRing(int marker) const;
   bool IsOnAnother(CameraId id, int marker) const;
   bool SingleHolds(CameraId id, int marker) const;
   void JudgeLoss();
@@ -145,11 +179,14 @@ class MarkerTracker {
   std::vector<Vec3> rest_mm_;
   std::vector<double> pair_z_mm_;   // where both cameras' rays met when last checked; NaN: not known
   std::vector<Vec3> predicted_mm_;  // of the frame in work
+  std::array<std::vector<Place>, kCameraCount> places_;
+  std::array<std::vector<uint8_t>, kCameraCount> place_known_, labelled_;  // labelled_: before the checks
   std::array<std::vector<uint8_t>, kCameraCount> doubtful_, fresh_;  // by marker; fresh: found in this frame
   double noise2_ = 8;  // running median of the patches' residuals, gray levels squared
   int frame_ = 0, since_acquire_ = 0, retry_frames_ = 8;
   int seen_at_acquire_ = 0;
   bool followed_ = false;
+  bool anew_ = false;  // the labels in check are of a full picture, and what is predicted comes from them
   AcquireReason wants_ = AcquireReason::kFirst;
 };
 

@@ -15,20 +15,18 @@ constexpr int kFewLost = 8;                  // so many at once are no loss
 constexpr double kConflictPx = 2;            // two results for one marker further apart than that
 constexpr double kUnclippedVariance = 0.01;  // px^2, of a spot that was only seen clipped before
 constexpr double kClippedPart = 0.0625;      // variance of a clipped spot over its area; as in MarkerDetector
-constexpr double kRivalPx = 1.5, kRivalPart = 0.4;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr double kMergedPart = 1.5;
-constexpr double kSinglePartOfPitch = 0.3;
 
 }  // namespace
 
-void MarkerTracker::WriteLabels(LabelledMarkers& labels) const {
+void MarkerTracker::WriteLabels(LabelledMarkers& labels) {
   for (size_t c = 0; c < kCameraCount; ++c) {
     labels.cameras[c].resize(static_cast<size_t>(count_));
     for (size_t i = 0; i < labels.cameras[c].size(); ++i) {
       const Track& track = cameras_[c].tracks[i];
       MarkerObservation& label = labels.cameras[c][i];
       label.seen = track.seen;
+      labelled_[c][i] = track.seen ? 1 : 0;
       label.center_px = track.pixel;
       label.covariance_px2 =
           track.clipped ? Mat2(kClippedPart * track.size.area_px2 * Mat2::Identity()) : track.covariance;
@@ -51,6 +49,7 @@ void MarkerTracker::CheckAll(LabelledMarkers& labels, TrackingReport& report) {
     }
   }
   for (int i = 0; i < count_; ++i) CheckMarker(i);
+  DoubtRivalled();
   for (size_t c = 0; c < kCameraCount; ++c) {
     for (size_t i = 0; i < doubtful_[c].size(); ++i) {
       if (doubtful_[c][i] == 0) continue;
@@ -93,6 +92,13 @@ void MarkerTracker::CheckMarker(int marker) {
       const double slip = check_.SlipMm(id, marker, pair.point_mm);
       holds = holds && std::abs(pair.point_mm.z() - expected_z) < part * slip;
     }
+    for (const CameraId id : kBothCameras) {
+      const double slip = check_.SlipMm(id, marker, pair.point_mm);
+      if (std::abs(pair.point_mm.z() - rest_mm_[m].z()) < options_.max_slip_from_rest * slip) continue;
+      doubtful_[Index(id)][m] = 1;
+      pair_z_mm_[m] = kUnknown;
+      return;
+    }
     for (size_t c = 0; c < kCameraCount; ++c) {
       pair_z_mm_[m] = holds ? pair.point_mm.z() : kUnknown;
       if (holds) {
@@ -108,58 +114,6 @@ void MarkerTracker::CheckMarker(int marker) {
     const auto c = Index(id);
     if (sure[c] && fresh_[c][m] != 0 && !SingleHolds(id, marker)) doubtful_[c][m] = 1;
   }
-}
-
-// A spot just found may as well be that of another marker without a label.
-bool MarkerTracker::IsAmbiguous(const Camera& camera, int marker) const {
-  const Track& track = camera.tracks[static_cast<size_t>(marker)];
-  const double own = (track.pixel - track.expected).norm();
-  bool ambiguous = false;
-  const auto look = [&](size_t n) {
-    const Track& other = camera.tracks[n];
-    if (other.seen || !other.projects) return;
-    const double apart = (other.expected - track.expected).norm();
-    ambiguous |= (track.pixel - other.expected).norm() < own + std::max(kRivalPx, kRivalPart * apart);
-  };
-  EachNeighbour(marker, look);
-  for (const int n : {marker - 2 * paths_, marker + 2 * paths_}) {
-    if (n >= 0 && n < count_) look(static_cast<size_t>(n));
-  }
-  return ambiguous;
-}
-
-// The next marker of the path has no label and should be here, so that the spot may be its or that of both:
-// it is nearer to the camera, or was lost in this frame.
-bool MarkerTracker::IsOnAnother(CameraId id, int marker) const {
-  const Camera& camera = cameras_[Index(id)];
-  const Track& track = camera.tracks[static_cast<size_t>(marker)];
-  if (!track.seen) return false;
-  const double apart = check_.LeastDistancePx(id, marker);
-  for (const int step : {-paths_, paths_}) {
-    const int n = marker + step;
-    if (n < 0 || n >= count_) continue;
-    const Track& other = camera.tracks[static_cast<size_t>(n)];
-    if (other.seen || !other.projects) continue;
-    const bool nearer = (step < 0) == (id == CameraId::kTop);
-    const double limit = other.lost_now ? kMergedPart * apart : apart;
-    if ((nearer || other.lost_now) && (other.expected - track.pixel).squaredNorm() < limit * limit)
-      return true;
-  }
-  return false;
-}
-
-// Found again by one camera only: near to where it is predicted, and between neighbours on its path that were
-// never lost, so that no other marker can be there.
-bool MarkerTracker::SingleHolds(CameraId id, int marker) const {
-  const Camera& camera = cameras_[Index(id)];
-  const Track& track = camera.tracks[static_cast<size_t>(marker)];
-  for (const int n : {marker - paths_, marker + paths_}) {
-    if (n < 0 || n >= count_) continue;
-    if (!camera.tracks[static_cast<size_t>(n)].seen || fresh_[Index(id)][static_cast<size_t>(n)] != 0)
-      return false;
-  }
-  const double limit = kSinglePartOfPitch * LocalPitch(camera, marker, track.pixel);
-  return (track.pixel - track.expected).squaredNorm() < limit * limit;
 }
 
 void MarkerTracker::JudgeLoss() {
@@ -190,12 +144,13 @@ void MarkerTracker::JudgeLoss() {
 
 void MarkerTracker::Adopt(const Pictures& gray, const LabelledMarkers& acquired, LabelledMarkers& labels,
                           TrackingReport& report) {
+  // After a loss, what was followed is not trusted.
+  anew_ = !followed_ || wants_ == AcquireReason::kLoss;
   int found = 0, tracked = 0;
   for (size_t c = 0; c < kCameraCount; ++c) {
     Camera& camera = cameras_[c];
-    // After a loss, what was followed is not trusted.
-    if (!followed_ || wants_ == AcquireReason::kLoss) {
-      for (Track& track : camera.tracks) Drop(track);
+    for (Track& track : camera.tracks) {
+      if (anew_) Drop(track);
     }
     tracked += CountSeen(camera);
     for (const MarkerObservation& label : acquired.cameras[c]) found += label.seen ? 1 : 0;
@@ -209,8 +164,10 @@ void MarkerTracker::Adopt(const Pictures& gray, const LabelledMarkers& acquired,
       }
     }
   }
+  if (anew_) PredictFromLabels();
   WriteLabels(labels);
   CheckAll(labels, report);
+  anew_ = false;
   since_acquire_ = 0;
   seen_at_acquire_ = 0;
   for (const Camera& camera : cameras_) seen_at_acquire_ += CountSeen(camera);

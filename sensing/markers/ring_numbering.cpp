@@ -41,6 +41,7 @@ RingNumbering::RingNumbering(const LinkModel& model, RingNumberingOptions option
   bends_mm_.resize(static_cast<size_t>(rings_));
   known_.resize(static_cast<size_t>(rings_));
   doubtful_.resize(static_cast<size_t>(rings_));
+  counted_.resize(static_cast<size_t>(rings_));
 }
 
 RingNumbering::State& RingNumbering::At(int ring, int top, int bottom) {
@@ -118,11 +119,34 @@ double RingNumbering::RivalCost(const Pair& pair, int ring) const {
          std::min(Square((bend - ExpectedBend(ring)) / options_.sigma_rival_mm), options_.max_rival_cost);
 }
 
+// Both cameras' labels slipped by one, in opposite ways, meet at the right z: a dent or a bulge that is none.
+// Where neither's are counted from its end without a gap, the undeformed skin is a rival.
+double RingNumbering::RivalCost(const Pair& pair, int ring, bool counted) const {
+  const double cost = RivalCost(pair, ring);
+  if (counted) return cost;
+  const double bend = pair.radius_mm - ring_radius_mm_[static_cast<size_t>(ring)];
+  return std::min(cost, PairCost(pair, ring) + Square(bend / options_.sigma_rest_mm));
+}
+
+void RingNumbering::Count() {
+  const auto skipped = rings_ - static_cast<int>(chains_[1].size());
+  bool top = true, bottom = true;
+  std::fill(counted_.begin(), counted_.end(), uint8_t{0});
+  for (int j = 0; j < rings_; ++j) {
+    const auto near = static_cast<size_t>(j), far = static_cast<size_t>(rings_ - 1 - j);
+    top = top && labels_[0][near] == j;
+    bottom = bottom && labels_[1][far] + skipped == rings_ - 1 - j;
+    if (top) counted_[near] = 1;
+    if (bottom) counted_[far] = 1;
+  }
+}
+
 // A detection that meets one of the other camera's almost as well on some ring may be that ring's; so may
 // another pair on the same ring.
 void RingNumbering::DropAmbiguousPairs() {
   const auto tops = static_cast<int>(chains_[0].size()), bottoms = static_cast<int>(chains_[1].size());
   std::fill(doubtful_.begin(), doubtful_.end(), uint8_t{0});
+  Count();
   for (int j = 0; j < rings_; ++j) {
     const auto k = static_cast<size_t>(j);
     const int t = labels_[0][k], b = labels_[1][k];
@@ -132,7 +156,7 @@ void RingNumbering::DropAmbiguousPairs() {
       for (int b2 = 0; b2 < bottoms; ++b2) {
         const Pair& pair = PairOf(t2, b2);
         const bool rival = (t2 == t) != (b2 == b) || (pair.ring == j && t2 != t);
-        if (!rival || pair.ring < 0 || RivalCost(pair, pair.ring) >= limit) continue;
+        if (!rival || pair.ring < 0 || RivalCost(pair, pair.ring, counted_[k] != 0) >= limit) continue;
         if (b2 != b) doubtful_[k] |= 1;
         if (t2 != t) doubtful_[k] |= 2;
       }

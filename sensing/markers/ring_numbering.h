@@ -23,6 +23,7 @@ struct RingNumberingOptions {
   double min_margin = 2.5;
   double sigma_rival_mm = 2.5;  ///< of the radial displacement off the neighbours' line, for that
   double max_rival_cost = 4;    ///< of the displacement, for that
+  double sigma_rest_mm = 0.8;   ///< the same where nothing is displaced
   /// Behind rings that a camera does not see, so many in a row must hold again: a few spots beside the rays
   /// of the other camera meet them by chance.
   int min_run = 4;
@@ -39,7 +40,7 @@ struct RingNumberingOptions {
 /// found by dynamic programming over (ring, used of top, used of bottom). Evidence: where two rays meet, z
 /// must be that of the ring (the skin hardly moves along its axis), and the radial displacement runs smoothly
 /// from one clamped end to the other. Every label of the result is then checked by itself and dropped where
-/// another ring would do as well.
+/// another ring would do as well; undeformed skin does where a gap in both chains leaves the count open.
 class RingNumbering {
  public:
   RingNumbering(const LinkModel& model, RingNumberingOptions options);
@@ -86,6 +87,8 @@ class RingNumbering {
   void ReadBack();
   void FindBends();
   double RivalCost(const Pair& pair, int ring) const;
+  double RivalCost(const Pair& pair, int ring, bool counted) const;
+  void Count();
   void DropAmbiguousPairs();
   void DropUnsupported();
   void DropShortRuns(CameraId id);
@@ -108,6 +111,7 @@ class RingNumbering {
   std::array<std::vector<int>, kCameraCount> labels_;
   std::vector<double> bends_mm_;  // by ring, where known_
   std::vector<bool> known_;
+  std::vector<uint8_t> counted_;   // by ring: in one camera's chain there is no gap before it
   std::vector<uint8_t> doubtful_;  // by ring; 1: the top label, 2: the bottom one
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "sensing/core/median.h"
 #include "sensing/markers/rest_labels.h"
 #include "sensing/pipeline/rest_match.h"
 
@@ -13,13 +14,6 @@ namespace {
 constexpr double kLeastSeenFraction = 0.5;  // in each picture
 // The skin moved if more than this part of the markers scatter by more than this; noise is a fraction of it.
 constexpr double kMovedFraction = 0.03, kMovedPx = 1;
-
-double Median(std::vector<double>& values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
