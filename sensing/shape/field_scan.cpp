@@ -37,6 +37,15 @@ void FieldScan::Correlate(const Eigen::VectorXd& v, Eigen::VectorXd& correlation
   correlations.resize(basis_.fields());
   CorrelateLoads(v, correlations);
   CorrelateBells(v, correlations);
+  // The answers to the loads hold them.
+  for (int wave = 0; wave < SkinBasis::kWaves; ++wave) {
+    const int h = SkinBasis::HarmonicOf(wave), row = 2 * h + (SkinBasis::IsSine(wave) ? 1 : 0);
+    const double weight = waves_(0, 2 * h);
+    for (int ring = 0; ring < basis_.wave_rings(); ++ring) {
+      correlations[basis_.first_wave() + wave * basis_.wave_rings() + ring] =
+          answers_(row, basis_.InwardColumn(ring)) / weight;
+    }
+  }
 }
 
 void FieldScan::CorrelateLoads(const Eigen::VectorXd& v, Eigen::VectorXd& correlations) {

@@ -8,6 +8,18 @@ namespace {
 // Where nothing was measured the estimate stands in, without information.
 constexpr double kNoInformation = 1e-9;  // 1/mm^2
 
+// R M R^T of a symmetric M, R a turn about Z.
+Mat3 Turned(const Mat3& r, const Mat3& m) {
+  const double c = r(0, 0), s = r(1, 0), cross = 2 * c * s * m(0, 1);
+  const double xx = c * c * m(0, 0) + s * s * m(1, 1) - cross;
+  const double yy = s * s * m(0, 0) + c * c * m(1, 1) + cross;
+  const double xy = c * s * (m(0, 0) - m(1, 1)) + (c * c - s * s) * m(0, 1);
+  const double xz = c * m(0, 2) - s * m(1, 2), yz = s * m(0, 2) + c * m(1, 2);
+  Mat3 turned;
+  turned << xx, xy, xz, xy, yy, yz, xz, yz, m(2, 2);
+  return turned;
+}
+
 MarkerSource SourceOf(bool top, bool bottom) {
   if (top) return bottom ? MarkerSource::kBoth : MarkerSource::kTop;
   return bottom ? MarkerSource::kBottom : MarkerSource::kInferred;
@@ -49,7 +61,7 @@ void ShapeReconstructor::Write(SkinShape& shape) const {
     const Vec3 u = estimator_.displacements().segment<3>(3 * marker);
     shape.positions_mm[i] = model_rest_mm_[i] + frame * u;
     shape.displacements_mm[i] = frame * (u - rest_u_.segment<3>(3 * marker));
-    shape.covariances_mm2[i] = frame * estimator_.covariances()[i] * frame.transpose();
+    shape.covariances_mm2[i] = Turned(frame, estimator_.covariances()[i]);
     shape.sources[i] =
         SourceOf(evidence_.Uses(marker, CameraId::kTop), evidence_.Uses(marker, CameraId::kBottom));
     for (const CameraId id : kBothCameras) {
@@ -61,7 +73,7 @@ void ShapeReconstructor::Write(SkinShape& shape) const {
     const Mat3 information = exact.information + kNoInformation * Mat3::Identity();
     const Vec3 measured = about + information.llt().solve(exact.pull);
     shape.measured[i] = {frame * (measured - rest_u_.segment<3>(3 * marker)),
-                         frame * exact.information * frame.transpose()};
+                         Turned(frame, exact.information)};
   }
 }
 

@@ -36,6 +36,7 @@ class ShapeReconstructor {
   int rounds() const { return estimator_.rounds(); }
   /// Loads that the last shape needs, N; inward, around, and across both, by 3 * marker + direction.
   const ShapeSolver& solver() const { return estimator_.solver(); }
+  const SkinBasis& basis() const { return estimator_.basis(); }
 
  private:
   void Write(SkinShape& shape) const;

@@ -8,9 +8,9 @@ namespace taclink {
 namespace {
 
 constexpr int kMaxSteps = 5, kMaxReadmissions = 2, kMaxOpenings = 4;
-constexpr double kOpenedKept = 0.7;  // of the slack that opened, to the next frame
-constexpr double kLonely = 40;       // an outlier's chi^2 against that per number around it
-constexpr double kConvergedMm = 0.01;
+constexpr double kOpenedKept = 0.7;   // of the slack that opened, to the next frame
+constexpr double kLonely = 40;        // an outlier's chi^2 against that per number around it
+constexpr double kConvergedMm = 0.1;  // a step leaves less than a tenth of itself
 constexpr double kMostOpenedMm2 =
     400;  // slack as good as unlimited; more would only grow from frame to frame
 
@@ -52,11 +52,12 @@ void ShapeEstimator::SetSlack() {
         basis_.Remainder(m).diagonal().array() + (part * part + least2 + opened_mm2_[static_cast<size_t>(m)]);
   }
   for (size_t i = 0; i < solver_.fields().size(); ++i) {
-    const int center = basis_.MarkerOf(solver_.fields()[i]), paths = basis_.paths();
+    const int field = solver_.fields()[i], center = basis_.MarkerOf(field), paths = basis_.paths();
     const double part = options_.slack_at_field * solver_.PeakMm(i);
     for (int m = 0; m < basis_.markers(); ++m) {
-      const double nearness = basis_.Along(0)(center / paths, m / paths) *
-                              basis_.Around(0)(center / paths, std::abs(m % paths - center % paths));
+      double nearness = basis_.Along(0)(center / paths, m / paths);
+      if (!basis_.IsWave(field))
+        nearness *= basis_.Around(0)(center / paths, std::abs(m % paths - center % paths));
       const double sigma = part * nearness;
       slack_.segment<3>(3 * m).array() += sigma * sigma;
     }
@@ -75,13 +76,38 @@ void ShapeEstimator::Converge(Evidence& evidence) {
 // One more load, or one observation less; false: all is explained.
 bool ShapeEstimator::Improve(Evidence& evidence) {
   const Misfit worst = evidence.Worst();
-  const ShapeSolver::Candidate best = solver_.BestField(markers_);
+  const double least = options_.load_significance * options_.load_significance;
+  const ShapeSolver::Candidate best = solver_.BestField(markers_, least);
   if (worst.chi2 > options_.outlier_sigmas * options_.outlier_sigmas && worst.chi2 > best.gain &&
       worst.chi2 > kLonely * Neighbourhood(worst.marker, false)) {
     evidence.Drop(worst.observation);
     return true;
   }
-  return best.gain > options_.load_significance * options_.load_significance && solver_.AddField(best.field);
+  const size_t fields = solver_.fields().size();
+  if (best.gain <= least) {
+    // One field a frame is looked at without need.
+    if (fields == 0 || looked_) return false;
+    looked_ = true;
+    const size_t one = ++turn_ % fields;
+    return MoveLoad(one, one + 1);
+  }
+  return MoveLoad(0, fields) || solver_.AddField(best.field);
+}
+
+// Loads that came in while a contact was shallow, or elsewhere, may be beside it.
+bool ShapeEstimator::MoveLoad(size_t begin, size_t end) {
+  size_t moved = 0;
+  ShapeSolver::Candidate best;
+  for (size_t i = begin; i < end; ++i) {
+    if (basis_.IsWave(solver_.fields()[i])) continue;
+    const ShapeSolver::Candidate next = solver_.BestMove(i);
+    if (next.gain <= best.gain) continue;
+    best = next;
+    moved = i;
+  }
+  if (best.gain <= options_.load_moved * options_.load_moved) return false;
+  solver_.Move(moved, best.field);
+  return true;
 }
 
 // chi^2 per observed number of a marker and its neighbours; or of the neighbours but for the worst, which may
@@ -93,7 +119,9 @@ double ShapeEstimator::Neighbourhood(int marker, bool with_itself) const {
   for (int r = std::max(0, ring - 1); r <= std::min(basis_.rings() - 1, ring + 1); ++r) {
     for (int step = -1; step <= 1; ++step) {
       if (!with_itself && r == ring && step == 0) continue;
-      const MarkerEvidence& one = markers_[static_cast<size_t>(r * paths + (path + step + paths) % paths)];
+      const int turned = path + step, at = turned < 0 ? paths - 1 : turned == paths ? 0 : turned;
+      const int neighbour = r * paths + at;
+      const MarkerEvidence& one = markers_[static_cast<size_t>(neighbour)];
       chi2 += one.chi2;
       numbers += one.numbers;
       if (one.chi2 <= largest) continue;
@@ -135,6 +163,7 @@ void ShapeEstimator::Estimate(Evidence& evidence, const KnownPressure& pressure)
   for (double& opened : opened_mm2_) opened *= kOpenedKept;
   Converge(evidence);
   rounds_ = 0;
+  looked_ = false;
   Pursue(evidence);
   // What was dropped before the loads were found may fit now.
   for (int turn = 0; turn < kMaxReadmissions && evidence.dropped() > 0; ++turn) {

@@ -16,20 +16,22 @@ struct ShapeEstimatorOptions {
   /// A load comes in if it explains this many standard deviations, and goes below the second figure.
   double load_significance = 4.5;
   double load_kept = 2.5;
+  /// A load goes where it explains so many standard deviations more.
+  double load_moved = 3;
   /// An observation is dropped if it is off by more sigmas than this and that explains more than any load.
   double outlier_sigmas = 6;
   /// Standard deviation of what the linear shell can't follow, as a part of a marker's displacement, and at
   /// least.
-  double slack_part = 0.01;
+  double slack_part = 0.005;
   double least_slack_mm = 0.01;
   /// The same round a field that came in, as a part of the displacement that it makes at its own place: loads
   /// are not points at markers.
-  double slack_at_field = 0.08;
+  double slack_at_field = 0.05;
   /// Where what is left is larger than noise and slack allow over a marker and its neighbours, chi^2 per
   /// number above this, slack opens until it fits; there, nothing is called an outlier.
   double misfit_allowed = 2;
   /// Stray loads grow with the largest displacement: by their rest value every so many mm.
-  double stray_doubles_at_mm = 5;
+  double stray_doubles_at_mm = 20;
   /// Errors of a known pressure, and of what the linear shell makes of it, as a part of it.
   double pressure_sigma_mpa = 1e-4;
   double pressure_part = 0.1;
@@ -70,6 +72,7 @@ class ShapeEstimator {
   bool OpenSlack();
   double Neighbourhood(int marker, bool with_itself) const;
   bool Improve(Evidence& evidence);
+  bool MoveLoad(size_t begin, size_t end);
   void Finish();
 
   const ShapeEstimatorOptions options_;
@@ -80,6 +83,8 @@ class ShapeEstimator {
   std::vector<double> opened_mm2_;  // by marker, slack that OpenSlack added
   std::vector<Mat3> covariances_;
   int rounds_ = 0;
+  size_t turn_ = 0;      // whose place is looked at next
+  bool looked_ = false;  // in this frame
 };
 
 }  // namespace taclink

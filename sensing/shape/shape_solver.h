@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -17,6 +18,8 @@ struct ShapeSolverOptions {
   double bell_sigma_mm = 5;
   /// Loads are what should explain a displacement: a bell's gain counts this part.
   double bell_handicap = 0.6;
+  /// Nothing that touches pulls: the gain of a load that does counts this part.
+  double pull_handicap = 0.25;
   /// Information that differs by less than this part from what the factor holds is not worth a new factor;
   /// the steps still go to the true optimum.
   double stale_information = 0.1;
@@ -41,8 +44,12 @@ class ShapeSolver {
     int field = -1;
     double gain = 0;  ///< by how much chi^2 falls if the field comes in
   };
-  /// The field that explains most of what is left; valid at the optimum.
-  Candidate BestField(std::span<const MarkerEvidence> evidence);
+  /// The field that explains most of what is left, if that may be `least`; valid at the optimum.
+  Candidate BestField(std::span<const MarkerEvidence> evidence, double least);
+  /// The inward load near the field `i` that explains most more in its place; after BestField.
+  Candidate BestMove(size_t i);
+  /// Takes the field `i` out and lets another in.
+  void Move(size_t i, int field);
   /// Lets a field in; it moves nothing until the next step. False: no room.
   bool AddField(int field);
   /// Takes the least significant field out if it is within `significance` standard deviations of zero.
@@ -59,7 +66,8 @@ class ShapeSolver {
   /// Estimated pressure, MPa.
   double pressure_mpa() const { return pressure_mpa_ + x_[pressure_at_]; }
 
-  /// Of the displacement of each marker, without slack. Brought up to date if the factor has changed.
+  /// Of the displacement of each marker, without slack. Up to date for all if fields or prior have changed,
+  /// else for the markers whose own information has; the others' turn comes within a few frames.
   std::span<const Mat3> Covariances();
 
  private:
@@ -70,13 +78,18 @@ class ShapeSolver {
   void Weigh();
   double FieldPrecision(int field) const;
   double ExactGain(int field);
+  double NormLeft();
+  void Renew();
+  void SolveCovariances(size_t gathered);
+  double Handicap(int field, double amplitude) const;
+  void Remove(Eigen::Index i);
   auto Active() const { return transposed_.topRows(count_); }
 
   // Constant after construction.
   const SkinBasis& basis_;
   const ShapeSolverOptions options_;
   Eigen::Index modes_, pressure_at_, fixed_;
-  Eigen::VectorXd field_norms_;  // by field, at the first frame's information
+  Eigen::VectorXd field_norms_;  // by field, squared, at the first frame's information
 
   FieldScan scan_;
   Eigen::Index count_;          // columns in use
@@ -92,9 +105,12 @@ class ShapeSolver {
   Eigen::MatrixXd factor_;  // lower Cholesky factor
   bool factor_is_stale_ = true, covariances_are_stale_ = true;
   std::vector<Mat3> covariances_;
+  std::vector<char> covariance_is_stale_;  // by marker
+  size_t covariance_turn_ = 0;
+  std::array<size_t, 16> gathered_;  // markers whose covariances are found together
 
   // Scratch.
-  Eigen::VectorXd pull_, correlations_, column_, weighted_, rhs_, step_, change_;
+  Eigen::VectorXd pull_, correlations_, column_, weighted_, rhs_, step_, change_, unit_;
   Eigen::MatrixXd inverse_;
 };
 

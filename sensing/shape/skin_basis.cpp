@@ -41,6 +41,7 @@ SkinBasis::SkinBasis(const LinkModel& model, const SkinBasisOptions& options)
   }
   Solve(model, options);
   FindBells(model);
+  FindWaves();
   FindInflation(model);
   FindModes(model, options);
 }
@@ -122,6 +123,15 @@ void SkinBasis::FindBells(const LinkModel& model) {
   }
 }
 
+void SkinBasis::FindWaves() {
+  wave_amplitudes_.resize(3 * rings_, kWaves * wave_rings());
+  for (int wave = 0; wave < kWaves; ++wave) {
+    const Eigen::MatrixXd answers = Harmonic(HarmonicOf(wave));
+    for (int ring = 0; ring < wave_rings(); ++ring)
+      wave_amplitudes_.col(wave * wave_rings() + ring) = answers.col(InwardColumn(ring));
+  }
+}
+
 void SkinBasis::FindInflation(const LinkModel& model) {
   inflation_.setZero(3 * markers(), kInflations);
   const Eigen::MatrixXd even = MarkerHarmonic(0);
@@ -191,33 +201,74 @@ void SkinBasis::FindModes(const LinkModel& model, const SkinBasisOptions& option
 }
 
 int SkinBasis::MarkerOf(int field) const {
+  if (IsWave(field)) {
+    const int wave = (field - first_wave()) / wave_rings(),
+              column = InwardColumn((field - first_wave()) % wave_rings());
+    const int path = IsSine(wave) ? (paths_ + 2 * HarmonicOf(wave)) / (4 * HarmonicOf(wave)) : 0;
+    return ring_of_column_[static_cast<size_t>(column)] * paths_ + path;
+  }
   if (!IsLoad(field)) return (field - loads()) % (3 * markers()) / 3;
   return ring_of_column_[static_cast<size_t>(field / paths_)] * paths_ + field % paths_;
 }
 
+SkinBasis::HalfGrid SkinBasis::PlaceOf(int field) const {
+  const int column = IsLoad(field) ? field / paths_ : 0;
+  if (column < 3 * rings_) return {2 * (MarkerOf(field) % paths_), 2 * (MarkerOf(field) / paths_) + 1};
+  if (column < columns_on_paths_) return {2 * (field % paths_), 2 * (column - 3 * rings_)};
+  return {2 * (field % paths_) + 1, column - columns_on_paths_};
+}
+
+int SkinBasis::InwardAt(HalfGrid place) const {
+  const int turned = (place.path % (2 * paths_) + 2 * paths_) % (2 * paths_);
+  const bool on_path = turned % 2 == 0, on_ring = place.ring % 2 == 1;
+  if (place.ring < 0 || place.ring > 2 * rings_) return -1;
+  if (columns_on_paths_ == 3 * rings_ && !(on_path && on_ring)) return -1;
+  const int column = !on_path  ? columns_on_paths_ + place.ring
+                     : on_ring ? 3 * (place.ring / 2)
+                               : 3 * rings_ + place.ring / 2;
+  return column * paths_ + turned / 2;
+}
+
 int SkinBasis::OnFirstPath(int field) const {
+  if (IsWave(field)) return field;
   const int path = MarkerOf(field) % paths_;
   return IsLoad(field) ? field - path : field - 3 * path;
 }
 
 void SkinBasis::WriteField(int field, Eigen::Ref<Eigen::VectorXd> column) const {
-  if (!IsLoad(field)) {
-    const int width = (field - loads()) / (3 * markers()), center = MarkerOf(field),
-              component = (field - loads()) % 3;
-    column.setZero();
-    for (int m = 0; m < markers(); ++m) {
-      const int between = std::abs(m % paths_ - center % paths_);
-      column[3 * m + component] =
-          Along(width)(center / paths_, m / paths_) * Around(width)(center / paths_, between);
-    }
-    return;
+  if (IsLoad(field)) return WriteLoad(field, column);
+  if (IsWave(field)) return WriteWave(field, column);
+  WriteBell(field, column);
+}
+
+void SkinBasis::WriteBell(int field, Eigen::Ref<Eigen::VectorXd>& column) const {
+  const int width = (field - loads()) / (3 * markers()), center = MarkerOf(field),
+            component = (field - loads()) % 3;
+  column.setZero();
+  for (int m = 0; m < markers(); ++m) {
+    const int between = std::abs(m % paths_ - center % paths_);
+    column[3 * m + component] =
+        Along(width)(center / paths_, m / paths_) * Around(width)(center / paths_, between);
   }
+}
+
+void SkinBasis::WriteLoad(int field, Eigen::Ref<Eigen::VectorXd>& column) const {
   const auto response = responses_.col(field / paths_);
   const Eigen::Index wrapped = 3 * (field % paths_), all = 3 * paths_;
   for (int ring = 0; ring < rings_; ++ring) {
     const Eigen::Index at = ring * all;
     column.segment(at + wrapped, all - wrapped) = response.segment(at, all - wrapped);
     column.segment(at, wrapped) = response.segment(at + all - wrapped, wrapped);
+  }
+}
+
+void SkinBasis::WriteWave(int field, Eigen::Ref<Eigen::VectorXd>& column) const {
+  const int wave = (field - first_wave()) / wave_rings(), h = HarmonicOf(wave);
+  const auto amplitudes = wave_amplitudes_.col(field - first_wave());
+  for (int m = 0; m < markers(); ++m) {
+    const double angle = 2 * kPi * h * (m % paths_) / paths_, c = std::cos(angle), s = std::sin(angle);
+    const Vec3 shape = IsSine(wave) ? Vec3(s, -c, s) : Vec3(c, s, c);
+    column.segment<3>(3 * m) = shape.cwiseProduct(amplitudes.segment<3>(3 * (m / paths_)));
   }
 }
 

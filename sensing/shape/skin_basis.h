@@ -28,6 +28,7 @@ struct SkinBasisOptions {
 class SkinBasis {
  public:
   static constexpr int kBellWidths = 2;
+  static constexpr int kWaves = 5;  ///< 1, cos, sin, cos 2, sin 2 of the angle
 
   explicit SkinBasis(const LinkModel& model, const SkinBasisOptions& options = {});
 
@@ -54,14 +55,33 @@ class SkinBasis {
   int load_columns() const { return static_cast<int>(responses_.cols()); }
   /// How many of them are not half a path on; they come first.
   int columns_on_paths() const { return columns_on_paths_; }
-  /// Loads, then bells: 3 a marker and width.
-  int fields() const { return loads() + 3 * markers() * kBellWidths; }
-  /// The marker where a field is, or next to it.
+  /// Loads, then bells: 3 a marker and width; then waves: a ring's inward loads on all paths at once, times a
+  /// wave round the axis, by wave and then by ring: those at the markers, then those half an interval on.
+  int fields() const { return first_wave() + kWaves * wave_rings(); }
+  int first_wave() const { return loads() + 3 * markers() * kBellWidths; }
+  int wave_rings() const { return columns_on_paths_ - 2 * rings_; }
+  static constexpr int HarmonicOf(int wave) { return (wave + 1) / 2; }
+  static constexpr bool IsSine(int wave) { return wave > 0 && wave % 2 == 0; }
+  /// Load column of a wave's ring.
+  int InwardColumn(int wave_ring) const {
+    return wave_ring < rings_ ? 3 * wave_ring : 2 * rings_ + wave_ring;
+  }
+  /// Inward loads are on a grid of half intervals: `path` of 2 paths, round and round, `ring` of 2 rings + 1,
+  /// the first half an interval before the first markers'. A field's own place is its marker's.
+  struct HalfGrid {
+    int path = 0, ring = 0;
+  };
+  HalfGrid PlaceOf(int field) const;
+  /// The inward load there; -1: none.
+  int InwardAt(HalfGrid place) const;
+  /// The marker where a field is (a wave: where it is largest), or next to it.
   int MarkerOf(int field) const;
-  /// A field's turned copies have the same shape: the one on the first path.
+  /// A field's turned copies have the same shape: the one on the first path; of waves, itself.
   int OnFirstPath(int field) const;
   bool IsLoad(int field) const { return field < loads(); }
-  /// Displacement per N of a load or per mm of a bell.
+  bool IsInward(int field) const { return field < 3 * markers() ? field / paths_ % 3 == 0 : IsLoad(field); }
+  bool IsWave(int field) const { return field >= first_wave(); }
+  /// Displacement per N of a load (a wave: of each path's) or per mm of a bell.
   void WriteField(int field, Eigen::Ref<Eigen::VectorXd> column) const;
   /// A bell's displacement at `ring` of those centred on `center` is Along(..)(center, ring) *
   /// Around(..)(center, paths between).
@@ -78,7 +98,11 @@ class SkinBasis {
  private:
   void Solve(const LinkModel& model, const SkinBasisOptions& options);
   Eigen::MatrixXd MarkerHarmonic(int h) const { return Harmonic(h).leftCols(3 * rings_); }
+  void WriteLoad(int field, Eigen::Ref<Eigen::VectorXd>& column) const;
+  void WriteBell(int field, Eigen::Ref<Eigen::VectorXd>& column) const;
+  void WriteWave(int field, Eigen::Ref<Eigen::VectorXd>& column) const;
   void FindBells(const LinkModel& model);
+  void FindWaves();
   void FindInflation(const LinkModel& model);
   void FindModes(const LinkModel& model, const SkinBasisOptions& options);
 
@@ -89,6 +113,7 @@ class SkinBasis {
   int columns_on_paths_ = 0;
   Eigen::VectorXd per_pressure_;
   Eigen::MatrixXd inflation_, modes_;
+  Eigen::MatrixXd wave_amplitudes_;              // 3 rings x waves
   std::vector<Eigen::MatrixXd> along_, around_;  // by width
   std::vector<int> harmonics_;
   std::vector<Mat3> remainder_;  // by ring

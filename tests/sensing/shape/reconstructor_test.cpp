@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "sensing/model/model_file.h"
@@ -79,6 +80,62 @@ TEST_P(ReconstructorTest, PushesAnywhere) {
   EXPECT_LT(score.rmse(), 0.15);
   EXPECT_LT(score.nees(), 1.25);
   EXPECT_GT(score.nees(), 0.2);
+}
+
+TEST_P(ReconstructorTest, SqueezedAllRoundWithAFoldThatHides) {
+  std::vector<Push> pushes;
+  for (int i = 0; i < 16; ++i) pushes.push_back({0.1 + kPi / 8 * i, 0.37, 6});
+  const auto truth = TrueMarkers(model_, pushes);
+  Score score;
+  for (int trial = 0; trial < 5; ++trial) {
+    TakeRest();
+    LabelledMarkers labels = eyes_.See(truth, kNoisePx);
+    // The markers on the fold are not seen, but for three.
+    for (size_t m = 0; m < truth.size(); ++m) {
+      const double z = model_.RestMarker(static_cast<int>(m)).z();
+      const bool folded = std::abs(z - 0.37 * model_.length_mm) < 0.7 * 18;
+      if (folded && m % 7 != 0) labels.cameras[0][m].seen = labels.cameras[1][m].seen = false;
+    }
+    reconstructor_->Reconstruct(labels, 0, shape_);
+    for (size_t m = 0; m < truth.size(); ++m)
+      score.Add(shape_.positions_mm[m] - truth[m], shape_.covariances_mm2[m], Vec3::Zero());
+  }
+  EXPECT_LT(score.rmse(), 0.25);
+  EXPECT_LT(score.worst, 2);
+}
+
+// The markers nearest to it are hidden; loads that stay where they came in do much worse.
+TEST_P(ReconstructorTest, LoadsFollowAContactThatSlides) {
+  constexpr int kFrames = 16;
+  const auto place = [](int i) { return Push{0.4 + 0.03 * i, 0.35 + 0.015 * i, std::min(9.0, 1.5 * i)}; };
+  std::vector<std::vector<Vec3>> truths;
+  for (int i = 0; i < kFrames; ++i) truths.push_back(TrueMarkers(model_, {place(i)}));
+  std::array<Score, 2> scores;
+  for (const bool may_move : {false, true}) {
+    ShapeOptions options = options_;
+    if (!may_move) options.estimator.load_moved = 1e9;
+    reconstructor_.emplace(model_, model_.nominal_rig, options);
+    TakeRest();
+    for (int i = 0; i < kFrames; ++i) {
+      const Push push = place(i);
+      const auto& truth = truths[static_cast<size_t>(i)];
+      LabelledMarkers labels = eyes_.See(truth, kNoisePx);
+      for (size_t m = 0; m < truth.size(); ++m) {
+        const Vec3 at = model_.RestMarker(static_cast<int>(m));
+        const double turn = std::remainder(std::atan2(at.y(), at.x()) - push.angle_rad, 2 * kPi);
+        const bool hidden =
+            std::hypot(turn * at.head<2>().norm(), at.z() - push.z_part * model_.length_mm) < 15;
+        if (hidden) labels.cameras[0][m].seen = labels.cameras[1][m].seen = false;
+      }
+      reconstructor_->Reconstruct(labels, 0, shape_);
+      for (size_t m = 0; m < truth.size(); ++m) {
+        if (!labels.cameras[0][m].seen)
+          scores[may_move].Add(shape_.positions_mm[m] - truth[m], shape_.covariances_mm2[m], Vec3::Zero());
+      }
+    }
+  }
+  EXPECT_LT(scores[1].rmse(), 0.7 * scores[0].rmse());
+  EXPECT_LT(scores[1].rmse(), 0.6);
 }
 
 TEST_P(ReconstructorTest, RawMeasurementsAreHonest) {

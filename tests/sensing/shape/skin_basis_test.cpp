@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "sensing/mechanics/linear_shell.h"
 #include "sensing/model/model_file.h"
 #include "sensing/shape/field_scan.h"
@@ -68,8 +70,32 @@ TEST_P(SkinBasisTest, ScanIsTheProductWithEveryField) {
     basis.WriteField(field, column);
     EXPECT_NEAR(correlations[field], column.dot(v), basis.IsLoad(field) ? 1e-8 : 1e-2) << field;
     const int first = basis.OnFirstPath(field);
-    EXPECT_EQ(basis.MarkerOf(first) % basis.paths(), 0);
+    EXPECT_TRUE(basis.IsWave(field) || basis.MarkerOf(first) % basis.paths() == 0);
     EXPECT_EQ(basis.MarkerOf(first) / basis.paths(), basis.MarkerOf(field) / basis.paths());
+  }
+}
+
+TEST_P(SkinBasisTest, WavesAreSumsOfInwardLoads) {
+  const SkinBasis basis(model_);
+  Eigen::VectorXd column(3 * basis.markers()), sum(column.size());
+  for (int wave = 0; wave < SkinBasis::kWaves; ++wave) {
+    for (int ring = 0; ring < basis.wave_rings(); ++ring) {
+      sum.setZero();
+      for (int path = 0; path < basis.paths(); ++path) {
+        const double angle = 2 * kPi * SkinBasis::HarmonicOf(wave) * path / basis.paths();
+        basis.WriteField(basis.InwardColumn(ring) * basis.paths() + path, column);
+        sum += (SkinBasis::IsSine(wave) ? std::sin(angle) : std::cos(angle)) * column;
+      }
+      const int field = basis.first_wave() + wave * basis.wave_rings() + ring;
+      basis.WriteField(field, column);
+      EXPECT_LT((column - sum).norm(), 1e-6 * sum.norm()) << wave << " " << ring;
+      // Where the marker said to have most has most of its ring, but for the grid's steps.
+      const int marker = basis.MarkerOf(field), first = marker / basis.paths() * basis.paths();
+      double most = 0;
+      for (int path = 0; path < basis.paths(); ++path)
+        most = std::max(most, std::abs(column[3 * (first + path)]));
+      EXPECT_GT(std::abs(column[3 * marker]), 0.9 * most);
+    }
   }
 }
 
