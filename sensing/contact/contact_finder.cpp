@@ -5,6 +5,11 @@
 #include <cmath>
 
 namespace taclink {
+namespace {
+
+constexpr size_t kAtOnce = 16;  // contacts for which there is memory from the start
+
+}  // namespace
 
 ContactFinder::ContactFinder(const LinkModel& model, const ContactOptions& options)
     : model_(model), options_(options), open_(static_cast<size_t>(model.markers.count())) {
@@ -18,17 +23,40 @@ ContactFinder::ContactFinder(const LinkModel& model, const ContactOptions& optio
     areas_mm2_.push_back(radius * grid.path_pitch_rad() * (above - below) / 2 *
                          std::hypot(1.0, model_.profile.Slope(z)));
   }
+  queue_.reserve(open_.size());
+  previous_.reserve(kAtOnce);
+  spare_.resize(kAtOnce);
+  for (Contact& contact : spare_) contact.markers.reserve(open_.size());
+}
+
+void ContactFinder::Recycle(std::vector<Contact>& contacts) {
+  contacts.reserve(kAtOnce);
+  for (Contact& contact : contacts) {
+    if (spare_.size() < kAtOnce) spare_.push_back(std::move(contact));
+  }
+  contacts.clear();
+}
+
+Contact ContactFinder::Fresh() {
+  if (spare_.empty()) return {};
+  Contact contact = std::move(spare_.back());
+  spare_.pop_back();
+  std::vector<int> markers = std::move(contact.markers);
+  contact = {};
+  contact.markers = std::move(markers);
+  return contact;
 }
 
 void ContactFinder::Find(const SkinShape& shape, const NodalForces& forces, std::vector<Contact>& contacts) {
-  contacts.clear();
+  Recycle(contacts);
   std::fill(open_.begin(), open_.end(), 0);
   for (const int m : forces.loaded) open_[static_cast<size_t>(m)] = 1;
   for (const int first : forces.loaded) {
     if (!open_[static_cast<size_t>(first)]) continue;
-    Collect(first, region_);
-    Contact contact = Describe(shape, forces, region_);
-    if (contact.normal_force_n >= options_.min_force_n) contacts.push_back(std::move(contact));
+    Contact contact = Fresh();
+    Collect(first, contact.markers);
+    Describe(shape, forces, contact);
+    (contact.normal_force_n >= options_.min_force_n ? contacts : spare_).push_back(std::move(contact));
   }
   std::sort(contacts.begin(), contacts.end(),
             [](const Contact& a, const Contact& b) { return a.normal_force_n > b.normal_force_n; });
@@ -57,10 +85,8 @@ void ContactFinder::Collect(int first, std::vector<int>& region) {
   }
 }
 
-Contact ContactFinder::Describe(const SkinShape& shape, const NodalForces& forces,
-                                const std::vector<int>& region) const {
-  Contact contact;
-  contact.markers = region;
+void ContactFinder::Describe(const SkinShape& shape, const NodalForces& forces, Contact& contact) const {
+  const std::vector<int>& region = contact.markers;
   double weight = 0, path = 0, ring = 0;
   const int paths = model_.markers.paths, origin = model_.PathOf(region.front());
   for (const int m : region) {
@@ -96,14 +122,13 @@ Contact ContactFinder::Describe(const SkinShape& shape, const NodalForces& force
     }
   }
   contact.force_sigma_n = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  return contact;
 }
 
 void ContactFinder::AssignIds(std::vector<Contact>& contacts) {
   for (Contact& contact : contacts) {
-    Contact* nearest = nullptr;
+    Known* nearest = nullptr;
     double best = options_.same_contact_mm;
-    for (Contact& old : previous_) {
+    for (Known& old : previous_) {
       const double distance = (old.center_mm - contact.center_mm).norm();
       if (old.id != 0 && distance < best) {
         best = distance;
@@ -113,7 +138,8 @@ void ContactFinder::AssignIds(std::vector<Contact>& contacts) {
     contact.id = nearest != nullptr ? nearest->id : next_id_++;
     if (nearest != nullptr) nearest->id = 0;  // taken
   }
-  previous_ = contacts;
+  previous_.clear();
+  for (const Contact& contact : contacts) previous_.push_back({contact.id, contact.center_mm});
 }
 
 Vec3 ContactFinder::DeformedNormal(const SkinShape& shape, int path, int ring) const {

@@ -15,16 +15,20 @@ struct ContactOptions {
 };
 
 /// Groups nodal forces into contacts: connected regions of loaded markers (neighbours on the grid, diagonals
-/// too). Remembers the last frame's contacts for their ids. One thread.
+/// too). Remembers the last frame's contacts for their ids. Allocates only for more contacts than there were
+/// before. One thread.
 class ContactFinder {
  public:
   explicit ContactFinder(const LinkModel& model, const ContactOptions& options = {});
 
+  /// `contacts`: those of the frame before, or none; their lists' memory is reused.
   void Find(const SkinShape& shape, const NodalForces& forces, std::vector<Contact>& contacts);
 
  private:
   void Collect(int first, std::vector<int>& region);
-  Contact Describe(const SkinShape& shape, const NodalForces& forces, const std::vector<int>& region) const;
+  void Recycle(std::vector<Contact>& contacts);
+  Contact Fresh();
+  void Describe(const SkinShape& shape, const NodalForces& forces, Contact& contact) const;
   void AssignIds(std::vector<Contact>& contacts);
   Vec3 DeformedNormal(const SkinShape& shape, int path, int ring) const;
   Vec3 OuterPoint(const SkinShape& shape, int path, int ring) const;
@@ -36,8 +40,13 @@ class ContactFinder {
   std::vector<double> areas_mm2_;  // of the undeformed outer surface that belongs to each marker
 
   std::vector<char> open_;  // scratch: loaded and not yet in a region
-  std::vector<int> region_, queue_;
-  std::vector<Contact> previous_;
+  std::vector<int> queue_;
+  std::vector<Contact> spare_;  // for the memory of their lists
+  struct Known {
+    uint64_t id;
+    Vec3 center_mm;
+  };
+  std::vector<Known> previous_;
   uint64_t next_id_ = 1;
 };
 

@@ -58,6 +58,7 @@ LinearForceEstimator::LinearForceEstimator(const LinkModel& model, const LinearE
   trial_.resize(most);
   rhs_.resize(most);
   loaded_.reserve(static_cast<size_t>(most));
+  gram_.setZero();
 }
 
 // False: nothing moved, no forces to solve for.
@@ -109,15 +110,28 @@ int LinearForceEstimator::MostSignificantLoad() const {
   return best;
 }
 
+// Of the loaded columns; gram_ then holds the factor.
+void LinearForceEstimator::FactorGram() {
+  const auto n = static_cast<Eigen::Index>(loaded_.size());
+  for (Eigen::Index k = 0; k < n; ++k) {
+    columns_.col(k) = whitened_.col(loaded_[static_cast<size_t>(k)]);
+    for (Eigen::Index i = 0; i <= k; ++i) gram_(k, i) = columns_.col(k).dot(columns_.col(i));
+  }
+  Eigen::Ref<Eigen::MatrixXd> gram = gram_.topLeftCorner(n, n);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(gram);
+}
+
 // The minimum over loaded_ alone, sign free.
 void LinearForceEstimator::FitLoaded(double penalty, Eigen::VectorXd& load) {
   const auto n = static_cast<Eigen::Index>(loaded_.size());
-  for (Eigen::Index k = 0; k < n; ++k) columns_.col(k) = whitened_.col(loaded_[static_cast<size_t>(k)]);
-  const auto columns = columns_.leftCols(n);
-  gram_.topLeftCorner(n, n).noalias() = columns.transpose() * columns;
-  rhs_.head(n).noalias() = columns.transpose() * data_;
+  FactorGram();
+  rhs_.head(n).noalias() = columns_.leftCols(n).transpose() * data_;
   for (Eigen::Index k = 0; k < n; ++k) rhs_[k] -= penalty * norms_[loaded_[static_cast<size_t>(k)]];
-  load.head(n) = gram_.topLeftCorner(n, n).llt().solve(rhs_.head(n));
+  const auto lower = gram_.topLeftCorner(n, n).triangularView<Eigen::Lower>();
+  auto solution = load.head(n);
+  solution = rhs_.head(n);
+  lower.solveInPlace(solution);
+  lower.transpose().solveInPlace(solution);
 }
 
 // One step of Lawson and Hanson's inner loop: towards the minimum over loaded_, as far as no load has to
@@ -184,7 +198,7 @@ void LinearForceEstimator::Estimate(const SkinShape& shape, double pressure_mpa,
   forces.forces_n.assign(static_cast<size_t>(markers_), Vec3::Zero());
   forces.sigmas_n.assign(static_cast<size_t>(markers_), 0.0);
   forces.loaded.clear();
-  forces.loaded_covariance.resize(0, 0);
+  forces.loaded_covariance.setZero();
   forces.residual = 0;
   forces.converged = true;
   const bool moved = Whiten(shape, pressure_mpa);
@@ -206,11 +220,14 @@ void LinearForceEstimator::Estimate(const SkinShape& shape, double pressure_mpa,
   }
   forces.loaded = loaded_;
   // What is left unexplained beyond the noise is the model's error; it widens the result.
-  forces.loaded_covariance =
-      std::max(1.0, residual2) * gram_.topLeftCorner(n, n).llt().solve(Eigen::MatrixXd::Identity(n, n));
+  if (forces.loaded_covariance.rows() < n) forces.loaded_covariance.setZero(gram_.rows(), gram_.rows());
+  auto covariance = forces.loaded_covariance.topLeftCorner(n, n);
+  const auto lower = gram_.topLeftCorner(n, n).triangularView<Eigen::Lower>();
+  covariance.diagonal().setConstant(std::max(1.0, residual2));
+  lower.solveInPlace(covariance);
+  lower.transpose().solveInPlace(covariance);
   for (Eigen::Index k = 0; k < n; ++k) {
-    forces.sigmas_n[static_cast<size_t>(loaded_[static_cast<size_t>(k)])] =
-        std::sqrt(forces.loaded_covariance(k, k));
+    forces.sigmas_n[static_cast<size_t>(loaded_[static_cast<size_t>(k)])] = std::sqrt(covariance(k, k));
   }
 }
 

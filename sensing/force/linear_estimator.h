@@ -49,6 +49,7 @@ class LinearForceEstimator {
   void FindLoads(NodalForces& forces);
   bool StepToOptimum();
   void RemoveBias();
+  void FactorGram();
   void FitLoaded(double penalty, Eigen::VectorXd& load);
   void UpdateResidual();
 
@@ -68,7 +69,7 @@ class LinearForceEstimator {
   std::vector<int> loaded_;
   std::vector<char> is_loaded_;
   Eigen::VectorXd load_, trial_, rhs_;  // N, in the order of loaded_
-  Eigen::MatrixXd gram_, columns_;
+  Eigen::MatrixXd gram_, columns_;      // gram_: lower half, becomes its own Cholesky factor
   int measured_numbers_ = 0;
 };
 

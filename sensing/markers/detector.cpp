@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "sensing/markers/lanes.h"
+
 namespace taclink {
 namespace {
 
@@ -16,6 +18,7 @@ constexpr int kOpening = 2;    // cells each way: the opening is 5 cells wide, m
 constexpr int kMeanSlack = 3;  // gray levels below the local mean that still count, for flat insides
 constexpr int kSlackPerContrast = 5;  // and 5/49 of the contrast
 constexpr int kHole = 3;              // px: shorter gaps in a blob's row are shade or a scratch
+constexpr uint64_t kEachByte = 0x0101010101010101ULL;
 constexpr double kSplitLevels[] = {0.5, 0.7};
 
 // Minimum or maximum over 2 * kOpening + 1 cells along one axis of a grid.
@@ -29,6 +32,47 @@ void Slide(const uint8_t* in, uint8_t* out, int width, int height, int dx, int d
         best = choose(best, in[yy * width + xx]);
       }
       out[y * width + x] = best;
+    }
+  }
+}
+
+// Lowers `least`, one for each whole 4 px along a row, to the sum of the 4 x 4 block that begins there.
+void LowerToSums(const uint8_t* p, std::ptrdiff_t step, int width, int32_t* least) {
+  static_assert(kBlock == 4);
+  int x = 0;
+  for (; x + 16 <= width; x += 16, least += 4) {
+    Shorts8 pairs{};
+    for (int k = 0; k < kBlock; ++k) {
+      const auto sixteen = reinterpret_cast<Shorts8>(LoadSixteen(p + k * step + x));
+      pairs += (sixteen & 255) + (sixteen >> 8);
+    }
+    const auto both = reinterpret_cast<Ints4>(pairs);
+    const Ints4 sums = (both & 0xffff) + (both >> 16);
+    Ints4 before;
+    std::memcpy(&before, least, sizeof before);
+    const Ints4 now = sums < before ? sums : before;
+    std::memcpy(least, &now, sizeof now);
+  }
+  for (; x + kBlock <= width; x += kBlock, ++least) {
+    int sum = 0;
+    for (int k = 0; k < kBlock * kBlock; ++k) sum += p[k / kBlock * step + x + k % kBlock];
+    *least = std::min(*least, sum);
+  }
+}
+
+// The brightest of each 8 px from there to the right, over some rows; `out` is 8 longer than the row.
+void BrightestOfEight(const uint8_t* p, std::ptrdiff_t step, int rows, int width, uint8_t* __restrict out) {
+  std::memcpy(out, p, static_cast<size_t>(width));
+  std::memset(out + width, 0, 8);
+  for (int k = 1; k < rows; ++k) {
+    const uint8_t* __restrict row = p + k * step;
+    for (int x = 0; x < width; ++x) out[x] = std::max(out[x], row[x]);
+  }
+  for (int shift = 1; shift < 8; shift *= 2) {
+    for (int x = 0; x < width; x += static_cast<int>(sizeof(Bytes16))) {
+      const Bytes16 here = LoadSixteen(out + x), there = LoadSixteen(out + x + shift);
+      const Bytes16 most = here > there ? here : there;
+      std::memcpy(out + x, &most, sizeof most);
     }
   }
 }
@@ -57,7 +101,9 @@ void MarkerDetector::Resize(int width, int height) {
   const auto cells = static_cast<size_t>(grid_width_ * grid_height_);
   background_.resize(cells);
   grid_scratch_.resize(cells);
-  block_sums_.resize(static_cast<size_t>(width));
+  brightest_.resize(cells);
+  block_least_.resize(static_cast<size_t>(grid_width_ * cell_ / kBlock));
+  row_brightest_.resize(static_cast<size_t>(grid_width_ * cell_) + 32);
   column_sums_.resize(static_cast<size_t>(width + 2 * kHalfWindow));
   row_background_.resize(static_cast<size_t>(width));
   chosen_.assign(static_cast<size_t>(width) + 16, 0);
@@ -70,15 +116,16 @@ void MarkerDetector::Detect(const cv::Mat& gray, Detections& out) {
   EstimateNoise(gray);
   FindBackground(gray);
   FindRuns(gray);
-  CollectBlobs(gray);
+  CollectBlobs();
   measured_.clear();
+  edge_area_ = edge_length_ = 0;
   bells_.Begin(gray, noise_, contrast_);
   first_level_ = true;
   for (const double level : kSplitLevels) {
     MeasureBlobs(gray, level);
     first_level_ = false;
     SplitAgain(gray);
-    CollectBlobs(gray);
+    CollectBlobs();
   }
   MeasureBlobs(gray, 0);
   DropDimBells();
@@ -98,7 +145,7 @@ void MarkerDetector::EstimateNoise(const cv::Mat& gray) {
   int count = 0;
   for (int y = 4; y < height_; y += 8) {
     const uint8_t* row = gray.ptr(y);
-    for (int x = 0; x + 1 < width_; x += 2, ++count) {
+    for (int x = 0; x + 1 < width_; x += 4, ++count) {
       ++histogram[static_cast<size_t>(std::abs(row[x] - row[x + 1]))];
       ++levels[row[x]];
     }
@@ -116,15 +163,25 @@ void MarkerDetector::EstimateNoise(const cv::Mat& gray) {
 }
 
 void MarkerDetector::FindBackground(const cv::Mat& gray) {
-  std::fill(background_.begin(), background_.end(), uint8_t{255});
-  uint16_t* sums = block_sums_.data();
-  for (int y0 = 0; y0 + kBlock <= height_; y0 += kBlock) {
-    const uint8_t *r0 = gray.ptr(y0), *r1 = gray.ptr(y0 + 1), *r2 = gray.ptr(y0 + 2), *r3 = gray.ptr(y0 + 3);
-    for (int x = 0; x < width_; ++x) sums[x] = static_cast<uint16_t>(r0[x] + r1[x] + r2[x] + r3[x]);
-    uint8_t* cells = background_.data() + (y0 / cell_) * grid_width_;
-    for (int x0 = 0; x0 + kBlock <= width_; x0 += kBlock) {
-      const int mean = (sums[x0] + sums[x0 + 1] + sums[x0 + 2] + sums[x0 + 3]) / (kBlock * kBlock);
-      cells[x0 / cell_] = std::min(cells[x0 / cell_], static_cast<uint8_t>(mean));
+  const auto step = static_cast<std::ptrdiff_t>(gray.step[0]);
+  for (int row = 0; row < grid_height_; ++row) {
+    const int y0 = row * cell_, rows = std::min(cell_, height_ - y0);
+    std::fill(block_least_.begin(), block_least_.end(), 255 * kBlock * kBlock);
+    for (int y = y0; y + kBlock <= y0 + rows; y += kBlock) {
+      LowerToSums(gray.ptr(y), step, width_, block_least_.data());
+    }
+    BrightestOfEight(gray.ptr(y0), step, rows, width_, row_brightest_.data());
+    const int32_t* least = block_least_.data();
+    const uint8_t* most = row_brightest_.data();
+    for (int cell = row * grid_width_; cell < (row + 1) * grid_width_;
+         ++cell, least += cell_ / kBlock, most += cell_) {
+      const auto c = static_cast<size_t>(cell);
+      int darkest = least[0];
+      for (int i = 1; i < cell_ / kBlock; ++i) darkest = std::min(darkest, least[i]);
+      background_[c] = static_cast<uint8_t>(darkest / (kBlock * kBlock));
+      brightest_[c] = most[0];
+      for (int x = kBlock; x + 2 * kBlock <= cell_; x += kBlock)
+        brightest_[c] = std::max(brightest_[c], most[x]);
     }
   }
   const auto least = [](uint8_t a, uint8_t b) { return std::min(a, b); };
@@ -157,17 +214,37 @@ void MarkerDetector::FindRuns(const cv::Mat& gray) {
       sums[width_ - 1 + k] = sums[width_ - 1];
     }
     ChooseRow(gray, y);
-    AppendRuns(y, 0, width_);
+  }
+}
+
+// The spans of a row of cells in which anything is bright enough, and their background by pixel.
+void MarkerDetector::FindSpans(int row) {
+  spans_.clear();
+  std::fill(chosen_.begin(), chosen_.end(), uint8_t{0});
+  const int first = row * grid_width_, contrast = Contrast();
+  for (int i = 0; i < grid_width_; ++i) {
+    const auto cell = static_cast<size_t>(first + i);
+    if (brightest_[cell] <= background_[cell] + contrast) continue;
+    const int begin = i * cell_, end = std::min(begin + cell_, width_);
+    std::fill(row_background_.begin() + begin, row_background_.begin() + end, int16_t{background_[cell]});
+    if (!spans_.empty() && spans_.back().end == begin) {
+      spans_.back().end = end;
+    } else {
+      spans_.push_back({begin, end});
+    }
   }
 }
 
 void MarkerDetector::ChooseRow(const cv::Mat& gray, int y) {
-  if (y % cell_ == 0) {
-    const uint8_t* cells = background_.data() + (y / cell_) * grid_width_;
-    for (int x = 0; x < width_; ++x) row_background_[static_cast<size_t>(x)] = cells[x / cell_];
+  if (y % cell_ == 0) FindSpans(y / cell_);
+  if (spans_.empty()) return;
+  const auto contrast = static_cast<int16_t>(Contrast());
+  for (const Span& span : spans_) {
+    ChoosePixels(gray.ptr(y) + span.begin, row_background_.data() + span.begin,
+                 column_sums_.data() + span.begin, contrast, span.end - span.begin,
+                 chosen_.data() + span.begin);
   }
-  const auto contrast = static_cast<int16_t>(std::lround(contrast_));
-  ChoosePixels(gray.ptr(y), row_background_.data(), column_sums_.data(), contrast, width_, chosen_.data());
+  AppendRuns(y, spans_.front().begin, spans_.back().end);
 }
 
 int MarkerDetector::Root(int label) {
@@ -186,16 +263,17 @@ void MarkerDetector::AppendRuns(int y, int x_begin, int x_end) {
   while (previous > 0 && runs_[previous - 1].y == y - 1) --previous;
   const uint8_t* chosen = chosen_.data();
   for (int x = x_begin; x < x_end;) {
-    uint64_t eight = 0;
-    std::memcpy(&eight, chosen + x, sizeof eight);  // zeros follow the row
+    const uint64_t eight = LoadEight(chosen + x);  // zeros follow the row
     if (eight == 0) {
       x += 8;
       continue;
     }
     x += std::countr_zero(eight) / 8;
+    if (x >= x_end) break;
     const int begin = x;
-    while (x < x_end && chosen[x] != 0) ++x;
-    if (x == begin) break;  // past the end
+    uint64_t gap = 0;
+    while ((gap = ~LoadEight(chosen + x) & kEachByte) == 0) x += 8;
+    x += std::countr_zero(gap) / 8;
     int label = -1;
     while (previous < previous_end && runs_[previous].end <= begin) ++previous;
     for (size_t i = previous; i < previous_end && runs_[i].begin < x; ++i) {
@@ -216,7 +294,7 @@ int MarkerDetector::NewLabel() {
   return label;
 }
 
-void MarkerDetector::CollectBlobs(const cv::Mat& gray) {
+void MarkerDetector::CollectBlobs() {
   blob_of_label_.assign(parents_.size(), -1);
   blobs_.clear();
   for (Run& run : runs_) {
@@ -245,17 +323,13 @@ void MarkerDetector::CollectBlobs(const cv::Mat& gray) {
   for (const Run& run : runs_) {
     Blob& blob = blobs_[static_cast<size_t>(run.label)];
     if (blob.dropped) continue;
-    int begin = run.begin;
     Run* const before = sorted_.data() + blob.first_run + blob.runs - 1;
     if (blob.runs > 0 && before->y == run.y && run.begin - before->end <= kHole) {
-      begin = before->end;
+      blob.area += run.begin - before->end;
       before->end = run.end;
-      blob.area += run.begin - begin;
     } else {
       sorted_[static_cast<size_t>(blob.first_run + blob.runs++)] = run;
     }
-    const uint8_t* row = gray.ptr(run.y);
-    for (int x = begin; x < run.end; ++x) blob.sum += row[x];
   }
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
 #include "sensing/core/markers.h"
+#include "sensing/markers/blob_box.h"
 #include "sensing/markers/detector_peaks.h"
 
 namespace taclink {
@@ -52,10 +54,12 @@ class MarkerDetector {
   struct Run {  // of chosen pixels in a row: [begin, end)
     int y, begin, end, label;
   };
+  struct Span {  // pixels of a row
+    int begin, end;
+  };
   struct Blob {
     int first_run = 0, runs = 0;  // in sorted_
     int area = 0, x0 = 0, x1 = 0, y0 = 0, y1 = 0;
-    int64_t sum = 0;       // of gray levels
     bool dropped = false;  // too small for anything
     bool odd = false;      // too large or too thin for one marker
   };
@@ -63,11 +67,6 @@ class MarkerDetector {
     double peak = 0, background = 0, outline = 0;
     double dark_outline = 0;  // part of the outline below half the contrast
     double contrast() const { return peak - background; }
-  };
-  struct Moments {
-    int x = 0, y = 0;  // the sums' origin
-    int64_t w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0;
-    int64_t ramp_xx = 0, ramp_xy = 0, ramp_yy = 0;  // of pixels whose noise counts, not weighted
   };
   struct Measured {
     Detection detection;
@@ -93,19 +92,19 @@ class MarkerDetector {
   void EstimateNoise(const cv::Mat& gray);
   void FindBackground(const cv::Mat& gray);
   void FindRuns(const cv::Mat& gray);
+  int Contrast() const { return static_cast<int>(std::lround(contrast_)); }
+  void FindSpans(int row);
   void ChooseRow(const cv::Mat& gray, int y);
   void AppendRuns(int y, int x_begin, int x_end);
   int NewLabel();
   int Root(int label);
-  void CollectBlobs(const cv::Mat& gray);
+  void CollectBlobs();
   double BackgroundAt(double x, double y) const;
   void MeasureBlobs(const cv::Mat& gray, double split_level);
   void SplitAgain(const cv::Mat& gray);
   Levels MeasureLevels(const cv::Mat& gray, const Blob& blob);
-  Vec2 Shade(const cv::Mat& gray, const Blob& blob, const Levels& levels) const;
-  Moments SumCoverage(const cv::Mat& gray, const Blob& blob, const Levels& levels, double low, double high,
-                      const Vec2& shade) const;
-  bool Measure(const cv::Mat& gray, const Blob& blob, const Levels& levels, Measured& measured) const;
+  Vec2 Shade(const Blob& blob, const Levels& levels) const;
+  bool Measure(const Blob& blob, const Levels& levels, Measured& measured);
   void CompleteClipped(const Blob& blob, Detection& d) const;
   void FindSummits(const Blob& blob, double base);
   void TakeBells();
@@ -114,21 +113,26 @@ class MarkerDetector {
     return sigma * sigma;
   }
   void DropDimBells();
+  double BlurVariance() const;
   void DropSpecks(Detections& out);
 
   const DetectorOptions options_;
   int width_ = 0, height_ = 0;
   double noise_ = 1, contrast_ = 10;
+  double edge_area_ = 0, edge_length_ = 0;  // of the whole, not small blobs: what is between dark and bright
   bool first_level_ = true;
-  int cell_ = 8, grid_width_ = 0, grid_height_ = 0;  // background grid, cells of cell_ px
-  std::vector<uint8_t> background_, grid_scratch_;
-  std::vector<uint16_t> block_sums_;
+  int cell_ = 8, grid_width_ = 0, grid_height_ = 0;             // background grid, cells of cell_ px
+  std::vector<uint8_t> background_, grid_scratch_, brightest_;  // by cell; brightest: single pixel
+  std::vector<int32_t> block_least_;                            // of a row of cells, by block
+  std::vector<uint8_t> row_brightest_;                          // of a row of cells, by pixel
+  std::vector<Span> spans_;
   std::vector<int16_t> column_sums_, row_background_;  // of the 7 rows around; background by column
   std::vector<uint8_t> chosen_;                        // the row's pixels that passed
   std::vector<Run> runs_, sorted_;
   std::vector<int> parents_, blob_of_label_;
   std::vector<Blob> blobs_;
   std::vector<Run> again_;
+  BlobBox box_;
   BellFinder bells_;
   std::vector<Measured> measured_;
   Neighbourhoods around_;

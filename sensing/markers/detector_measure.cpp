@@ -9,13 +9,15 @@
 namespace taclink {
 namespace {
 
-constexpr int kSmallArea = 60;      // px^2
-constexpr double kShadeDip = 0.3;   // of the height: uneven shade within one marker
-constexpr double kLongest = 2;      // elongation from which two summits are two markers
-constexpr double kInside = 0.7;     // of the contrast: brighter pixels tell the shade
-constexpr int kLargeArea = 400;     // px^2
-constexpr int kLeastArea = 5;       // px^2, of a blob that is measured by itself
-constexpr int kNeighbourhood = 48;  // px, cells over which typical contrast is looked up
+constexpr int kSmallArea = 60;       // px^2
+constexpr double kShadeDip = 0.3;    // of the height: uneven shade within one marker
+constexpr double kLongest = 2;       // elongation from which two summits are two markers
+constexpr double kInside = 0.7;      // of the contrast: brighter pixels tell the shade
+constexpr double kSharp = 0.8;       // px: a blur that does no harm
+constexpr double kBlurError = 0.13;  // px per px^2 of blur beyond that
+constexpr int kLargeArea = 400;      // px^2
+constexpr int kLeastArea = 5;        // px^2, of a blob that is measured by itself
+constexpr int kNeighbourhood = 48;   // px, cells over which typical contrast is looked up
 
 bool Covers(const Detection& d, const Vec2& p) {
   return std::abs(d.center_px.x() - p.x()) < d.width_px / 2 &&
@@ -55,7 +57,7 @@ void MarkerDetector::MeasureBlobs(const cv::Mat& gray, double split_level) {
       const Levels levels = MeasureLevels(gray, blob);
       Measured measured;
       measured.contrast = contrast = levels.contrast();
-      if (contrast >= contrast_ && Measure(gray, blob, levels, measured) &&
+      if (contrast >= contrast_ && Measure(blob, levels, measured) &&
           (large || !first_level_ || Elongation(measured.spread) < kLongest ||
            bells_.CountSummits(base, 0) <= 1)) {
         measured_.push_back(measured);
@@ -121,143 +123,59 @@ void MarkerDetector::TakeBells() {
   }
 }
 
-// The blob's gray levels, and those of the pixels that touch it from outside.
+// The blob's gray levels, and those of the pixels that touch it from outside. Leaves the blob in box_.
 MarkerDetector::Levels MarkerDetector::MeasureLevels(const cv::Mat& gray, const Blob& blob) {
-  Levels levels;
-  const auto mean = static_cast<int>(blob.sum / blob.area);
-  int bright_sum = 0, bright = 0;
-  const Run* const first = sorted_.data() + blob.first_run;
-  const Run* const last = first + blob.runs;
-  for (const Run* run = first; run != last; ++run) {
-    const uint8_t* row = gray.ptr(run->y);
-    for (int x = run->begin; x < run->end; ++x) {
-      const int counts = row[x] >= mean ? 1 : 0;
-      bright_sum += counts * row[x];
-      bright += counts;
-    }
+  box_.Open(gray, blob.x0, blob.y0, blob.x1, blob.y1);
+  for (int i = blob.first_run; i < blob.first_run + blob.runs; ++i) {
+    const Run& run = sorted_[static_cast<size_t>(i)];
+    box_.AddRun(run.y, run.begin, run.end);
   }
-  levels.peak = static_cast<double>(bright_sum) / std::max(1, bright);
+  box_.Close();
+  Levels levels;
+  const BlobBox::Sum bright = box_.AtLeast(box_.AtLeast(1).levels / blob.area);
+  levels.peak = static_cast<double>(bright.levels) / std::max(1, bright.pixels);
   levels.background = BackgroundAt(0.5 * (blob.x0 + blob.x1 - 1), 0.5 * (blob.y0 + blob.y1 - 1));
   if (levels.contrast() < contrast_) return levels;
-
-  const auto half = static_cast<int>(0.5 * (levels.background + levels.peak));
-  int sum = 0, count = 0, dark = 0;
-  const auto look = [&](int y, int begin, int end) {
-    if (y < 0 || y >= height_) return;
-    const uint8_t* row = gray.ptr(y);
-    for (int x = std::max(begin, 0); x < std::min(end, width_); ++x) {
-      sum += row[x], ++count;
-      dark += row[x] < half ? 1 : 0;
-    }
-  };
-  const Run* const before_first = first - 1;
-  for (const Run* run = first; run != last; ++run) {
-    look(run->y, run->begin - 1, run->begin);
-    look(run->y, run->end, run->end + 1);
-    // Above and below: what the first overlapping run of that row leaves free.
-    for (const int step : {-1, 1}) {
-      const int y = run->y + step;
-      const Run* other = run;
-      while (other != before_first && other != last && std::abs(other->y - run->y) <= 1 &&
-             !(other->y == y && other->begin < run->end && other->end > run->begin)) {
-        other += step;
-      }
-      const bool found = other != before_first && other != last && other->y == y;
-      look(y, run->begin, found ? std::min(run->end, other->begin) : run->end);
-      if (found) look(y, std::max(run->begin, other->end), run->end);
-    }
-  }
-  levels.outline = static_cast<double>(sum) / std::max(1, count);
-  levels.dark_outline = static_cast<double>(dark) / std::max(1, count);
+  const BlobBox::Outline outline = box_.Around(static_cast<int>(0.5 * (levels.background + levels.peak)));
+  levels.outline = static_cast<double>(outline.levels) / std::max(1, outline.pixels);
+  levels.dark_outline = static_cast<double>(outline.dark) / std::max(1, outline.pixels);
   return levels;
 }
 
 // How the blob's inside brightens along x and y, per px, over its contrast.
-Vec2 MarkerDetector::Shade(const cv::Mat& gray, const Blob& blob, const Levels& levels) const {
-  const auto inside = static_cast<int>(levels.background + kInside * levels.contrast());
-  const int x_middle = (blob.x0 + blob.x1) / 2, y_middle = (blob.y0 + blob.y1) / 2;
-  int64_t n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, v = 0, vx = 0, vy = 0;
-  for (int i = blob.first_run; i < blob.first_run + blob.runs; ++i) {
-    const Run& run = sorted_[static_cast<size_t>(i)];
-    const uint8_t* row = gray.ptr(run.y);
-    const int dy = run.y - y_middle;
-    int s = 0, sx = 0, sxx = 0, sv = 0, svx = 0;
-    for (int px = run.begin; px < run.end; ++px) {
-      const int dx = px - x_middle, w = row[px] > inside ? 1 : 0, wx = w * dx;
-      s += w, sx += wx, sxx += wx * dx;
-      sv += w * row[px], svx += wx * row[px];
-    }
-    n += s, x += sx, y += s * dy, xx += sxx, xy += sx * dy, yy += s * dy * dy;
-    v += sv, vx += svx, vy += sv * dy;
-  }
-  if (n < 14) return Vec2::Zero();
-  const auto over = [&](int64_t sum, int64_t a, int64_t b) {
-    return static_cast<double>(sum) -
-           static_cast<double>(a) * static_cast<double>(b) / static_cast<double>(n);
-  };
+Vec2 MarkerDetector::Shade(const Blob& blob, const Levels& levels) const {
+  const BlobBox::Inside in = box_.Above(static_cast<int>(levels.background + kInside * levels.contrast()));
+  if (in.n < 14) return Vec2::Zero();
   Mat2 m;
-  m << over(xx, x, x), over(xy, x, y), over(xy, x, y), over(yy, y, y);
+  m << in.xx - in.x * in.x / in.n, in.xy - in.x * in.y / in.n, in.xy - in.x * in.y / in.n,
+      in.yy - in.y * in.y / in.n;
   if (m.determinant() < 1) return Vec2::Zero();
-  const Vec2 slope = m.inverse() * Vec2(over(vx, v, x), over(vy, v, y)) / levels.contrast();
+  const Vec2 slope =
+      m.inverse() * Vec2(in.vx - in.v * in.x / in.n, in.vy - in.v * in.y / in.n) / levels.contrast();
   const double most = 0.25 / std::sqrt(static_cast<double>(blob.area));
   return slope * std::min(1.0, most / std::max(slope.norm(), 1e-9));
 }
 
-// Sums of soft coverage: a pixel's weight rises from 0 to 1 between two levels of its blob's edge, so that
-// the edge counts with its sub-pixel part. The shade inside is taken out first. Weights in 1/256.
-MarkerDetector::Moments MarkerDetector::SumCoverage(const cv::Mat& gray, const Blob& blob,
-                                                    const Levels& levels, double low, double high,
-                                                    const Vec2& shade) const {
-  Moments m;
-  const auto base16 = static_cast<int>(16 * levels.background);
-  const auto above16 = static_cast<int>(16 * (low - levels.background));
-  const auto slope = static_cast<int>(4096 / (high - low));
-  const auto gx = static_cast<int>(4096 * shade.x()), gy = static_cast<int>(4096 * shade.y());
-  m.x = (blob.x0 + blob.x1) / 2, m.y = (blob.y0 + blob.y1) / 2;
-  const auto add = [&](int y, int begin, int end) {
-    const uint8_t* row = gray.ptr(y);
-    const int dy = y - m.y;
-    int64_t s0 = 0, s1 = 0, s2 = 0;
-    for (int x = begin; x < end; ++x) {
-      const int dx = x - m.x;
-      const int flat = ((16 * row[x] - base16) * (4096 - gx * dx - gy * dy)) >> 12;
-      const int w = std::clamp(((flat - above16) * slope) >> 8, 0, 256);
-      s0 += w, s1 += w * dx, s2 += w * dx * dx;
-      const int edge = w > 0 && w < 256 ? 1 : 0;
-      m.ramp_xx += edge * dx * dx, m.ramp_xy += edge * dx * dy, m.ramp_yy += edge * dy * dy;
-    }
-    m.w += s0, m.wx += s1, m.wy += s0 * dy;
-    m.wxx += s2, m.wxy += s1 * dy, m.wyy += s0 * dy * dy;
-  };
-  // Small blobs with a rim of a pixel, or a good part of their edge would be left out.
-  const int rim = blob.area < kSmallArea ? 1 : 0;
-  const Run* const first = sorted_.data() + blob.first_run;
-  const Run* const last = first + blob.runs - 1;
-  for (const Run* run = first; run <= last; ++run) {
-    add(run->y, std::max(run->begin - rim, 0), std::min(run->end + rim, width_));
-  }
-  if (rim != 0 && first->y > 0) add(first->y - 1, first->begin, first->end);
-  if (rim != 0 && last->y + 1 < height_) add(last->y + 1, last->begin, last->end);
-  return m;
-}
-
-bool MarkerDetector::Measure(const cv::Mat& gray, const Blob& blob, const Levels& levels,
-                             Measured& measured) const {
+// Of the blob in box_. Its soft coverage: a pixel's weight rises from 0 to 1 between two levels of its edge,
+// so that the edge counts with its sub-pixel part. The shade inside is taken out first.
+bool MarkerDetector::Measure(const Blob& blob, const Levels& levels, Measured& measured) {
   if (levels.dark_outline < options_.min_dark_outline) return false;
   // Small blobs are mostly edge: weights linear in the gray level keep every pixel's coverage.
   const bool small = blob.area < kSmallArea;
   const double low = std::max(levels.background + (small ? 0.1 : 0.25) * levels.contrast(),
                               std::min(levels.outline, levels.peak - 1));
   const double high = std::max(small ? levels.peak : 0.5 * (low + levels.peak), low + 1);
-  const Vec2 shade = Shade(gray, blob, levels);
-  const Moments m = SumCoverage(gray, blob, levels, low, high, shade);
-  const double area = static_cast<double>(m.w) / 256;
+  const Vec2 shade = Shade(blob, levels);
+  // Small blobs with a rim of a pixel, or a good part of their edge would be left out.
+  if (small) box_.Widen();
+  const BlobBox::Coverage m =
+      box_.Cover({levels.background, low - levels.background, high - levels.background, shade});
+  const double area = m.w;
   if (area < 0.5 * options_.min_area_px2) return false;
-  const auto mean = [&](int64_t sum) { return static_cast<double>(sum) / static_cast<double>(m.w); };
-  const double mx = mean(m.wx), my = mean(m.wy);
+  const double mx = m.x / area, my = m.y / area;
   const double pixel = 1.0 / 12;  // second moment of a pixel itself
-  const double xx = mean(m.wxx) - mx * mx + pixel, yy = mean(m.wyy) - my * my + pixel,
-               xy = mean(m.wxy) - mx * my;
+  const double xx = m.xx / area - mx * mx + pixel, yy = m.yy / area - my * my + pixel,
+               xy = m.xy / area - mx * my;
   measured.spread << xx, xy, xy, yy;
   const double middle = 0.5 * (xx + yy), spread = std::hypot(0.5 * (xx - yy), xy);
   const double longest = middle + spread, shortest = middle - spread;
@@ -268,7 +186,7 @@ bool MarkerDetector::Measure(const cv::Mat& gray, const Blob& blob, const Levels
   const double fill = area / (4 * std::numbers::pi * std::sqrt(longest * shortest));
   if (fill < options_.min_fill - 2.5 / area || fill > options_.max_fill) return false;
 
-  d.center_px = Vec2(m.x + mx, m.y + my);
+  d.center_px = box_.middle() + Vec2(mx, my);
   d.width_px = blob.x1 - blob.x0;
   d.height_px = blob.y1 - blob.y0;
   d.area_px2 = area;
@@ -276,15 +194,27 @@ bool MarkerDetector::Measure(const cv::Mat& gray, const Blob& blob, const Levels
   // more.
   const double noise = noise_ * noise_ + 1.0 / 12, per_level = 1 / (area * (high - low));
   Mat2 ramp;
-  ramp << static_cast<double>(m.ramp_xx), static_cast<double>(m.ramp_xy), static_cast<double>(m.ramp_xy),
-      static_cast<double>(m.ramp_yy);
+  ramp << m.edge_xx, m.edge_xy, m.edge_xy, m.edge_yy;
   // What departs from an ellipse may be half another marker.
   const double odd = d.clipped ? 0 : 2 * std::max(0.0, std::abs(1 - fill) - 0.04 - 2.5 / area);
   const double by_size = 4 * std::numbers::pi * options_.sigma_per_size * options_.sigma_per_size;
   d.covariance_px2 = noise * per_level * per_level * ramp + (by_size + odd * odd) * measured.spread +
                      Floor(small) * Mat2::Identity();
-  if (d.clipped) CompleteClipped(blob, d);
+  if (d.clipped) {
+    CompleteClipped(blob, d);
+  } else if (!small) {
+    edge_area_ += m.edge;
+    edge_length_ += 2 * std::numbers::pi * std::sqrt(2 * (longest + shortest));
+  }
   return true;
+}
+
+// An edge counts as such from a quarter of the contrast to five eighths, one sigma of the blur. Where that is
+// wide, light of neighbours and of the wall around reaches into a blob, and moves its centre, all alike.
+double MarkerDetector::BlurVariance() const {
+  const double blur = edge_length_ > 0 ? edge_area_ / edge_length_ : 0;
+  const double more = std::max(0.0, blur * blur - kSharp * kSharp);
+  return kBlurError * kBlurError * more * more;
 }
 
 // A blob that one side of the picture cuts is taken for an ellipse with its axes along that side: the chord
@@ -383,7 +313,9 @@ void MarkerDetector::DropSpecks(Detections& out) {
   around_.Clear(width_, height_);
   for (const Measured& m : measured_)
     around_.Add(m.detection.center_px, std::sqrt(m.detection.area_px2), m.contrast);
-  for (const Measured& m : measured_) {
+  const Mat2 blur = BlurVariance() * Mat2::Identity();
+  for (Measured& m : measured_) {
+    m.detection.covariance_px2 += blur;
     if (m.contrast > options_.min_relative_contrast * around_.Typical(m.detection.center_px))
       out.push_back(m.detection);
   }

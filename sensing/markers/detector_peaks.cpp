@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+
+#include "sensing/markers/lanes.h"
 
 namespace taclink {
 namespace {
@@ -13,6 +16,7 @@ constexpr double kWiggle = 2.5;         // sigmas of the noise that no dip is
 constexpr double kSettled = 0.05;       // px
 constexpr double kSmoothNoise = 0.375;  // of the binomial mean, over a pixel's
 constexpr int kScale = 16;              // of smoothed levels
+constexpr int kTogether = 8;            // pixels
 constexpr int kSweeps = 3;
 constexpr double kSlope = 0.005;  // of a background beside a marker, of its height a px
 constexpr double kWindow = 6.5;   // squared radius of what a fit looks at, in sigmas
@@ -22,6 +26,41 @@ struct Step {
 };
 constexpr std::array<Step, 8> kAround = {
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
+
+Floats4 LoadFloats(const float* p) {
+  Floats4 four;
+  std::memcpy(&four, p, sizeof four);
+  return four;
+}
+
+// exp(v) of v <= 0, to 1e-5 of it: 2^x by x's whole part and a series for what is left, within half.
+Floats4 Exp(Floats4 v) {
+  const Floats4 least = Floats4{} - 80, most{};
+  v = v > least ? v : least;
+  const Floats4 x = 1.44269504F * (v < most ? v : most);
+  const Ints4 whole = __builtin_convertvector(x - 0.5F, Ints4);
+  const Floats4 f = x - __builtin_convertvector(whole, Floats4);
+  const Floats4 series =
+      1 + f * (0.69314718F + f * (0.24022651F + f * (0.05550411F + f * (0.00961813F + f * 0.00133336F))));
+  return reinterpret_cast<Floats4>(reinterpret_cast<Ints4>(series) + (whole << 23));
+}
+
+// -d' precision d / 2 of a bell; pixels count from another place.
+struct Exponent {
+  Exponent(const Bell& bell, const Vec2& from)
+      : ox(Floats4{} + static_cast<float>(bell.center_px.x() - from.x())),
+        oy(Floats4{} + static_cast<float>(bell.center_px.y() - from.y())),
+        xx(Floats4{} + static_cast<float>(-0.5 * bell.precision(0, 0))),
+        xy(Floats4{} + static_cast<float>(-bell.precision(0, 1))),
+        yy(Floats4{} + static_cast<float>(-0.5 * bell.precision(1, 1))) {}
+
+  Floats4 operator()(Floats4 x, Floats4 y) const {
+    const Floats4 dx = x - ox, dy = y - oy;
+    return dx * (xx * dx + xy * dy) + yy * dy * dy;
+  }
+
+  Floats4 ox, oy, xx, xy, yy;
+};
 
 // Cholesky's factors into a symmetric matrix' lower half, the solution into the right side.
 template <int n>
@@ -69,9 +108,10 @@ int BellFinder::Smooth(int x, int y) const {
 void BellFinder::OpenBox(int x0, int y0, int x1, int y1) {
   summits_.clear();
   x0_ = x0, y0_ = y0, box_width_ = x1 - x0 + 2;
-  const int height = y1 - y0 + 2;
-  smooth_.resize(std::max(smooth_.size(), static_cast<size_t>(box_width_ * height)));
-  column_.resize(static_cast<size_t>(gray_.cols) + 4);
+  const int height = box_height_ = y1 - y0 + 2;
+  // A little more than the box: what is worked on together reaches past it.
+  smooth_.resize(std::max(smooth_.size(), static_cast<size_t>(box_width_ * height) + kTogether));
+  column_.resize(static_cast<size_t>(gray_.cols) + 4 + 2 * kTogether);
   for (int k = 0; k < height; ++k) {
     const int y = std::clamp(y0 - 1 + k, 0, gray_.rows - 1);
     const uint8_t *above = gray_.ptr(std::max(y - 1, 0)), *here = gray_.ptr(y),
@@ -79,28 +119,36 @@ void BellFinder::OpenBox(int x0, int y0, int x1, int y1) {
     // column_[i]: at x0 - 2 + i, the picture's edge pixels repeated.
     const int first = std::max(x0 - 2, 0), last = std::min(x1 + 2, gray_.cols);
     uint16_t* column = column_.data() + (first - (x0 - 2));
-    for (int x = first; x < last; ++x) {
-      column[x - first] = static_cast<uint16_t>(above[x] + 2 * here[x] + below[x]);
+    int x = first;
+    for (; x < last && x + kTogether <= gray_.cols; x += kTogether) {
+      const Shorts8 sums = EightShorts(LoadEight(above + x)) + 2 * EightShorts(LoadEight(here + x)) +
+                           EightShorts(LoadEight(below + x));
+      std::memcpy(column + (x - first), &sums, sizeof sums);
     }
+    for (; x < last; ++x) column[x - first] = static_cast<uint16_t>(above[x] + 2 * here[x] + below[x]);
     for (int i = 0; i < first - (x0 - 2); ++i) column_[static_cast<size_t>(i)] = column[0];
-    for (int x = last; x < x1 + 2; ++x) column[x - first] = column[last - 1 - first];
+    for (x = last; x < x1 + 2; ++x) column[x - first] = column[last - 1 - first];
     uint16_t* out = smooth_.data() + k * box_width_;
     const uint16_t* in = column_.data();
-    for (int i = 0; i < box_width_; ++i) out[i] = static_cast<uint16_t>(in[i] + 2 * in[i + 1] + in[i + 2]);
+    for (int i = 0; i < box_width_; i += kTogether) {
+      const Shorts8 sums = LoadShorts(in + i) + 2 * LoadShorts(in + i + 1) + LoadShorts(in + i + 2);
+      std::memcpy(out + i, &sums, sizeof sums);
+    }
   }
 }
 
 void BellFinder::AddSummits(int y, int begin, int end) {
   const uint16_t* row = smooth_.data() + (y - y0_ + 1) * box_width_ - x0_ + 1;
-  for (int x = begin; x < end; ++x) {
-    const uint16_t* at = row + x;
-    const uint16_t *up = at - box_width_, *down = at + box_width_;
-    const uint16_t v = *at;
-    if (at[-1] >= v || up[-1] >= v || up[0] >= v || up[1] >= v || at[1] > v || down[-1] > v || down[0] > v ||
-        down[1] > v) {
-      continue;
+  const auto load = [](const uint16_t* p) { return reinterpret_cast<SignedShorts8>(LoadShorts(p)); };
+  for (int x = begin; x < end; x += kTogether) {
+    const uint16_t *at = row + x, *up = at - box_width_, *down = at + box_width_;
+    const SignedShorts8 v = load(at);
+    const auto most = (load(at - 1) < v) & (load(up - 1) < v) & (load(up) < v) & (load(up + 1) < v) &
+                      (load(at + 1) <= v) & (load(down - 1) <= v) & (load(down) <= v) & (load(down + 1) <= v);
+    if (!Any(reinterpret_cast<Longs2>(most))) continue;
+    for (int i = 0; i < std::min(kTogether, end - x); ++i) {
+      if (most[i] != 0) summits_.push_back({x + i, y, at[i]});
     }
-    summits_.push_back({x, y, v});
   }
 }
 
@@ -138,7 +186,7 @@ int BellFinder::LowestBetween(int x0, int y0, int x1, int y1) const {
   for (int k = 1; k < steps; ++k) {
     const int x = x0 + (2 * (x1 - x0) * k + steps) / (2 * steps),
               y = y0 + (2 * (y1 - y0) * k + steps) / (2 * steps);
-    least = std::min(least, Smooth(x, y));
+    least = std::min(least, SmoothAt(x, y));
   }
   return least;
 }
@@ -161,7 +209,7 @@ void BellFinder::AddKnown(const Vec2& center_px, const Mat2& spread_px2, double 
 
 // Falls off on all sides, far enough on most of them; from where it has lost half, the bell's first shape.
 bool BellFinder::Surrounded(int x, int y, Bell& bell) const {
-  const double top = Smooth(x, y);
+  const double top = SmoothAt(x, y);
   const double wiggle = 2.5 * kSmoothNoise * kScale * noise_;
   std::array<double, 8> drop{}, half{};
   std::array<std::array<int, kReach + 1>, 8> path{};
@@ -173,7 +221,7 @@ bool BellFinder::Surrounded(int x, int y, Bell& bell) const {
     for (int k = 1; k <= reach; ++k) {
       const int xx = x + k * kAround[d].dx, yy = y + k * kAround[d].dy;
       if (xx < 0 || yy < 0 || xx >= gray_.cols || yy >= gray_.rows) break;
-      const int v = path[d][static_cast<size_t>(k)] = Smooth(xx, yy);
+      const int v = path[d][static_cast<size_t>(k)] = SmoothAt(xx, yy);
       if (v < least) least = v, lowest[d] = k;
       if (v > least + wiggle) break;
     }
@@ -215,14 +263,16 @@ void BellFinder::FindNeighbours() {
   const auto reach = [](const Bell& b) {
     return std::min(2.2 / std::sqrt(std::min(b.precision(0, 0), b.precision(1, 1))), 9.0);
   };
+  places_.clear();
+  for (const Bell& b : bells_)
+    places_.push_back({static_cast<float>(b.center_px.x()), static_cast<float>(b.center_px.y())});
   for (size_t i = 0; i < bells_.size(); ++i) {
     first_neighbour_[i] = static_cast<int>(neighbours_.size());
     if (bells_[i].known) continue;
-    const Vec2 here = bells_[i].center_px;
+    const Place here = places_[i];
     const double own = reach(bells_[i]);
     for (size_t k = 0; k < bells_.size(); ++k) {
-      const double down = std::abs(bells_[k].center_px.y() - here.y()),
-                   aside = std::abs(bells_[k].center_px.x() - here.x());
+      const float down = std::abs(places_[k].y - here.y), aside = std::abs(places_[k].x - here.x);
       if (down > 18 || aside > 18 || k == i) continue;
       const double limit = own + reach(bells_[k]);
       if (down * down + aside * aside < limit * limit)
@@ -259,34 +309,54 @@ bool BellFinder::LookAt(size_t index, double radius_squared) {
     const double middle = bell.center_px.x() - pxy * v / pxx;
     const int x0 = std::max(0, static_cast<int>(std::ceil(middle - root / pxx))),
               x1 = std::min(gray_.cols - 1, static_cast<int>(std::floor(middle + root / pxx)));
-    if (n + x1 - x0 + 1 > kMaxPixels) return false;
+    if (x1 < x0) continue;
+    if (n + x1 - x0 + 4 > kMaxPixels) return false;
     const uint8_t* row = gray_.ptr(y);
     const auto from = static_cast<float>(bell.center_px.x());
-    for (int x = x0; x <= x1; ++x, ++n) {
-      dx_[n] = static_cast<float>(x) - from;
-      dy_[n] = static_cast<float>(v);
-      value_[n] = row[x];
+    const Floats4 steps = {0, 1, 2, 3}, down = Floats4{} + static_cast<float>(v);
+    // Four at a time: what is too much, the next row writes over.
+    for (int x = x0; x <= x1; x += 4) {
+      const Eigen::Index at = n + x - x0;
+      const Floats4 aside = steps + (static_cast<float>(x) - from);
+      std::memcpy(dx_.data() + at, &aside, sizeof aside);
+      std::memcpy(dy_.data() + at, &down, sizeof down);
+      uint32_t four = 0;
+      std::memcpy(&four, row + std::min(x, gray_.cols - 4), sizeof four);
+      const Floats4 levels = FourFloats(four >> (8 * (x - std::min(x, gray_.cols - 4))));
+      std::memcpy(value_.data() + at, &levels, sizeof levels);
     }
+    n += x1 - x0 + 1;
   }
   if (n < 12) return false;
   dx_.conservativeResize(n), dy_.conservativeResize(n), value_.conservativeResize(n);
   for (int i = first_neighbour_[index]; i < first_neighbour_[index + 1]; ++i) {
     const Bell& other = bells_[static_cast<size_t>(neighbours_[static_cast<size_t>(i)].other)];
     if (!other.good) continue;
-    Shape(other, bell.center_px, shape_);
-    value_ -= static_cast<float>(other.height) * shape_;
+    TakeAway(other, bell.center_px);
   }
   Shape(bell, bell.center_px, shape_);
   return true;
 }
 
 void BellFinder::Shape(const Bell& bell, const Vec2& from, Pixels& out) const {
-  const auto ox = static_cast<float>(bell.center_px.x() - from.x()),
-             oy = static_cast<float>(bell.center_px.y() - from.y());
-  const auto xx = static_cast<float>(-0.5 * bell.precision(0, 0)),
-             xy = static_cast<float>(-bell.precision(0, 1)),
-             yy = static_cast<float>(-0.5 * bell.precision(1, 1));
-  out = ((dx_ - ox) * (xx * (dx_ - ox) + xy * (dy_ - oy)) + yy * (dy_ - oy).square()).exp();
+  const Exponent exponent(bell, from);
+  const Eigen::Index n = dx_.size();
+  out.resize(n);
+  for (Eigen::Index i = 0; i < n; i += 4) {
+    const Floats4 e = Exp(exponent(LoadFloats(dx_.data() + i), LoadFloats(dy_.data() + i)));
+    std::memcpy(out.data() + i, &e, sizeof e);  // there is room for what is too much
+  }
+}
+
+// The bell's light from value_.
+void BellFinder::TakeAway(const Bell& bell, const Vec2& from) {
+  const Exponent exponent(bell, from);
+  const Floats4 height = Floats4{} + static_cast<float>(bell.height);
+  for (Eigen::Index i = 0; i < dx_.size(); i += 4) {
+    const Floats4 left = LoadFloats(value_.data() + i) -
+                         height * Exp(exponent(LoadFloats(dx_.data() + i), LoadFloats(dy_.data() + i)));
+    std::memcpy(value_.data() + i, &left, sizeof left);
+  }
 }
 
 // A Gauss-Newton step with the other bells held. The window is even about the centre, so that the even and

@@ -63,9 +63,17 @@ class BellFinder {
   struct Summit {
     int x, y, level;  // smoothed
   };
+  struct Place {
+    float x, y;
+  };
   struct Neighbour {
     int bell, other;
   };
+  int SmoothAt(int x, int y) const {  // from the box, where it is
+    const int i = x - x0_ + 1, k = y - y0_ + 1;
+    const bool inside = i >= 0 && i < box_width_ && k >= 0 && k < box_height_;
+    return inside ? smooth_[static_cast<size_t>(k * box_width_ + i)] : Smooth(x, y);
+  }
   int Smooth(int x, int y) const;  // 3 x 3 binomial mean, times 16
   bool Surrounded(int x, int y, Bell& bell) const;
   bool Stands(const Summit& s, size_t higher, double base, double dip) const;
@@ -73,14 +81,16 @@ class BellFinder {
   void FindNeighbours();
   bool LookAt(size_t index, double radius_squared);
   void Shape(const Bell& bell, const Vec2& from, Pixels& out) const;
+  void TakeAway(const Bell& bell, const Vec2& from);
   void Improve(size_t index);
 
   cv::Mat gray_;
   double noise_ = 1, contrast_ = 10;
-  int x0_ = 0, y0_ = 0, box_width_ = 0;
+  int x0_ = 0, y0_ = 0, box_width_ = 0, box_height_ = 0;
   std::vector<uint16_t> smooth_, column_;  // of the box and a pixel around it; a row's vertical sums
   std::vector<Summit> summits_;
   std::vector<Bell> bells_;
+  std::vector<Place> places_;          // of the bells
   std::vector<Neighbour> neighbours_;  // by bell
   std::vector<int> first_neighbour_;
   Pixels dx_, dy_, value_, shape_;  // of the pixels that a fit looks at, from its bell's centre

@@ -8,6 +8,7 @@ namespace taclink {
 namespace {
 
 constexpr int kMaxPatch = 512;                        // px
+constexpr int kAhead = 2;                             // markers whose patches are fetched early
 constexpr double kSteadyPx = 0.4;                     // a smaller motion predicts nothing: it may be noise
 constexpr double kMaxNoiseRatio = 2.5;                // of a patch's residual over the median one
 constexpr double kModelError = 0.05;                  // of the contrast: what a patch may be off beside noise
@@ -148,6 +149,7 @@ void MarkerTracker::Follow(const Pictures& gray, std::span<const Vec3> predicted
 void MarkerTracker::FollowSeen(Camera& camera, const cv::Mat& gray, CameraTracking& counts) {
   for (int i = 0; i < count_; ++i) {
     Track& track = camera.tracks[static_cast<size_t>(i)];
+    if (i + kAhead < count_) camera.tracks[static_cast<size_t>(i + kAhead)].patch.Prefetch();
     track.lost_now = false;
     if (!track.seen) continue;
     if (Verify(gray, track, camera)) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "sensing/markers/lanes.h"
+
 namespace taclink {
 namespace {
 
@@ -34,21 +36,34 @@ Sums Correlate(const uint8_t* __restrict now, const uint8_t* __restrict referenc
   return s;
 }
 
-// 255 for each set bit, 0 for others.
-uint64_t SpreadBits(uint64_t eight) {
-  const uint64_t picked = (eight & 255) * 0x0101010101010101ULL & 0x8040201008040201ULL;
-  return (((picked + 0x7f7f7f7f7f7f7f7fULL) | picked) >> 7 & 0x0101010101010101ULL) * 255;
+struct NormalSums {
+  int count = 0, r = 0, x = 0, y = 0, rr = 0, rx = 0, ry = 0, xx = 0, xy = 0, yy = 0;
+};
+
+NormalSums SumNormal(const uint8_t* __restrict reference, const int8_t* __restrict gx,
+                     const int8_t* __restrict gy, int count) {
+  NormalSums n;
+  for (int i = 0; i < count; ++i) {
+    const int16_t r = reference[i], x = gx[i], y = gy[i];  // NOLINT(bugprone-signed-char-misuse): numbers
+    n.count += reference[i] != 0 ? 1 : 0;
+    n.r += r, n.x += x, n.y += y;
+    n.rr += r * r, n.rx += r * x, n.ry += r * y;
+    n.xx += x * x, n.xy += x * y, n.yy += y * y;
+  }
+  return n;
 }
 
 // Half of the derivative with an error of the fourth order: spots are only 3 px wide. Vector code: `mask` of
-// a pixel is 0 or 255.
-void TakeBlock(const uint8_t* __restrict p, std::ptrdiff_t down, uint8_t* __restrict mask,
+// a pixel is 0 or 255. A pixel in the mask has a reference of 1 at least, others 0.
+void TakeBlock(const uint8_t* __restrict p, std::ptrdiff_t down, const uint8_t* __restrict mask,
                uint8_t* __restrict reference, int8_t* __restrict gx, int8_t* __restrict gy) {
-  const auto half = [](int near, int far) { return static_cast<int8_t>((8 * near - far) * 2731 >> 16); };
+  const auto half = [](int near, int far) {
+    const auto wide = static_cast<int16_t>(8 * near - far);
+    return static_cast<int8_t>(static_cast<int16_t>(wide * 2731 >> 16));
+  };
   for (std::ptrdiff_t i = 0; i < 8; ++i) {
     const auto in = static_cast<uint8_t>(p[i] < kSaturated ? mask[i] : 0);
-    mask[i] = in;
-    reference[i] = static_cast<uint8_t>(p[i] & in);
+    reference[i] = static_cast<uint8_t>(std::max<uint8_t>(p[i], 1) & in);
     gx[i] = static_cast<int8_t>(half(p[i + 1] - p[i - 1], p[i + 2] - p[i - 2]) & in);
     gy[i] = static_cast<int8_t>(half(p[i + down] - p[i - down], p[i + 2 * down] - p[i - 2 * down]) & in);
   }
@@ -58,11 +73,7 @@ void TakeBlock(const uint8_t* __restrict p, std::ptrdiff_t down, uint8_t* __rest
 
 ReferencePatch::ReferencePatch(int capacity_px)
     : capacity_(std::clamp((capacity_px + 15) / 16 * 16, 64, static_cast<int>(kMaxPixels))) {
-  const auto size = static_cast<size_t>(capacity_);
-  reference_.resize(size);
-  mask_.resize(size);
-  gx_.resize(size);
-  gy_.resize(size);
+  pixels_.resize(3 * static_cast<size_t>(capacity_));
 }
 
 bool ReferencePatch::Take(const cv::Mat& gray, const WindowBlob& blob, const Vec2& center_px) {
@@ -78,12 +89,13 @@ bool ReferencePatch::Take(const cv::Mat& gray, const WindowBlob& blob, const Vec
   if (most_rows < 3) return false;
   step_ = (height + most_rows - 1) / most_rows;
   rows_ = (height + step_ - 1) / step_;
+  const int filled = rows_ * blocks_ * kBlock;
+  count_ = (filled + 15) / 16 * 16;
   for (int row = 0; row < rows_; ++row) TakeRow(gray, blob, row);
-  count_ = rows_ * blocks_ * kBlock;
-  while (count_ % 16 != 0) {
-    const auto i = static_cast<size_t>(count_++);
-    reference_[i] = mask_[i] = 0;
-    gx_[i] = gy_[i] = 0;
+  if (filled < count_) {
+    std::memset(reference() + filled, 0, kBlock);
+    std::memset(gx() + filled, 0, kBlock);
+    std::memset(gy() + filled, 0, kBlock);
   }
   if (!Solve()) Clear();
   return !empty();
@@ -97,29 +109,22 @@ void ReferencePatch::TakeRow(const cv::Mat& gray, const WindowBlob& blob, int ro
     const int x = x0_ + block * kBlock, shift = x - blob.window_x;
     const uint64_t bits = shift >= 64 || shift <= -64 ? 0 : shift >= 0 ? rim >> shift : rim << -shift;
     const int first = (row * blocks_ + block) * kBlock;
-    const auto at = static_cast<size_t>(first);
-    const uint64_t mask = SpreadBits(bits);
-    std::memcpy(mask_.data() + at, &mask, kBlock);
-    TakeBlock(gray.ptr(y) + x, static_cast<std::ptrdiff_t>(gray.step[0]), mask_.data() + at,
-              reference_.data() + at, gx_.data() + at, gy_.data() + at);
+    const uint64_t spread = SpreadBits(bits);
+    std::array<uint8_t, kBlock> mask;
+    std::memcpy(mask.data(), &spread, kBlock);
+    TakeBlock(gray.ptr(y) + x, static_cast<std::ptrdiff_t>(gray.step[0]), mask.data(), reference() + first,
+              gx() + first, gy() + first);
   }
 }
 
 bool ReferencePatch::Solve() {
-  used_ = 0;
-  int r = 0, rr = 0, x = 0, y = 0, rx = 0, ry = 0, xx = 0, xy = 0, yy = 0;
-  for (size_t i = 0; i < static_cast<size_t>(count_); ++i) {
-    const int a = reference_[i], b = gx_[i], c = gy_[i];  // NOLINT(bugprone-signed-char-misuse): numbers
-    used_ += mask_[i] & 1;
-    r += a, x += b, y += c;
-    rr += a * a, rx += a * b, ry += a * c;
-    xx += b * b, xy += b * c, yy += c * c;
-  }
+  const NormalSums n = SumNormal(reference(), gx(), gy(), count_);
+  used_ = n.count;
   Eigen::Matrix4d normal;
-  normal << rr, r, rx, ry,  //
-      r, used_, x, y,       //
-      rx, x, xx, xy,        //
-      ry, y, xy, yy;
+  normal << n.rr, n.r, n.rx, n.ry,  //
+      n.r, n.count, n.x, n.y,       //
+      n.rx, n.x, n.xx, n.xy,        //
+      n.ry, n.y, n.xy, n.yy;
   Eigen::Matrix4d inverse;
   bool invertible = false;
   normal.computeInverseWithCheck(inverse, invertible, 1e-3);
@@ -142,15 +147,15 @@ ReferencePatch::Shift ReferencePatch::Register(const cv::Mat& gray, const Vec2& 
   for (int row = 0; row < rows_; ++row) {
     const uint8_t* p = gray.ptr(y0 + row * step_) + x0;
     for (int block = 0; block < blocks_; ++block, p += kBlock, at += kBlock) {
-      uint64_t pixels = 0, mask = 0;
-      std::memcpy(&pixels, p, kBlock);
-      std::memcpy(&mask, mask_.data() + at, kBlock);
-      pixels &= mask;
-      std::memcpy(now.data() + at, &pixels, kBlock);
+      std::memcpy(now.data() + at, p, kBlock);
     }
   }
-  if (at < static_cast<size_t>(count_)) std::memset(now.data() + at, 0, kBlock);
-  const Sums s = Correlate(now.data(), reference_.data(), gx_.data(), gy_.data(), count_);
+  for (size_t i = 0; i < static_cast<size_t>(count_); i += sizeof(Bytes16)) {
+    const auto mask = reinterpret_cast<Bytes16>(LoadSixteen(reference() + i) != 0);
+    const Bytes16 masked = LoadSixteen(now.data() + i) & mask;
+    std::memcpy(now.data() + i, &masked, sizeof masked);
+  }
+  const Sums s = Correlate(now.data(), reference(), gx(), gy(), count_);
   const Eigen::Vector4f right(static_cast<float>(s.reference), static_cast<float>(s.difference),
                               static_cast<float>(s.gx), static_cast<float>(s.gy));
   const Eigen::Vector4f fit = inverse_ * right;

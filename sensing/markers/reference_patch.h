@@ -34,6 +34,12 @@ class ReferencePatch {
   /// With the patch laid where its centre is next to `expected_px`.
   Shift Register(const cv::Mat& gray, const Vec2& expected_px) const;
 
+  /// Has the memory that Register reads brought nearer, while another is worked on.
+  void Prefetch() const {
+    constexpr int kLine = 64;  // bytes
+    for (int at = 0; at < 3 * count_; at += kLine) __builtin_prefetch(pixels_.data() + at);
+  }
+
   const Vec2& center_px() const { return center_px_; }
   int pixels() const { return used_; }  ///< that Register reads
 
@@ -42,10 +48,16 @@ class ReferencePatch {
 
   void TakeRow(const cv::Mat& gray, const WindowBlob& blob, int row);
   bool Solve();
+  uint8_t* reference() { return pixels_.data(); }
+  const uint8_t* reference() const { return pixels_.data(); }
+  int8_t* gx() { return reinterpret_cast<int8_t*>(pixels_.data() + count_); }
+  const int8_t* gx() const { return reinterpret_cast<const int8_t*>(pixels_.data() + count_); }
+  int8_t* gy() { return gx() + count_; }
+  const int8_t* gy() const { return gx() + count_; }
 
   int capacity_;
-  std::vector<uint8_t> reference_, mask_;  // by row, blocks side by side; outside the mask 0
-  std::vector<int8_t> gx_, gy_;            // half the gradient
+  // By row, blocks side by side: the reference, 0 outside the mask; half its gradient along x and along y.
+  std::vector<uint8_t> pixels_;
   int count_ = 0, used_ = 0;
   int x0_ = 0, y0_ = 0, blocks_ = 0, rows_ = 0, step_ = 1;
   Vec2 center_px_ = Vec2::Zero();

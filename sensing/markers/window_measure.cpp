@@ -6,6 +6,8 @@
 #include <cstring>
 #include <limits>
 
+#include "sensing/markers/lanes.h"
+
 namespace taclink {
 namespace {
 
@@ -39,29 +41,27 @@ uint64_t Wider(uint64_t row) {
   return row | row << 1 | row >> 1;
 }
 
-// Takes a row into the least and the greatest by column. `width`: a multiple of 8.
-template <bool kBright>
-void Extend(const uint8_t* __restrict p, int width, uint8_t* __restrict low, uint8_t* __restrict high) {
-  for (int x = 0; x < width; x += 8) {
-    for (int i = x; i < x + 8; ++i) {
-      low[i] = std::min(low[i], p[i]);
-      if constexpr (kBright) high[i] = std::max(high[i], p[i]);
+constexpr int kWide = sizeof(Bytes16);
+// By column of a block, over its rows: the sums of the weights w, of w y and of w y^2.
+struct ColumnSums {
+  std::array<float, 8> w, wy, wyy;
+};
+
+// y counts from y0 along the block's rows.
+void SumColumns(const uint8_t* block, int rows, float y0, float low, float slope, ColumnSums& sums) {
+  std::array<Floats4, 2> w_sum{}, wy_sum{}, wyy_sum{};
+  float y = y0;
+  for (int row = 0; row < rows; ++row, block += 8, y += 1) {
+    const Floats8 pixels(block);
+    const std::array<Floats4, 2> w = {Clamped((pixels.low - low) * slope),
+                                      Clamped((pixels.high - low) * slope)};
+    for (size_t i = 0; i < 2; ++i) {
+      w_sum[i] += w[i], wy_sum[i] += w[i] * y, wyy_sum[i] += w[i] * (y * y);
     }
   }
-}
-
-// A row of pixels brighter than a level, one bit each. Reads whole blocks of 8: the caller sees to it that
-// they are in the picture.
-uint64_t Brighter(const uint8_t* p, int width, int level) {
-  uint64_t bits = 0;
-  for (int x = 0; x < width; x += 8) {
-    std::array<uint8_t, 8> flags;
-    for (size_t i = 0; i < 8; ++i) flags[i] = p[static_cast<size_t>(x) + i] > level ? 1 : 0;
-    uint64_t eight = 0;
-    std::memcpy(&eight, flags.data(), 8);
-    bits |= (eight * 0x0102040810204080ULL >> 56) << x;
-  }
-  return bits;
+  std::memcpy(sums.w.data(), w_sum.data(), sizeof sums.w);
+  std::memcpy(sums.wy.data(), wy_sum.data(), sizeof sums.wy);
+  std::memcpy(sums.wyy.data(), wyy_sum.data(), sizeof sums.wyy);
 }
 
 }  // namespace
@@ -87,27 +87,27 @@ bool WindowMeasure::Find(const cv::Mat& gray, const WindowTarget& target, Window
 }
 
 bool WindowMeasure::PlaceWindow(const cv::Mat& gray, const WindowTarget& target, WindowBlob& blob) const {
-  const auto place = [&](double expected, double size, int picture, int& begin, int& width) {
+  const auto place = [&](double expected, double size, int picture, int step, int& begin, int& width) {
     const double half = 0.5 * size + target.reach_px + kMargin;
     if (!(expected > -half && expected < picture + half) || picture < 16) return false;
     const int most = std::min(WindowBlob::kMaxSide, picture);
     const int whole = static_cast<int>(std::ceil(2 * half));
-    width = std::min((whole + 7) / 8 * 8, most / 8 * 8);
+    width = std::min((whole + step - 1) / step * step, most / step * step);
     begin = static_cast<int>(std::lround(expected)) - width / 2;
     begin = std::clamp(begin, 0, picture - width);
     return true;
   };
-  if (!place(target.expected_px.x(), target.width_px, gray.cols, blob.window_x, blob.window_width)) {
+  // Whole blocks of pixels, and at least what is compared together.
+  if (!place(target.expected_px.x(), target.width_px, gray.cols, kBlock, blob.window_x, blob.window_width) ||
+      blob.window_width < kWide) {
     return false;
   }
-  return place(target.expected_px.y(), target.height_px, gray.rows, blob.window_y, blob.window_height);
+  return place(target.expected_px.y(), target.height_px, gray.rows, kBlock, blob.window_y,
+               blob.window_height);
 }
 
 // The darkest is what surrounds the spot; the brightest within reach is the spot.
 void WindowMeasure::FindLevels(const cv::Mat& gray, const WindowTarget& target, const WindowBlob& blob) {
-  alignas(16) std::array<uint8_t, WindowBlob::kMaxSide> low, high;
-  low.fill(255);
-  high.fill(0);
   const int width = blob.window_width, height = blob.window_height;
   const auto near = [](double expected, double reach, int size, int& begin, int& end) {
     begin = std::clamp(static_cast<int>(std::ceil(expected - reach)), 0, size);
@@ -116,21 +116,31 @@ void WindowMeasure::FindLevels(const cv::Mat& gray, const WindowTarget& target, 
   int x0, x1, y0, y1;
   near(target.expected_px.x() - blob.window_x, target.reach_px + 0.3 * target.width_px, width, x0, x1);
   near(target.expected_px.y() - blob.window_y, target.reach_px + 0.3 * target.height_px, height, y0, y1);
-  for (int y = 0; y < height; ++y) {
-    const uint8_t* p = gray.ptr(blob.window_y + y) + blob.window_x;
-    y >= y0&& y < y1 ? Extend<true>(p, width, low.data(), high.data())
-                     : Extend<false>(p, width, low.data(), high.data());
+  const auto step = static_cast<std::ptrdiff_t>(gray.step[0]);
+  Bytes16 low = ~Bytes16{};
+  uint8_t bright = 0;
+  for (int x = 0; x < width; x += kWide) {
+    const int at = std::min(x, width - kWide);
+    const uint8_t* p = gray.ptr(blob.window_y) + blob.window_x + at;
+    Bytes16 high{};
+    for (int y = 0; y < height; ++y, p += step) {
+      const Bytes16 here = LoadSixteen(p);
+      low = here < low ? here : low;
+      if (y >= y0 && y < y1) high = here > high ? here : high;
+    }
+    for (int i = std::max(x0 - at, 0); i < std::min(x1 - at, kWide); ++i) bright = std::max(bright, high[i]);
   }
-  uint8_t dark = 255, bright = 0;
-  for (int x = 0; x < width; ++x) dark = std::min(dark, low[static_cast<size_t>(x)]);
-  for (int x = x0; x < x1; ++x) bright = std::max(bright, high[static_cast<size_t>(x)]);
+  uint8_t dark = 255;
+  for (int i = 0; i < kWide; ++i) dark = std::min(dark, low[i]);
   dark_ = dark, bright_ = bright;
 }
 
 void WindowMeasure::Threshold(const cv::Mat& gray, const WindowBlob& blob, int level) {
   for (int y = 0; y < blob.window_height; ++y) {
-    mask_[static_cast<size_t>(y)] =
-        Brighter(gray.ptr(blob.window_y + y) + blob.window_x, blob.window_width, level);
+    const uint8_t* p = gray.ptr(blob.window_y + y) + blob.window_x;
+    uint64_t bits = 0;
+    for (int x = 0; x < blob.window_width; x += kBlock) bits |= Brighter(LoadEight(p + x), level) << x;
+    mask_[static_cast<size_t>(y)] = bits;
   }
 }
 
@@ -217,55 +227,59 @@ void WindowMeasure::FindRim(WindowBlob& blob) const {
   blob.y_begin = blob.window_y + best_.y_begin, blob.y_end = blob.window_y + best_.y_end;
 }
 
+// The pixels of the rim and what it holds, others 0, by columns of blocks.
+void WindowMeasure::Gather(const cv::Mat& gray, const WindowBlob& blob) {
+  first_row_ = std::max(best_.y_begin - 1, 0);
+  rows_ = std::min(best_.y_end + 1, blob.window_height) - first_row_;
+  first_column_ = std::max(best_.x_begin - 1, 0) / kBlock * kBlock;
+  blocks_ = (std::min(best_.x_end + 1, blob.window_width) - first_column_ + kBlock - 1) / kBlock;
+  for (int row = 0; row < rows_; ++row) {
+    const uint8_t* p = gray.ptr(blob.window_y + first_row_ + row) + blob.window_x + first_column_;
+    const uint64_t rim = blob.rim[static_cast<size_t>(first_row_ + row)] >> first_column_;
+    for (int block = 0; block < blocks_; ++block) {
+      const uint64_t eight = LoadEight(p + block * kBlock) & SpreadBits(rim >> (block * kBlock));
+      std::memcpy(spot_.data() + (block * rows_ + row) * kBlock, &eight, sizeof eight);
+    }
+  }
+  // An even number of blocks, so that vector code has no rest.
+  std::memset(spot_.data() + blocks_ * rows_ * kBlock, 0, kBlock);
+}
+
 // Soft coverage, as in MarkerDetector: a pixel's weight rises from 0 to 1 between two levels of the edge.
-bool WindowMeasure::Measure(const cv::Mat& gray, WindowBlob& blob) const {
-  const auto each_run = [&](auto&& add) {
-    for (int y = std::max(best_.y_begin - 1, 0); y < std::min(best_.y_end + 1, blob.window_height); ++y) {
-      const uint8_t* row = gray.ptr(blob.window_y + y) + blob.window_x;
-      for (uint64_t rest = blob.rim[static_cast<size_t>(y)]; rest != 0;) {
-        const int begin = std::countr_zero(rest);
-        const int length = std::countr_one(rest >> begin);
-        add(row, y, begin, begin + length);
-        rest &= ~Bits(begin, begin + length);
-      }
-    }
-  };
-  const int half = (dark_ + bright_) / 2;
+bool WindowMeasure::Measure(const cv::Mat& gray, WindowBlob& blob) {
+  Gather(gray, blob);
+  const auto half = static_cast<uint8_t>((dark_ + bright_) / 2);
   int sum = 0, count = 0;
-  each_run([&](const uint8_t* row, int, int begin, int end) {
-    for (int x = begin; x < end; ++x) {
-      const int in = row[x] >= half ? 1 : 0;
-      sum += in * row[x], count += in;
-    }
-  });
+  for (size_t i = 0; i < static_cast<size_t>((blocks_ * rows_ + 1) / 2) * kWide; ++i) {
+    const uint8_t bright = spot_[i] >= half ? spot_[i] : uint8_t{0};
+    sum += bright, count += bright != 0 ? 1 : 0;
+  }
   if (count == 0) return false;
   const double mean = static_cast<double>(sum) / count, contrast = mean - dark_;
   if (contrast < kLeastContrast) return false;
   const bool small = count < kSmallArea / 2;
   const double low = dark_ + (small ? 0.12 : 0.25) * contrast;
   const double high = small ? mean + 0.1 * contrast : 0.5 * (low + mean);
-  const int low16 = static_cast<int>(16 * low), slope = static_cast<int>(4096 / (high - low));
-  const int x_middle = (best_.x_begin + best_.x_end) / 2, y_middle = (best_.y_begin + best_.y_end) / 2;
-  int w_sum = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0;
-  each_run([&](const uint8_t* row, int y, int begin, int end) {
-    const int dy = y - y_middle;
-    int s0 = 0, s1 = 0, s2 = 0;
-    for (int x = begin; x < end; ++x) {
-      const int w = std::clamp(((16 * row[x] - low16) * slope) >> 8, 0, 256);
-      const int dx = x - x_middle;
-      s0 += w, s1 += w * dx, s2 += w * dx * dx;
+  const double x_middle = 0.5 * (best_.x_begin + best_.x_end), y_middle = 0.5 * (best_.y_begin + best_.y_end);
+  double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0;
+  ColumnSums columns;
+  for (int block = 0; block < blocks_; ++block) {
+    SumColumns(spot_.data() + block * rows_ * kBlock, rows_, static_cast<float>(first_row_ - y_middle),
+               static_cast<float>(low), static_cast<float>(1 / (high - low)), columns);
+    double x = first_column_ + block * kBlock - x_middle;
+    for (size_t i = 0; i < kBlock; ++i, ++x) {
+      const double s = columns.w[i], sy = columns.wy[i];
+      w += s, wx += s * x, wy += sy;
+      wxx += s * x * x, wxy += sy * x, wyy += columns.wyy[i];
     }
-    w_sum += s0, wx += s1, wy += s0 * dy;
-    wxx += s2, wxy += s1 * dy, wyy += s0 * dy * dy;
-  });
-  if (w_sum < 256) return false;
-  const auto mean_of = [&](int total) { return static_cast<double>(total) / w_sum; };
-  const double mx = mean_of(wx), my = mean_of(wy);
-  const double xx = mean_of(wxx) - mx * mx, yy = mean_of(wyy) - my * my, xy = mean_of(wxy) - mx * my;
-  blob.area_px2 = w_sum / 256.0;
+  }
+  if (w < 1) return false;
+  const double mx = wx / w, my = wy / w;
+  const double xx = wxx / w - mx * mx, yy = wyy / w - my * my, xy = wxy / w - mx * my;
+  blob.area_px2 = w;
   blob.contrast = contrast;
   blob.center_px = Vec2(blob.window_x + x_middle + mx, blob.window_y + y_middle + my);
-  blob.spread_px2 = 0.5 * (xx + yy) + std::hypot(0.5 * (xx - yy), xy);
+  blob.spread_px2 = 0.5 * (xx + yy) + std::sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy);
   blob.clipped = blob.x_begin <= 0 || blob.y_begin <= 0 || blob.x_end >= gray.cols || blob.y_end >= gray.rows;
   return true;
 }

@@ -48,6 +48,7 @@ class WindowMeasure {
   int pixels() const { return pixels_; }
 
  private:
+  static constexpr int kBlock = 8;  // pixels that are handled together
   using Rows = std::array<uint64_t, WindowBlob::kMaxSide>;
   struct Part {  // a connected component
     Rows rows;
@@ -60,12 +61,16 @@ class WindowMeasure {
   bool ChoosePart(const WindowTarget& target, const WindowBlob& blob);
   void Flood(const WindowBlob& blob, int y, uint64_t seed, Part& part) const;
   void FindRim(WindowBlob& blob) const;
-  bool Measure(const cv::Mat& gray, WindowBlob& blob) const;
+  void Gather(const cv::Mat& gray, const WindowBlob& blob);
+  bool Measure(const cv::Mat& gray, WindowBlob& blob);
 
   int pixels_ = 0;
   int dark_ = 0, bright_ = 0;  // gray levels of the window
   Rows mask_, left_;
   Part part_, best_;
+  // The spot's pixels from the window's row and column on; the columns of 8 pixels after one another.
+  std::array<uint8_t, WindowBlob::kMaxSide * WindowBlob::kMaxSide + kBlock> spot_;
+  int first_row_ = 0, rows_ = 0, first_column_ = 0, blocks_ = 0;
 };
 
 }  // namespace taclink
