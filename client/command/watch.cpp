@@ -19,7 +19,6 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr milliseconds kPoll{100};  // how soon Ctrl-C is noticed
-constexpr double kPatienceS = 5;
 constexpr milliseconds kRedraw{100};
 constexpr const char* kClearScreen = "\x1b[2J";
 
@@ -28,6 +27,7 @@ struct Options {
   std::vector<std::string> links;
   std::string detail = "contacts";
   double rate_hz = 0;
+  double patience_s = 5;
   bool every = false;
   bool json = false;
   uint64_t count = 0;
@@ -106,7 +106,7 @@ Result<void> Run(const Options& options) {
   std::signal(SIGTERM, [](int) { interrupted = true; });
   Output output(options);
   // Every link says something once a second, so silence means a server or a network that hangs.
-  const double patience_s = std::max(kPatienceS, options.rate_hz > 0 ? 3 / options.rate_hz : 0);
+  const double patience_s = std::max(options.patience_s, options.rate_hz > 0 ? 3 / options.rate_hz : 0);
   double silence_s = 0;
   for (uint64_t taken = 0; !interrupted && (options.count == 0 || taken < options.count);) {
     const auto frame = (*reader)->Next(kPoll);
@@ -142,6 +142,9 @@ void AddWatch(CLI::App& app, Selected& selected) {
       ->capture_default_str();
   command->add_flag("--every", options->every, "Every frame in order, not only the newest");
   command->add_flag("--json", options->json, "One JSON object a line for each frame");
+  command->add_option("--patience", options->patience_s, "Seconds without any word before it gives up")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   command->add_option("--count", options->count, "End after so many frames")->check(CLI::PositiveNumber);
   command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
 }

@@ -13,14 +13,15 @@ namespace {
 using std::chrono::seconds;
 using ::testing::HasSubstr;
 
-// Two links of 20 frames a second with a steady touch each, after 2 s of rest.
+// 20 frames a second with a steady touch after 2 s of rest. It comes back, so that a machine so busy that it
+// missed the rest finds it later.
 constexpr const char* kScene = R"(taclink_scene: 1
 name: steady
 model: cylinder
 frame_rate_hz: 20
-duration_s: 600
+duration_s: 20
 contacts:
-  - {at: {path: 7, ring: 5}, force_n: 0.2, begin_s: 2, end_s: 599, ramp_s: 0.2}
+  - {at: {path: 7, ring: 5}, force_n: 0.2, begin_s: 2, end_s: 19, ramp_s: 0.2}
 )";
 
 class ServerTest : public ScratchFolder {
@@ -42,7 +43,7 @@ class ServerTest : public ScratchFolder {
   }
 
   std::vector<std::string> Watch(std::vector<std::string> more) const {
-    std::vector<std::string> command = {TACLINK, "watch", "--server", address_, "--json"};
+    std::vector<std::string> command = {TACLINK, "watch", "--server", address_, "--json", "--patience", "60"};
     command.insert(command.end(), more.begin(), more.end());
     return command;
   }
@@ -55,7 +56,9 @@ class ServerTest : public ScratchFolder {
       json frame = json::parse(*line);
       if (frame.contains("contacts") && frame.at("contacts").size() == contacts) return frame;
     }
-    ADD_FAILURE() << "no frame with " << contacts << " contacts";
+    const Finished ended = watch.Wait(seconds(0));
+    ADD_FAILURE() << "no frame with " << contacts << " contacts; exit code " << ended.exit_code << ", "
+                  << ended.err;
     return {};
   }
 
@@ -68,7 +71,9 @@ TEST_F(ServerTest, ClientsGetTheForceThatTheSceneExerts) {
   Process watch(Watch({"--links", "b"}));
   // The ramp takes 0.2 s; the frames after it have the full force.
   json frame = FrameWithContacts(watch, 1);
-  for (int i = 0; i < 10; ++i) frame = FrameWithContacts(watch, 1);
+  const auto size = [&] { return ToVec3(frame.at("contacts")[0].at("force_n")).norm(); };
+  for (int i = 0; i < 1000 && !frame.empty() && size() < 0.15; ++i) frame = FrameWithContacts(watch, 1);
+  ASSERT_FALSE(frame.empty());
   EXPECT_EQ(frame.at("link"), "b");
   EXPECT_EQ(frame.at("status"), "ok");
   EXPECT_GE(frame.at("markers").at("seen").get<int>(), 220);
@@ -118,7 +123,7 @@ TEST_F(ServerTest, KilledServerIsNoticed) {
 
 TEST_F(ServerTest, PicturesOfAFolderAreServed) {
   const Finished simulated = Taclink(
-      {"simulate", "--scene", Write("steady.yaml", kScene), "--out", Path("pictures"), "--frames", "60"});
+      {"simulate", "--scene", Write("steady.yaml", kScene), "--out", Path("pictures"), "--frames", "80"});
   ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
   StartServer(
       "taclink_config: 1\narm:\n  name: test\n  links:\n"
