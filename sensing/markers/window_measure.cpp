@@ -14,6 +14,8 @@ namespace {
 constexpr int kMargin = 3;                  // px around the spot, for its rim and the dark beside it
 constexpr int kSmallArea = 60;              // px^2, of the whole spot; as in MarkerDetector
 constexpr int kLeastContrast = 6;           // gray levels
+constexpr double kLeastArea = 4;            // px^2 above the level; of the smallest spots
+constexpr double kLeastPart = 0.6;          // of what they had
 constexpr double kLevels[] = {0.42, 0.62};  // of the contrast; the second parts spots that touch
 constexpr int kSaturated = 250;
 constexpr double kBloom = 1.5;      // a spot that saturates looks larger
@@ -154,6 +156,7 @@ bool WindowMeasure::ChoosePart(const WindowTarget& target, const WindowBlob& blo
                              limit(std::ceil(ex + target.reach_px) + 1, blob.window_width));
   left_ = mask_;
   const double ratio = kMaxAreaRatio * target.looseness;
+  const double least = std::min(kLeastArea, kLeastPart * target.area_px2);
   double nearest = target.reach_px * target.reach_px;
   bool found = false;
   for (int y = y0; y < y1; ++y) {
@@ -165,7 +168,7 @@ bool WindowMeasure::ChoosePart(const WindowTarget& target, const WindowBlob& blo
       const double dx = 0.5 * (part_.x_begin + part_.x_end - 1) - ex;
       const double dy = 0.5 * (part_.y_begin + part_.y_end - 1) - ey;
       const bool fits = part_.area < ratio * target.area_px2 && part_.area * ratio > target.area_px2 &&
-                        part_.area >= 4 &&
+                        part_.area >= least &&
                         2.5 * part_.area > (part_.x_end - part_.x_begin) * (part_.y_end - part_.y_begin);
       if (!fits || dx * dx + dy * dy > nearest) continue;
       nearest = dx * dx + dy * dy;
