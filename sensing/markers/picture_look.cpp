@@ -29,7 +29,7 @@ void PictureLabeller::FillChain(int path) {
     cell.off_path = spots[k].off_path;
     cell.log_radius = last ? at : std::max(at, 0.5 * (spots[k].log_radius + spots[k + 1].log_radius));
     if (std::abs(cell.off_path) > kSector / 2) continue;
-    MarkerPlace place = PlaceFor(path, NearestRing(cell.log_radius), cell);
+    const MarkerPlace place = PlaceFor(path, NearestRing(cell.log_radius), cell);
     const Cell here{{}, cell.off_path, spots[k].log_radius, 0, false};
     const auto beside = FindMarkerAt(gray_, PlaceFor(path, NearestRing(here.log_radius), here), 0);
     const double least = std::max(kMinContrast, kMinContrastPart * (beside ? beside->contrast : 0));

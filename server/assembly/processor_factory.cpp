@@ -35,7 +35,7 @@ class PipelineProcessor final : public LinkProcessor {
     if (order.save && !file_)
       return Error{ErrorCode::kFailedPrecondition,
                    "no file to save to: the link's configuration has no 'calibration'"};
-    save_ = order.save;
+    save_to_ = order.save ? file_ : std::nullopt;
     pipeline_.BeginRest(order.pairs);
     return {};
   }
@@ -56,26 +56,27 @@ class PipelineProcessor final : public LinkProcessor {
 
  private:
   Result<CalibrationResult> Finish() const {
-    const CalibrationSummary& found = *pipeline_.calibration();
-    CalibrationResult result{.markers_used = found.markers_used,
-                             .rms_px = found.rms_px,
-                             .rmse_r_mm = found.rmse_r_mm,
-                             .rmse_tangential_mm = found.rmse_phi_r_mm,
-                             .rmse_z_mm = found.rmse_z_mm,
-                             .file_text = CalibrationText(pipeline_.model().name, found),
+    const std::optional<CalibrationSummary>& found = pipeline_.calibration();
+    if (!found) return Error{ErrorCode::kFailedPrecondition, "the rest pictures gave no cameras; try again"};
+    CalibrationResult result{.markers_used = found->markers_used,
+                             .rms_px = found->rms_px,
+                             .rmse_r_mm = found->rmse_r_mm,
+                             .rmse_tangential_mm = found->rmse_phi_r_mm,
+                             .rmse_z_mm = found->rmse_z_mm,
+                             .file_text = CalibrationText(pipeline_.model().name, *found),
                              .saved_to = {}};
-    if (save_) {
-      const auto saved = SaveCalibration(*file_, pipeline_.model().name, found);
+    if (save_to_) {
+      const auto saved = SaveCalibration(*save_to_, pipeline_.model().name, *found);
       if (!saved) return saved.error();
-      result.saved_to = *file_;
+      result.saved_to = *save_to_;
     }
     return result;
   }
 
   LinkPipeline pipeline_;
   const std::optional<std::string> file_;
-  bool touched_ = false;  // in the newest frame
-  bool save_ = false;
+  bool touched_ = false;                // in the newest frame
+  std::optional<std::string> save_to_;  // by the calibration under way
 };
 
 }  // namespace
