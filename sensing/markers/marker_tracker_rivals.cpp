@@ -8,10 +8,10 @@
 namespace taclink {
 namespace {
 
-constexpr double kRivalPx = 1.5, kRivalPart = 0.4;
-constexpr double kMergedPart = 1.5;
-constexpr double kSinglePartOfPitch = 0.3;
-constexpr int kRivals = 3;  // rings to either side
+constexpr double kRivalPx = 1.5, kRivalPart = 0.4;  // nearer than this, or part of what parts both
+constexpr double kMergedPart = 1.5;                 // of the least distance: two spots may have become one
+constexpr double kSinglePartOfPitch = 0.3;          // off the prediction, of one that a single camera found
+constexpr int kRivals = 3;                          // rings to either side
 constexpr int kRivalRounds = 2;
 constexpr double kMostPushed = 0.7;  // of a marker's radius
 constexpr double kLeastSlope = 0.1;  // of a ray along z

@@ -1,21 +1,8 @@
-// Its own program: it counts every malloc of the process, and so every operator new and all that Eigen takes.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-
 #include "sensing/pipeline/link_pipeline.h"
+#include "tests/support/count_allocations.h"
 #include "tests/support/moving_skin.h"
-
-namespace {
-std::atomic<long> allocations = 0;
-}
-
-extern "C" void* __libc_malloc(size_t size);  // NOLINT(bugprone-reserved-identifier)
-extern "C" void* malloc(size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
 
 namespace taclink {
 namespace {

@@ -1,21 +1,9 @@
-// Steady state allocates nothing: counted at malloc.
 #include <gtest/gtest.h>
-
-#include <atomic>
-#include <cstdlib>
 
 #include "sensing/model/model_file.h"
 #include "sensing/shape/reconstructor.h"
 #include "tests/sensing/shape/support.h"
-
-namespace {
-std::atomic<int> allocations{0};
-}
-extern "C" void* __libc_malloc(size_t size);  // NOLINT(bugprone-reserved-identifier)
-extern "C" void* malloc(size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
+#include "tests/support/count_allocations.h"
 
 namespace taclink {
 namespace {
@@ -31,7 +19,7 @@ TEST(ShapeAllocation, NoneOnceRunning) {
   LabelledMarkers outlier = touched;
   outlier.cameras[0][50].center_px += Vec2(20, 0);
   reconstructor.Reconstruct(outlier, 0, shape);
-  const int before = allocations;
+  const long before = allocations;
   for (const LabelledMarkers* labels : {&still, &touched, static_cast<const LabelledMarkers*>(&outlier)})
     reconstructor.Reconstruct(*labels, 0, shape);
   EXPECT_GT(before, 0);
