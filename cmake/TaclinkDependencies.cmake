@@ -2,6 +2,11 @@
 find_package(Threads REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(Ceres 2.1 REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+add_library(taclink_cholmod INTERFACE)
+target_link_libraries(taclink_cholmod INTERFACE ${CHOLMOD_LIBRARY})
+target_include_directories(taclink_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
 find_package(OpenCVLite REQUIRED)
 find_package(Protobuf REQUIRED)  # module mode, before gRPC's config looks for its own
 find_package(gRPC CONFIG REQUIRED)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -39,9 +40,15 @@ class RadiusProfile {
   Shape shape_;
 };
 
+enum class MaterialLaw : uint8_t {
+  kSaintVenantKirchhoff,  ///< stress linear in Green-Lagrange strain
+  kNeoHookean,            ///< incompressible: Poisson's ratio 0.5
+};
+
 struct Material {
-  double youngs_modulus_mpa = 0;
-  double poisson_ratio = 0;  ///< in [0, 0.5]; the shell is in plane stress, so 0.5 is allowed
+  double youngs_modulus_mpa = 0;  ///< at small strain
+  double poisson_ratio = 0;       ///< in [0, 0.5]; the shell is in plane stress, so 0.5 is allowed
+  MaterialLaw law = MaterialLaw::kSaintVenantKirchhoff;
 };
 
 /// White domes on the inner wall, on `paths` x `rings`. Path l (from 1) lies at the angle

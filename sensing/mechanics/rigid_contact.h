@@ -1,0 +1,64 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "sensing/mechanics/element_load.h"
+#include "sensing/mechanics/nonlinear_shell.h"
+#include "sensing/mechanics/rigid_body.h"
+
+namespace taclink {
+
+struct RigidContactOptions {
+  double offset_mm =
+      0;  ///< of the touched surface from the mid-surface: half the thickness outside, or inside
+  double spacing_mm = 1;  ///< of the points that are kept out of the body
+  /// Pressure by penetration, N/mm^3. The stiffer, the smaller the penetration and the more steps a solution
+  /// takes.
+  double stiffness_n_mm3 = 0;
+  bool sticks = false;  ///< no sliding once touched; else no friction
+};
+
+/// A rigid body that a shell can't enter: points spread over one of its surfaces are held outside by a stiff
+/// one-sided bedding.
+class RigidContact final : public ElementLoad {
+ public:
+  RigidContact(const NonlinearShell& shell, const RigidContactOptions& options);
+
+  void SetBody(const RigidBody& body);
+  const RigidBody& body() const { return body_; }
+
+  /// Where it sticks from now on: call between steps, with the state of the last equilibrium.
+  void Hold(const ShellState& state);
+
+  struct Summary {
+    Vec3 force_n = Vec3::Zero();     ///< on the shell
+    Vec3 center_mm = Vec3::Zero();   ///< pressure-weighted mean of the touched points, deformed
+    Vec3 moment_nmm = Vec3::Zero();  ///< about the link frame's origin
+    double area_mm2 = 0;             ///< of the touched points, at rest
+    double penetration_mm = 0;       ///< largest
+    int points = 0;
+  };
+  Summary Summarize(const ShellState& state) const;
+
+  void Add(DerivativeOrder order, int element, const ElementState& state,
+           ElementResponse& response) const override;
+
+ private:
+  struct Sample {
+    Eigen::Vector4d weights;  // of the corners
+    double area_mm2 = 0;
+    std::optional<Vec3> held_at_mm;  // relative to the body's origin when it was first touched
+  };
+  Vec3 PointOf(const Sample& sample, const ElementState& state) const;
+  bool IsFar(const ElementState& state) const;
+
+  const NonlinearShell& shell_;
+  RigidContactOptions options_;
+  RigidBody body_;
+  Vec3 moved_mm_ = Vec3::Zero();  // of the body since it was first set
+  bool has_body_ = false;
+  std::vector<std::vector<Sample>> samples_;  // by element
+};
+
+}  // namespace taclink
