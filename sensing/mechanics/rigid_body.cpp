@@ -29,30 +29,37 @@ Gap GapTo(const RigidBar& s, const Vec3& p) {
   return RoundGap(across * (p - s.point_mm), s.radius_mm, across, s.axis.unitOrthogonal());
 }
 
-// In the plane through the axis: a box with a rounded corner, `out` beyond the flat part, `up` before the
-// rim's centre.
+// Height above the face, and above a parabola beyond the flat part: the side would throw out points that a
+// long step has put deep behind the face.
 Gap GapTo(const RigidStamp& s, const Vec3& p) {
   const Mat3 across = Mat3::Identity() - s.axis * s.axis.transpose();
   const Vec3 d = p - s.face_center_mm;
-  const double up = s.axis.dot(d) + s.rim_radius_mm;
   const Gap side = RoundGap(across * d, s.radius_mm - s.rim_radius_mm, across, s.axis.unitOrthogonal());
-  const double out = side.distance_mm;
-  if (out <= 0 || up <= 0) {
-    if (up >= out) return {up - s.rim_radius_mm, s.axis, Mat3::Zero()};
-    return {out - s.rim_radius_mm, side.normal, side.curvature_per_mm};
+  const double out = std::max(side.distance_mm, 0.0);
+  Gap gap{s.axis.dot(d) + 0.5 * out * out / s.rim_radius_mm, s.axis + out / s.rim_radius_mm * side.normal,
+          Mat3::Zero()};
+  if (out > 0) {
+    gap.curvature_per_mm =
+        (side.normal * side.normal.transpose() + out * side.curvature_per_mm) / s.rim_radius_mm;
   }
-  const double length = std::hypot(out, up);
-  const Vec3 normal = (out * side.normal + up * s.axis) / length;
-  const Mat3 curvature = (side.normal * side.normal.transpose() + out * side.curvature_per_mm +
-                          s.axis * s.axis.transpose() - normal * normal.transpose()) /
-                         length;
-  return {length - s.rim_radius_mm, normal, curvature};
+  return gap;
 }
 
 }  // namespace
 
 Gap GapOf(const RigidBody& body, const Vec3& point_mm) {
   return std::visit([&](const auto& shape) { return GapTo(shape, point_mm); }, body);
+}
+
+bool IsBeyondReach(const RigidBody& body, const Vec3& point_mm, double reach_mm) {
+  const auto* stamp = std::get_if<RigidStamp>(&body);
+  if (!stamp) return GapOf(body, point_mm).distance_mm > reach_mm;
+  const Vec3 d = point_mm - stamp->face_center_mm;
+  const double up = stamp->axis.dot(d);
+  if (up > reach_mm) return true;
+  // How wide the parabola is as far down as the reach goes.
+  const double widest = stamp->radius_mm + std::sqrt(2 * stamp->rim_radius_mm * (reach_mm - up));
+  return (d - up * stamp->axis).norm() > widest + reach_mm;
 }
 
 RigidBody Moved(const RigidBody& body, const Vec3& by_mm) {

@@ -22,22 +22,24 @@ struct RigidBar {
   Vec3 axis;
   double radius_mm = 0;
 };
-/// Flat-ended round stamp, like a force probe; its rim is rounded.
+/// Flat-ended round stamp, like a force probe; its rim falls off as a parabola.
 struct RigidStamp {
   Vec3 face_center_mm;
   Vec3 axis;  ///< from the face towards the skin
   double radius_mm = 0;
-  double rim_radius_mm = 0.25;
+  double rim_radius_mm = 0.25;  ///< of curvature
 };
 using RigidBody = std::variant<RigidSphere, RigidPlate, RigidBar, RigidStamp>;
 
 /// Where a point is, seen from a body.
 struct Gap {
-  double distance_mm = 0;  ///< to its surface; negative: inside
-  Vec3 normal;             ///< unit, the distance's gradient
+  double distance_mm = 0;  ///< to its surface, of a stamp along its axis; negative: inside
+  Vec3 normal;             ///< the distance's gradient, a unit vector but beside a stamp's face
   Mat3 curvature_per_mm;   ///< the gradient's derivative
 };
 Gap GapOf(const RigidBody& body, const Vec3& point_mm);
+/// No point within `reach_mm` of this one can be inside the body.
+bool IsBeyondReach(const RigidBody& body, const Vec3& point_mm, double reach_mm);
 
 RigidBody Moved(const RigidBody& body, const Vec3& by_mm);
 

@@ -28,8 +28,9 @@ class RigidContact final : public ElementLoad {
   void SetBody(const RigidBody& body);
   const RigidBody& body() const { return body_; }
 
-  /// Where it sticks from now on: call between steps, with the state of the last equilibrium.
-  void Hold(const ShellState& state);
+  /// Holds what touches where it is, and lets go what does not: call with an equilibrium. True: something
+  /// that had been held was let go, so that this is no equilibrium any more.
+  bool Hold(const ShellState& state);
 
   struct Summary {
     Vec3 force_n = Vec3::Zero();     ///< on the shell
@@ -48,10 +49,15 @@ class RigidContact final : public ElementLoad {
   struct Sample {
     Eigen::Vector4d weights;  // of the corners
     double area_mm2 = 0;
-    std::optional<Vec3> held_at_mm;  // relative to the body's origin when it was first touched
+    // Relative to the body's place when it was first set; it can't slide across the normal there.
+    struct Held {
+      Vec3 at_mm, normal;
+    };
+    std::optional<Held> held;
   };
+  Vec3 SlipOf(const Sample& sample, const Vec3& point_mm) const;
   Vec3 PointOf(const Sample& sample, const ElementState& state) const;
-  bool IsFar(const ElementState& state) const;
+  bool IsFar(int element, const ElementState& state) const;
 
   const NonlinearShell& shell_;
   RigidContactOptions options_;
@@ -59,6 +65,7 @@ class RigidContact final : public ElementLoad {
   Vec3 moved_mm_ = Vec3::Zero();  // of the body since it was first set
   bool has_body_ = false;
   std::vector<std::vector<Sample>> samples_;  // by element
+  std::vector<int> held_count_;               // by element
 };
 
 }  // namespace taclink
