@@ -45,6 +45,17 @@ Gap GapTo(const RigidStamp& s, const Vec3& p) {
   return gap;
 }
 
+template <typename Shape>
+Vec3& OriginIn(Shape& shape) {
+  if constexpr (requires { shape.center_mm; }) {
+    return shape.center_mm;
+  } else if constexpr (requires { shape.face_center_mm; }) {
+    return shape.face_center_mm;
+  } else {
+    return shape.point_mm;
+  }
+}
+
 }  // namespace
 
 Gap GapOf(const RigidBody& body, const Vec3& point_mm) {
@@ -65,12 +76,27 @@ bool IsBeyondReach(const RigidBody& body, const Vec3& point_mm, double reach_mm)
 RigidBody Moved(const RigidBody& body, const Vec3& by_mm) {
   return std::visit(
       [&](auto shape) -> RigidBody {
-        if constexpr (requires { shape.center_mm; }) {
-          shape.center_mm += by_mm;
-        } else if constexpr (requires { shape.face_center_mm; }) {
-          shape.face_center_mm += by_mm;
+        OriginIn(shape) += by_mm;
+        return shape;
+      },
+      body);
+}
+
+Vec3 OriginOf(const RigidBody& body) {
+  return std::visit([](auto shape) -> Vec3 { return OriginIn(shape); }, body);
+}
+
+RigidBody Grown(const RigidBody& body, double by_mm) {
+  return std::visit(
+      [&](auto shape) -> RigidBody {
+        if constexpr (requires { shape.rim_radius_mm; }) {
+          shape.face_center_mm += by_mm * shape.axis;
+          shape.rim_radius_mm += by_mm;
+          shape.radius_mm += by_mm;
+        } else if constexpr (requires { shape.outward; }) {
+          shape.point_mm += by_mm * shape.outward;
         } else {
-          shape.point_mm += by_mm;
+          shape.radius_mm += by_mm;
         }
         return shape;
       },

@@ -42,5 +42,9 @@ Gap GapOf(const RigidBody& body, const Vec3& point_mm);
 bool IsBeyondReach(const RigidBody& body, const Vec3& point_mm, double reach_mm);
 
 RigidBody Moved(const RigidBody& body, const Vec3& by_mm);
+/// The body and all within `by_mm` of it.
+RigidBody Grown(const RigidBody& body, double by_mm);
+/// A point that moves with it.
+Vec3 OriginOf(const RigidBody& body);
 
 }  // namespace taclink

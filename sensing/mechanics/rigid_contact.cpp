@@ -8,55 +8,20 @@
 namespace taclink {
 namespace {
 
-Vec3 OriginOf(const RigidBody& body) {
-  return std::visit(
-      [](const auto& shape) -> Vec3 {
-        if constexpr (requires { shape.center_mm; }) {
-          return shape.center_mm;
-        } else if constexpr (requires { shape.face_center_mm; }) {
-          return shape.face_center_mm;
-        } else {
-          return shape.point_mm;
-        }
-      },
-      body);
-}
-
-Vec3 Interpolated(const Eigen::Vector4d& weights, double offset, const ElementState& q) {
+Vec3 Interpolated(const Eigen::Vector4d& weights, const ElementState& q) {
   Vec3 p = Vec3::Zero();
-  for (Eigen::Index i = 0; i < 4; ++i) {
-    p += weights[i] * (q.segment<3>(6 * i) + offset * q.segment<3>(6 * i + 3));
-  }
+  for (Eigen::Index i = 0; i < 4; ++i) p += weights[i] * q.segment<3>(6 * i);
   return p;
-}
-
-// A force and a stiffness at a point, on the corners that carry it.
-void AddPoint(const Eigen::Vector4d& weights, double offset_mm, const Vec3& force, const Mat3& stiffness,
-              bool with_hessian, ElementResponse& response) {
-  for (Eigen::Index i = 0; i < 4; ++i) {
-    response.gradient.segment<3>(6 * i) += weights[i] * force;
-    response.gradient.segment<3>(6 * i + 3) += offset_mm * weights[i] * force;
-  }
-  if (!with_hessian) return;
-  for (Eigen::Index i = 0; i < 4; ++i) {
-    for (Eigen::Index j = 0; j < 4; ++j) {
-      const Mat3 block = weights[i] * weights[j] * stiffness;
-      response.hessian.block<3, 3>(6 * i, 6 * j) += block;
-      response.hessian.block<3, 3>(6 * i, 6 * j + 3) += offset_mm * block;
-      response.hessian.block<3, 3>(6 * i + 3, 6 * j) += offset_mm * block;
-      response.hessian.block<3, 3>(6 * i + 3, 6 * j + 3) += offset_mm * offset_mm * block;
-    }
-  }
 }
 
 }  // namespace
 
 RigidContact::RigidContact(const NonlinearShell& shell, const RigidContactOptions& options)
-    : shell_(shell), options_(options), body_(RigidSphere{Vec3::Zero(), 0}) {
+    : shell_(shell), options_(options), body_(RigidSphere{Vec3::Zero(), 0}), grown_(body_) {
   held_count_.assign(shell.surface().elements.size(), 0);
   const ShellState rest = shell.Rest();
   const auto corner = [&](const ElementState& q, double xi, double eta) {
-    return Interpolated(ShapeFunctionsAt(xi, eta).value, options.offset_mm, q);
+    return Interpolated(ShapeFunctionsAt(xi, eta).value, q);
   };
   for (size_t e = 0; e < shell.surface().elements.size(); ++e) {
     const ElementState q = shell.StateOf(static_cast<int>(e), rest);
@@ -82,23 +47,23 @@ RigidContact::RigidContact(const NonlinearShell& shell, const RigidContactOption
 void RigidContact::SetBody(const RigidBody& body) {
   if (has_body_) moved_mm_ += OriginOf(body) - OriginOf(body_);
   body_ = body;
+  grown_ = Grown(body, shell_.surface().thickness_mm / 2);
   has_body_ = true;
 }
 
 Vec3 RigidContact::PointOf(const Sample& sample, const ElementState& state) const {
-  return Interpolated(sample.weights, options_.offset_mm, state);
+  return Interpolated(sample.weights, state);
 }
 
 // No point of the element can be nearer than its centre less its half diagonal.
 bool RigidContact::IsFar(int element, const ElementState& state) const {
   if (held_count_[static_cast<size_t>(element)] > 0) return false;
-  const Vec3 center = Interpolated(Eigen::Vector4d::Constant(0.25), options_.offset_mm, state);
+  const Vec3 center = Interpolated(Eigen::Vector4d::Constant(0.25), state);
   double reach2 = 0;
   for (Eigen::Index i = 0; i < 4; ++i) {
-    const Vec3 p = state.segment<3>(6 * i) + options_.offset_mm * state.segment<3>(6 * i + 3);
-    reach2 = std::max(reach2, (p - center).squaredNorm());
+    reach2 = std::max(reach2, (state.segment<3>(6 * i) - center).squaredNorm());
   }
-  return IsBeyondReach(body_, center, std::sqrt(reach2));
+  return IsBeyondReach(grown_, center, std::sqrt(reach2));
 }
 
 Vec3 RigidContact::SlipOf(const Sample& sample, const Vec3& point_mm) const {
@@ -109,25 +74,33 @@ Vec3 RigidContact::SlipOf(const Sample& sample, const Vec3& point_mm) const {
 void RigidContact::Add(DerivativeOrder order, int element, const ElementState& state,
                        ElementResponse& response) const {
   if (!has_body_ || IsFar(element, state)) return;
-  for (const Sample& sample : samples_[static_cast<size_t>(element)]) {
-    const Vec3 p = PointOf(sample, state);
-    const Gap gap = GapOf(body_, p);
-    if (gap.distance_mm >= 0 && !sample.held) continue;
-    const double k = options_.stiffness_n_mm3 * sample.area_mm2;
-    const double depth = std::min(gap.distance_mm, 0.0);
-    response.energy_nmm += 0.5 * k * depth * depth;
-    Vec3 force = k * depth * gap.normal;  // the energy's derivative by the point
-    Mat3 stiffness = Mat3::Zero();
-    if (depth < 0) stiffness = k * (gap.normal * gap.normal.transpose() + depth * gap.curvature_per_mm);
-    if (sample.held) {
-      const Vec3 slip = SlipOf(sample, p);
-      response.energy_nmm += 0.5 * k * slip.squaredNorm();
-      force += k * slip;
-      stiffness += k * (Mat3::Identity() - sample.held->normal * sample.held->normal.transpose());
-    }
-    if (order != DerivativeOrder::kEnergy) {
-      AddPoint(sample.weights, options_.offset_mm, force, stiffness, order == DerivativeOrder::kHessian,
-               response);
+  for (const Sample& sample : samples_[static_cast<size_t>(element)])
+    AddPoint(sample, state, order, response);
+}
+
+void RigidContact::AddPoint(const Sample& sample, const ElementState& state, DerivativeOrder order,
+                            ElementResponse& response) const {
+  const Vec3 p = PointOf(sample, state);
+  const Gap gap = GapOf(grown_, p);
+  if (gap.distance_mm >= 0 && !sample.held) return;
+  const double k = options_.stiffness_n_mm3 * sample.area_mm2;
+  const double depth = std::min(gap.distance_mm, 0.0);
+  response.energy_nmm += 0.5 * k * depth * depth;
+  Vec3 force = k * depth * gap.normal;  // the energy's derivative by the point
+  Mat3 stiffness = Mat3::Zero();
+  if (depth < 0) stiffness = k * (gap.normal * gap.normal.transpose() + depth * gap.curvature_per_mm);
+  if (sample.held) {
+    const Vec3 slip = SlipOf(sample, p);
+    response.energy_nmm += 0.5 * k * slip.squaredNorm();
+    force += k * slip;
+    stiffness += k * (Mat3::Identity() - sample.held->normal * sample.held->normal.transpose());
+  }
+  if (order == DerivativeOrder::kEnergy) return;
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    response.gradient.segment<3>(6 * i) += sample.weights[i] * force;
+    if (order == DerivativeOrder::kGradient) continue;
+    for (Eigen::Index j = 0; j < 4; ++j) {
+      response.hessian.block<3, 3>(6 * i, 6 * j) += sample.weights[i] * sample.weights[j] * stiffness;
     }
   }
 }
@@ -140,18 +113,41 @@ bool RigidContact::Hold(const ShellState& state) {
     if (IsFar(static_cast<int>(e), q)) continue;
     for (Sample& sample : samples_[e]) {
       const Vec3 p = PointOf(sample, q);
-      const Gap gap = GapOf(body_, p);
+      const Gap gap = GapOf(grown_, p);
       if (gap.distance_mm >= 0) {
         let_go = let_go || sample.held;
         held_count_[e] -= sample.held ? 1 : 0;
         sample.held.reset();
       } else if (!sample.held) {
-        sample.held = Sample::Held{p - moved_mm_, gap.normal.normalized()};
+        sample.held = HeldPoint{p - moved_mm_, gap.normal.normalized()};
         ++held_count_[e];
       }
     }
   }
   return let_go;
+}
+
+RigidContact::Grip RigidContact::GripNow() const {
+  Grip grip;
+  for (size_t e = 0; e < samples_.size(); ++e) {
+    if (held_count_[e] == 0) continue;
+    for (size_t i = 0; i < samples_[e].size(); ++i) {
+      if (samples_[e][i].held) grip.entries.push_back({e, i, *samples_[e][i].held});
+    }
+  }
+  return grip;
+}
+
+void RigidContact::Restore(const Grip& grip) {
+  for (size_t e = 0; e < samples_.size(); ++e) {
+    if (held_count_[e] == 0) continue;
+    for (Sample& sample : samples_[e]) sample.held.reset();
+    held_count_[e] = 0;
+  }
+  for (const auto& [element, sample, held] : grip.entries) {
+    samples_[element][sample].held = held;
+    ++held_count_[element];
+  }
 }
 
 RigidContact::Summary RigidContact::Summarize(const ShellState& state) const {
@@ -162,15 +158,16 @@ RigidContact::Summary RigidContact::Summarize(const ShellState& state) const {
     if (!has_body_ || IsFar(static_cast<int>(e), q)) continue;
     for (const Sample& sample : samples_[e]) {
       const Vec3 p = PointOf(sample, q);
-      const Gap gap = GapOf(body_, p);
+      const Gap gap = GapOf(grown_, p);
       if (gap.distance_mm >= 0) continue;
       const double k = options_.stiffness_n_mm3 * sample.area_mm2;
       Vec3 force = -k * gap.distance_mm * gap.normal;
       if (sample.held) force -= k * SlipOf(sample, p);
       const double weight = -k * gap.distance_mm;
+      const Vec3 touched = p - shell_.surface().thickness_mm / 2 * gap.normal.normalized();
       summary.force_n += force;
-      summary.moment_nmm += p.cross(force);
-      summary.center_mm += weight * p;
+      summary.moment_nmm += touched.cross(force);
+      summary.center_mm += weight * touched;
       pressing += weight;
       summary.area_mm2 += sample.area_mm2;
       summary.penetration_mm = std::max(summary.penetration_mm, -gap.distance_mm);

@@ -19,8 +19,9 @@ struct RigidContactOptions {
   bool sticks = false;  ///< no sliding once touched; else no friction
 };
 
-/// A rigid body that a shell can't enter: points spread over one of its surfaces are held outside by a stiff
-/// one-sided bedding.
+/// A rigid body that a shell can't enter: points spread over its mid-surface are held half a thickness
+/// outside the body by a stiff one-sided bedding. (Points of the touched wall would do the same, were it not
+/// that a force there turns the director over.)
 class RigidContact final : public ElementLoad {
  public:
   RigidContact(const NonlinearShell& shell, const RigidContactOptions& options);
@@ -32,9 +33,14 @@ class RigidContact final : public ElementLoad {
   /// that had been held was let go, so that this is no equilibrium any more.
   bool Hold(const ShellState& state);
 
+  /// All that is held, to go back to.
+  struct Grip;
+  Grip GripNow() const;
+  void Restore(const Grip& grip);
+
   struct Summary {
     Vec3 force_n = Vec3::Zero();     ///< on the shell
-    Vec3 center_mm = Vec3::Zero();   ///< pressure-weighted mean of the touched points, deformed
+    Vec3 center_mm = Vec3::Zero();   ///< of pressure, on the body
     Vec3 moment_nmm = Vec3::Zero();  ///< about the link frame's origin
     double area_mm2 = 0;             ///< of the touched points, at rest
     double penetration_mm = 0;       ///< largest
@@ -46,15 +52,17 @@ class RigidContact final : public ElementLoad {
            ElementResponse& response) const override;
 
  private:
+  struct HeldPoint {
+    Vec3 at_mm, normal;
+  };
   struct Sample {
     Eigen::Vector4d weights;  // of the corners
     double area_mm2 = 0;
     // Relative to the body's place when it was first set; it can't slide across the normal there.
-    struct Held {
-      Vec3 at_mm, normal;
-    };
-    std::optional<Held> held;
+    std::optional<HeldPoint> held;
   };
+  void AddPoint(const Sample& sample, const ElementState& state, DerivativeOrder order,
+                ElementResponse& response) const;
   Vec3 SlipOf(const Sample& sample, const Vec3& point_mm) const;
   Vec3 PointOf(const Sample& sample, const ElementState& state) const;
   bool IsFar(int element, const ElementState& state) const;
@@ -62,10 +70,19 @@ class RigidContact final : public ElementLoad {
   const NonlinearShell& shell_;
   RigidContactOptions options_;
   RigidBody body_;
+  RigidBody grown_;               // by half the shell's thickness
   Vec3 moved_mm_ = Vec3::Zero();  // of the body since it was first set
   bool has_body_ = false;
   std::vector<std::vector<Sample>> samples_;  // by element
   std::vector<int> held_count_;               // by element
+};
+
+struct RigidContact::Grip {
+  struct Entry {
+    size_t element, sample;
+    HeldPoint held;
+  };
+  std::vector<Entry> entries;
 };
 
 }  // namespace taclink

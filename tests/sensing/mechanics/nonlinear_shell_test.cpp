@@ -90,11 +90,10 @@ TEST_P(Derivatives, OfTheElement) {
 TEST_P(Derivatives, OfPressureAndContact) {
   const NonlinearShell shell(SmallSurface(), MaterialOf(GetParam()));
   const FollowerPressure pressure(kThickness, 5e-3);
-  RigidContact ball(shell,
-                    {.offset_mm = kThickness / 2, .spacing_mm = 2, .stiffness_n_mm3 = 0.5, .sticks = true});
+  RigidContact ball(shell, {.spacing_mm = 2, .stiffness_n_mm3 = 0.5, .sticks = true});
   ball.SetBody(RigidSphere{{47, 5, 10}, 8});
   ball.Hold(Disturbed(shell, 0.4, 3));
-  RigidContact stamp(shell, {.offset_mm = kThickness / 2, .spacing_mm = 2, .stiffness_n_mm3 = 0.5});
+  RigidContact stamp(shell, {.spacing_mm = 2, .stiffness_n_mm3 = 0.5});
   stamp.SetBody(RigidStamp{{39, 3, 8}, Vec3(-1, 0.1, 0).normalized(), 3, 1});
   const std::array<const ElementLoad*, 3> loads = {&pressure, &ball, &stamp};
   const ShellState state = Disturbed(shell, 0.8, 2);

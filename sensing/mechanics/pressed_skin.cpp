@@ -1,0 +1,151 @@
+#include "sensing/mechanics/pressed_skin.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace taclink {
+namespace {
+
+constexpr double kTolerance = 1e-7;  // of E t^2
+
+EquilibriumOptions SolverOptions(const LinkModel& model) {
+  EquilibriumOptions options;
+  options.tolerance_n =
+      kTolerance * model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm;
+  return options;
+}
+
+RigidContactOptions ContactOptions(const LinkModel& model, const PressedSkinOptions& options, bool sticks) {
+  return {.spacing_mm = options.spacing_mm,
+          .stiffness_n_mm3 = options.stiffness * model.material.youngs_modulus_mpa / model.thickness_mm,
+          .sticks = sticks};
+}
+
+}  // namespace
+
+std::string PressSummary::Text() const {
+  if (ok()) return "converged in " + std::to_string(steps) + " steps";
+  return "stopped at " + std::to_string(static_cast<int>(100 * reached)) + " % of the way: " + Name(stop);
+}
+
+PressedSkin::PressedSkin(const LinkModel& model, const PressedSkinOptions& options)
+    : model_(model),
+      options_(options),
+      mesh_(MakeShellMesh(model, options.refinement)),
+      shell_(SkinSurface(mesh_), model.material),
+      solver_(shell_, SolverOptions(model)),
+      pressure_(model.thickness_mm, 0),
+      state_(shell_.Rest()) {
+  if (model.tube_outer_radius_mm > 0) {
+    tube_ = std::make_unique<RigidContact>(shell_, ContactOptions(model, options, false));
+    tube_->SetBody(RigidBar{Vec3::Zero(), Vec3::UnitZ(), model.tube_outer_radius_mm});
+  }
+}
+
+int PressedSkin::AddBody(const RigidBody& body, bool sticks) {
+  bodies_.emplace_back(shell_, ContactOptions(model_, options_, sticks));
+  bodies_.back().SetBody(body);
+  return static_cast<int>(bodies_.size()) - 1;
+}
+
+RigidContact::Summary PressedSkin::TubeContact() const {
+  return tube_ ? tube_->Summarize(state_) : RigidContact::Summary{};
+}
+
+Vec3 PressedSkin::Marker(int marker) const {
+  return state_.AtOffset(mesh_.NodeOfMarker(model_, marker),
+                         model_.thickness_mm / 2 - model_.markers.center_depth_mm);
+}
+
+EquilibriumSummary PressedSkin::Settle(ShellState& state) {
+  std::vector<const ElementLoad*> loads = {&pressure_};
+  if (tube_) loads.push_back(tube_.get());
+  for (const RigidContact& body : bodies_) loads.push_back(&body);
+  return solver_.Solve(loads, {}, state);
+}
+
+ShellState PressedSkin::Extrapolated(const Point& before, const Point& last, double at) {
+  const double share = (at - last.at) / (last.at - before.at);
+  ShellState guess = last.state;
+  for (size_t i = 0; i < guess.mids_mm.size(); ++i) {
+    guess.mids_mm[i] += share * (last.state.mids_mm[i] - before.state.mids_mm[i]);
+    Vec3& d = guess.directors[i];
+    Vec3& t = guess.tangents[i];
+    d = (d + share * (d - before.state.directors[i])).normalized();
+    t = (t - t.dot(d) * d).normalized();
+  }
+  return guess;
+}
+
+// `advance` sets the loads for a share of the way. Steps grow where they are easy and halve where they fail.
+template <typename Advance>
+PressSummary PressedSkin::Follow(double longest, double least, Advance advance) {
+  constexpr int kEasy = 6, kMostSettlings = 4;
+  PressSummary summary;
+  Point last{0, state_};
+  std::optional<Point> before;
+  double step = longest;
+  while (last.at < 1) {
+    const double at = last.at + step > 1 - 1e-9 ? 1 : last.at + step;
+    advance(at);
+    ShellState guess = before ? Extrapolated(*before, last, at) : last.state;
+    std::vector<RigidContact::Grip> grips;
+    for (const RigidContact& body : bodies_) grips.push_back(body.GripNow());
+    EquilibriumSummary settled;
+    int iterations = 0;
+    for (int settling = 0; settling < kMostSettlings; ++settling) {
+      settled = Settle(guess);
+      iterations += settled.iterations;
+      summary.shifted += settled.shifted;
+      if (!settled.ok()) break;
+      bool let_go = false;
+      for (RigidContact& body : bodies_) let_go = body.Hold(guess) || let_go;
+      if (!let_go) break;
+    }
+    summary.iterations += iterations;
+    if (!settled.ok()) {
+      for (size_t i = 0; i < bodies_.size(); ++i) bodies_[i].Restore(grips[i]);
+      step /= 2;
+      if (step >= least) continue;
+      advance(last.at);
+      summary.stop = settled.stop;
+      summary.residual_n = settled.residual_n;
+      summary.reached = last.at;
+      break;
+    }
+    ++summary.steps;
+    summary.residual_n = settled.residual_n;
+    summary.stable = settled.stable;
+    before = std::move(last);
+    last = {at, std::move(guess)};
+    if (iterations <= kEasy) step = std::min(longest, 1.5 * step);
+  }
+  state_ = std::move(last.state);
+  return summary;
+}
+
+PressSummary PressedSkin::Inflate(double pressure_mpa) {
+  const double from = pressure_mpa_, change = pressure_mpa - from;
+  if (change == 0) return {};
+  const double longest = std::min(1.0, options_.pressure_step_mpa / std::abs(change));
+  return Follow(longest, longest / 256, [&](double at) {
+    pressure_mpa_ = from + at * change;
+    pressure_ = FollowerPressure(model_.thickness_mm, pressure_mpa_);
+  });
+}
+
+PressSummary PressedSkin::Move(std::span<const Vec3> by_mm) {
+  double distance = 0;
+  for (const Vec3& by : by_mm) distance = std::max(distance, by.norm());
+  if (distance == 0) return {};
+  std::vector<RigidBody> from;
+  from.reserve(bodies_.size());
+  for (const RigidContact& body : bodies_) from.push_back(body.body());
+  return Follow(std::min(1.0, options_.step_mm / distance), options_.least_step_mm / distance,
+                [&](double at) {
+                  for (size_t i = 0; i < by_mm.size(); ++i) bodies_[i].SetBody(Moved(from[i], at * by_mm[i]));
+                });
+}
+
+}  // namespace taclink

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sensing/core/link_model.h"
+#include "sensing/mechanics/equilibrium.h"
+#include "sensing/mechanics/rigid_contact.h"
+#include "sensing/mechanics/shell_mesh.h"
+
+namespace taclink {
+
+struct PressedSkinOptions {
+  int refinement = 2;           ///< elements per interval of the marker grid
+  double step_mm = 1;           ///< longest motion of a body from one equilibrium to the next
+  double least_step_mm = 0.01;  ///< gives up below
+  double pressure_step_mpa = 4e-4;
+  double spacing_mm = 0.8;  ///< of contact points
+  double stiffness = 1000;  ///< of contact, times Young's modulus / thickness
+};
+
+/// Why a skin's way to a new state ended, and what it took.
+struct PressSummary {
+  EquilibriumStop stop = EquilibriumStop::kConverged;
+  double reached = 1;  ///< share of the way
+  int steps = 0;
+  int iterations = 0;
+  int shifted = 0;
+  double residual_n = 0;
+  bool stable = true;
+  bool ok() const { return stop == EquilibriumStop::kConverged && reached == 1; }
+  /// In words: "converged in 12 steps", "stopped at 40 % of the way: no descent".
+  std::string Text() const;
+};
+
+/// A link's skin as the nonlinear shell, under pressure and pressed by rigid bodies; the inner tube stops it.
+/// Each change is followed in steps, as long as they succeed. One thread.
+class PressedSkin {
+ public:
+  PressedSkin(const LinkModel& model, const PressedSkinOptions& options);
+
+  /// Errors are in the summary; the state stays at the last equilibrium.
+  PressSummary Inflate(double pressure_mpa);
+  /// A body that does not touch yet. Returns its index.
+  int AddBody(const RigidBody& body, bool sticks);
+  /// Moves all bodies in a straight line, together, `by_mm` each by index.
+  PressSummary Move(std::span<const Vec3> by_mm);
+
+  const NonlinearShell& shell() const { return shell_; }
+  const ShellMesh& mesh() const { return mesh_; }
+  const ShellState& state() const { return state_; }
+  double pressure_mpa() const { return pressure_mpa_; }
+  RigidContact::Summary ContactOf(int body) const {
+    return bodies_[static_cast<size_t>(body)].Summarize(state_);
+  }
+  RigidContact::Summary TubeContact() const;
+  /// Where a marker's centre is.
+  Vec3 Marker(int marker) const;
+
+ private:
+  struct Point {
+    double at = 0;  // share of the way
+    ShellState state;
+  };
+  template <typename Advance>
+  PressSummary Follow(double longest, double least, Advance advance);
+  EquilibriumSummary Settle(ShellState& state);
+  static ShellState Extrapolated(const Point& before, const Point& last, double at);
+
+  LinkModel model_;
+  PressedSkinOptions options_;
+  ShellMesh mesh_;
+  NonlinearShell shell_;
+  EquilibriumSolver solver_;
+  FollowerPressure pressure_;
+  double pressure_mpa_ = 0;
+  std::unique_ptr<RigidContact> tube_;
+  std::deque<RigidContact> bodies_;
+  ShellState state_;
+};
+
+}  // namespace taclink
