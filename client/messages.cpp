@@ -36,6 +36,21 @@ LinkStatus From(v1::LinkStatus status) {
   }
 }
 
+ForceModel From(v1::ForceModel model) {
+  switch (model) {
+    case v1::FORCE_MODEL_LITERAL:
+      return ForceModel::kLiteral;
+    case v1::FORCE_MODEL_LINEAR:
+      return ForceModel::kLinear;
+    case v1::FORCE_MODEL_PRESSURISED:
+      return ForceModel::kPressurised;
+    case v1::FORCE_MODEL_NONLINEAR:
+      return ForceModel::kNonlinear;
+    default:
+      return ForceModel::kUnknown;
+  }
+}
+
 MarkerSource From(v1::MarkerSource source) {
   switch (source) {
     case v1::MARKER_SOURCE_BOTH:
@@ -150,7 +165,19 @@ const char* Name(LinkStatus status) {
 }
 
 const char* Name(ForceModel model) {
-  return model == ForceModel::kLinear ? "linear" : "unknown";
+  switch (model) {
+    case ForceModel::kLiteral:
+      return "literal";
+    case ForceModel::kLinear:
+      return "linear";
+    case ForceModel::kPressurised:
+      return "pressurised";
+    case ForceModel::kNonlinear:
+      return "nonlinear";
+    case ForceModel::kUnknown:
+      break;
+  }
+  return "unknown";
 }
 
 const char* Name(SourceKind kind) {
@@ -186,8 +213,7 @@ Frame FromMessage(const v1::LinkFrame& message) {
   frame.markers_inferred = static_cast<int>(message.markers_inferred());
   for (const auto& contact : message.contacts()) frame.contacts.push_back(From(contact));
   frame.total_force_n = From(message.total_force_n());
-  frame.force_model =
-      message.force_model() == v1::FORCE_MODEL_LINEAR ? ForceModel::kLinear : ForceModel::kUnknown;
+  frame.force_model = From(message.force_model());
   frame.baseline_age_s = message.baseline_age_s();
   frame.tracked = message.tracking_mode() == v1::TRACKING_MODE_TRACKED;
   for (const auto& camera : message.cameras())

@@ -66,14 +66,29 @@ LinkStatus FromWire(v1::LinkStatus status) {
 
 v1::ForceModel ToWire(ForceModel model) {
   switch (model) {
+    case ForceModel::kLiteral:
+      return v1::FORCE_MODEL_LITERAL;
     case ForceModel::kLinear:
       return v1::FORCE_MODEL_LINEAR;
+    case ForceModel::kPressurised:
+      return v1::FORCE_MODEL_PRESSURISED;
+    case ForceModel::kNonlinear:
+      return v1::FORCE_MODEL_NONLINEAR;
   }
   return v1::FORCE_MODEL_UNSPECIFIED;
 }
 
-ForceModel FromWire(v1::ForceModel) {
-  return ForceModel::kLinear;
+ForceModel FromWire(v1::ForceModel model) {
+  switch (model) {
+    case v1::FORCE_MODEL_LITERAL:
+      return ForceModel::kLiteral;
+    case v1::FORCE_MODEL_PRESSURISED:
+      return ForceModel::kPressurised;
+    case v1::FORCE_MODEL_NONLINEAR:
+      return ForceModel::kNonlinear;
+    default:
+      return ForceModel::kLinear;
+  }
 }
 
 v1::MarkerSource ToWire(MarkerSource source) {

@@ -17,8 +17,8 @@ struct PushOptions {
   double depth_mm = 0;
   double pressure_kpa = 0;
   double patch_diameter_mm = 5.5;
-  int refinement = 1;
-  std::string force_model = "linear";
+  int refinement = 3;
+  std::string force_model = "nonlinear";
   bool json = false;
 };
 
@@ -32,14 +32,22 @@ Result<void> Push(const PushOptions& options) {
                      model->name + "' has paths 1 to " + std::to_string(model->markers.paths) +
                      " and rings 1 to " + std::to_string(model->markers.rings())};
   }
-  const auto result = PushSkin(*model, {.marker = model->MarkerIndex(path - 1, ring - 1),
-                                        .depth_mm = options.depth_mm,
-                                        .pressure_mpa = options.pressure_kpa * 1e-3,
-                                        .patch_diameter_mm = options.patch_diameter_mm,
-                                        .refinement = options.refinement});
+  const auto result = PushSkin(
+      *model,
+      {.marker = model->MarkerIndex(path - 1, ring - 1),
+       .depth_mm = options.depth_mm,
+       .pressure_mpa = options.pressure_kpa * 1e-3,
+       .patch_diameter_mm = options.patch_diameter_mm,
+       .refinement = options.refinement,
+       .force_model = options.force_model == "linear" ? ForceModel::kLinear : ForceModel::kNonlinear});
   if (!result) return result.error();
   if (options.json) {
-    std::puts(Json({{"force_n", result->force_n}, {"inflation_mm", result->inflation_mm}}).dump().c_str());
+    std::puts(Json({{"force_n", result->force_n},
+                    {"inflation_mm", result->inflation_mm},
+                    {"indentation_mm", result->indentation_mm},
+                    {"solution", result->solution}})
+                  .dump()
+                  .c_str());
   } else {
     std::printf("force %.4f N, inflation %.3f mm, nodes in contact %d\n", result->force_n,
                 result->inflation_mm, result->nodes_in_contact);
@@ -67,8 +75,8 @@ void AddSkin(CLI::App& app, Selected& selected) {
   push->add_option("--patch-diameter-mm", options->patch_diameter_mm, "Of the disc")->check(Within(0, 1e3));
   push->add_option("--refinement", options->refinement, "Elements per marker interval")
       ->check(CLI::Range(1, 8));
-  push->add_option("--force-model", options->force_model, "Only linear so far")
-      ->check(CLI::IsMember({"linear"}));
+  push->add_option("--force-model", options->force_model, "nonlinear, or linear: small displacements only")
+      ->check(CLI::IsMember({"nonlinear", "linear"}));
   push->add_flag("--json", options->json, "One JSON object");
   push->callback([options, &selected] { selected = [options] { return Push(*options); }; });
 }

@@ -31,7 +31,7 @@ enum class Delivery {
 enum class LinkStatus { kUnknown, kStarting, kCalibrating, kOk, kDegraded, kLost };
 const char* Name(LinkStatus status);  ///< "ok", "lost", ...
 
-enum class ForceModel { kUnknown, kLinear };
+enum class ForceModel { kUnknown, kLiteral, kLinear, kPressurised, kNonlinear };
 const char* Name(ForceModel model);
 
 enum class MarkerSource : uint8_t { kUnknown, kBoth, kTop, kBottom, kInferred };

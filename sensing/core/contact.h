@@ -8,9 +8,27 @@
 
 namespace taclink {
 
-enum class ForceModel : uint8_t { kLinear };
+/// How displacements become forces; from the thesis' own to the most exact.
+enum class ForceModel : uint8_t {
+  kLiteral,      ///< stiffness times displacements with zero rotations, (6.1): for comparison only
+  kLinear,       ///< small displacements, no pressure
+  kPressurised,  ///< small displacements about the skin inflated by the pressure
+  kNonlinear,    ///< large displacements
+};
+inline constexpr ForceModel kForceModels[] = {ForceModel::kLiteral, ForceModel::kLinear,
+                                              ForceModel::kPressurised, ForceModel::kNonlinear};
 constexpr const char* Name(ForceModel model) {
-  return model == ForceModel::kLinear ? "linear" : "unknown";
+  switch (model) {
+    case ForceModel::kLiteral:
+      return "literal";
+    case ForceModel::kLinear:
+      return "linear";
+    case ForceModel::kPressurised:
+      return "pressurised";
+    case ForceModel::kNonlinear:
+      return "nonlinear";
+  }
+  return "unknown";
 }
 
 /// What the world exerts on the skin, lumped at the markers' places on the mid-surface. Link frame, N.

@@ -6,6 +6,7 @@
 #include "sensing/core/contact.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/skin_shape.h"
+#include "sensing/force/force_estimator.h"
 
 namespace taclink {
 
@@ -34,13 +35,13 @@ struct LinearEstimatorOptions {
 /// deviations, so noise makes no forces. Solved by Lawson and Hanson's active set; the loads found are then
 /// fitted once more without the second term, which would make them too small. Holds scratch memory: one
 /// thread.
-class LinearForceEstimator {
+class LinearForceEstimator final : public ForceEstimator {
  public:
   explicit LinearForceEstimator(const LinkModel& model, const LinearEstimatorOptions& options = {});
 
   /// Uses the shape's measured displacements; its others are not independent of each other. `pressure_mpa`:
   /// gauge pressure now less that of the baseline.
-  void Estimate(const SkinShape& shape, double pressure_mpa, NodalForces& forces);
+  void Estimate(const SkinShape& shape, double pressure_mpa, NodalForces& forces) override;
 
  private:
   bool Whiten(const SkinShape& shape, double pressure_mpa);

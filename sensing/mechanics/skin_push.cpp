@@ -7,11 +7,15 @@
 #include <vector>
 
 #include "sensing/mechanics/linear_shell.h"
+#include "sensing/mechanics/pressed_skin.h"
 
 namespace taclink {
 namespace {
 
 constexpr double kMaxPressureMpa = 0.02;  // several times what any skin of this kind bears
+
+constexpr double kStartMm = 0.1;  // of the disc, outside the skin
+constexpr double kRimMm = 0.25;   // radius of the disc's edge
 
 std::string Shown(double value) {
   std::string text = std::to_string(value);
@@ -60,10 +64,7 @@ std::vector<int> NodesUnderDisc(const ShellMesh& mesh, int center, const Vec3& a
   return nodes;
 }
 
-}  // namespace
-
-Result<SkinPushResult> PushSkin(const LinkModel& model, const SkinPush& push) {
-  if (auto good = Check(model, push); !good) return good.error();
+SkinPushResult PushLinear(const LinkModel& model, const SkinPush& push) {
   const LinearShell shell(model, push.refinement);
   const ShellMesh& mesh = shell.mesh();
   const int center = mesh.NodeOfMarker(model, push.marker);
@@ -103,6 +104,55 @@ Result<SkinPushResult> PushSkin(const LinkModel& model, const SkinPush& push) {
     nodes.erase(nodes.begin() + pulling);  // contact can't pull
   }
   return result;
+}
+
+Error NoEquilibrium(const char* where, const PressSummary& summary) {
+  return {ErrorCode::kFailedPrecondition, std::string("no equilibrium found while ") + where + ": " +
+                                              summary.Text() + "; try a finer mesh or a smaller load"};
+}
+
+Result<SkinPushResult> PushNonlinear(const LinkModel& model, const SkinPush& push) {
+  PressedSkin skin(model, {.refinement = push.refinement});
+  const PressSummary inflated = skin.Inflate(push.pressure_mpa);
+  if (!inflated.ok()) return NoEquilibrium("inflating", inflated);
+  const ShellMesh& mesh = skin.mesh();
+  const auto center = static_cast<size_t>(mesh.NodeOfMarker(model, push.marker));
+  const Vec3 axis = mesh.normals[center];
+  SkinPushResult result;
+  result.inflation_mm = (skin.state().mids_mm[center] - mesh.mid_mm[center]).dot(axis);
+  // From just outside the inflated skin; a flat disc meets a doubly curved one at its highest point.
+  double highest = result.inflation_mm;
+  for (const int node : NodesUnderDisc(mesh, static_cast<int>(center), axis, push.patch_diameter_mm / 2)) {
+    const auto i = static_cast<size_t>(node);
+    highest = std::max(highest, axis.dot(skin.state().mids_mm[i] - mesh.mid_mm[center]));
+  }
+  const double start = highest + kStartMm;
+  const double way = start + push.depth_mm;
+  if (way > 0) {
+    const Vec3 face = mesh.mid_mm[center] + (model.thickness_mm / 2 + start) * axis;
+    const double radius = std::max(push.patch_diameter_mm / 2, kRimMm);
+    skin.AddBody(RigidStamp{face, -axis, radius, kRimMm}, true);
+    const Vec3 by = -way * axis;
+    const PressSummary pushed = skin.Move({&by, 1});
+    if (!pushed.ok()) return NoEquilibrium("pushing", pushed);
+    const auto contact = skin.ContactOf(0);
+    result.force_n = -contact.force_n.dot(axis);
+    result.nodes_in_contact = contact.points;
+    result.indentation_mm = contact.penetration_mm;
+    result.solution = pushed.Text();
+  }
+  return result;
+}
+
+}  // namespace
+
+Result<SkinPushResult> PushSkin(const LinkModel& model, const SkinPush& push) {
+  if (auto good = Check(model, push); !good) return good.error();
+  if (push.force_model == ForceModel::kLinear) return PushLinear(model, push);
+  if (push.force_model == ForceModel::kNonlinear) return PushNonlinear(model, push);
+  return Error{
+      ErrorCode::kUnsupported,
+      std::string("a push is solved with force model linear or nonlinear, not ") + Name(push.force_model)};
 }
 
 }  // namespace taclink

@@ -65,6 +65,11 @@ void ReadSkin(YamlMap map, LinkModel& model) {
   YamlMap material = map.Map("material");
   model.material.youngs_modulus_mpa = material.Number("youngs_modulus_mpa", {.min = 1e-4, .max = 1e5});
   model.material.poisson_ratio = material.Number("poisson_ratio", {.min = 0, .max = 0.5});
+  const size_t law = material.Choice("law", {"saint_venant_kirchhoff", "neo_hookean"}, 0);
+  model.material.law = law == 0 ? MaterialLaw::kSaintVenantKirchhoff : MaterialLaw::kNeoHookean;
+  if (law == 1 && model.material.poisson_ratio != 0.5) {
+    material.Fail("poisson_ratio", "must be 0.5: the neo_hookean law is incompressible");
+  }
   material.Done();
   map.Done();
 }

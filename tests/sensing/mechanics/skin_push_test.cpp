@@ -14,7 +14,8 @@ class SkinPushTest : public testing::Test {
     const auto result = PushSkin(model_, {.marker = model_.MarkerIndex(6, 4),
                                           .depth_mm = depth_mm,
                                           .pressure_mpa = pressure_kpa * 1e-3,
-                                          .refinement = refinement});
+                                          .refinement = refinement,
+                                          .force_model = ForceModel::kLinear});
     EXPECT_TRUE(result.ok());
     return result->force_n;
   }
@@ -32,7 +33,10 @@ TEST_F(SkinPushTest, AgreesWithTheLinearProbeTable) {
 }
 
 TEST_F(SkinPushTest, FinerMeshPushesMoreNodesAndStaysClose) {
-  const auto fine = PushSkin(model_, {.marker = model_.MarkerIndex(6, 4), .depth_mm = 5, .refinement = 4});
+  const auto fine = PushSkin(model_, {.marker = model_.MarkerIndex(6, 4),
+                                      .depth_mm = 5,
+                                      .refinement = 4,
+                                      .force_model = ForceModel::kLinear});
   ASSERT_TRUE(fine.ok());
   EXPECT_GE(fine->nodes_in_contact, 2);
   EXPECT_NEAR(fine->force_n / ForceN(0, 5), 1, 0.15);
