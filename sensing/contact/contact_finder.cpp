@@ -115,10 +115,8 @@ void ContactFinder::Describe(const SkinShape& shape, const NodalForces& forces, 
     for (size_t j = 0; j < forces.loaded.size(); ++j) {
       const int b = forces.loaded[j];
       if (std::find(region.begin(), region.end(), b) == region.end()) continue;
-      const Vec3 along_a = forces.forces_n[static_cast<size_t>(a)].normalized();
-      const Vec3 along_b = forces.forces_n[static_cast<size_t>(b)].normalized();
-      covariance += forces.loaded_covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) *
-                    along_a * along_b.transpose();
+      covariance += forces.loaded_covariance.block<3, 3>(3 * static_cast<Eigen::Index>(i),
+                                                         3 * static_cast<Eigen::Index>(j));
     }
   }
   contact.force_sigma_n = covariance.diagonal().cwiseMax(0).cwiseSqrt();

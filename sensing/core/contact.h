@@ -37,8 +37,8 @@ struct NodalForces {
   std::vector<Vec3> forces_n;    ///< by marker index
   std::vector<double> sigmas_n;  ///< by marker index: standard deviation of the force; 0 where there is none
   std::vector<int> loaded;       ///< indices of the markers with a force
-  /// Of the inward forces of `loaded`, in its order; N^2. May be larger, so as to be reused; then the rest is
-  /// 0.
+  /// Of the forces of `loaded`, in its order, three numbers each; N^2. May be larger, so as to be reused;
+  /// then the rest is 0.
   Eigen::MatrixXd loaded_covariance;
   double residual = 0;    ///< RMS of the unexplained displacement, in standard deviations
   bool converged = true;  ///< false: the solver stopped at its limit of loads

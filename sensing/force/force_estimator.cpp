@@ -1,15 +1,14 @@
 #include "sensing/force/force_estimator.h"
 
-#include "sensing/force/linear_estimator.h"
+#include "sensing/force/compliance_estimator.h"
+#include "sensing/force/nonlinear_estimator.h"
 
 namespace taclink {
 
 std::unique_ptr<ForceEstimator> MakeForceEstimator(const LinkModel& model, const ForceOptions& options) {
-  LinearEstimatorOptions linear;
-  linear.significance = options.significance;
-  linear.noise_floor_mm = options.noise_floor_mm;
-  if (options.refinement > 0) linear.refinement = options.refinement;
-  return std::make_unique<LinearForceEstimator>(model, linear);
+  const ForceModel force_model = options.model.value_or(ForceModel::kLinear);
+  if (force_model == ForceModel::kNonlinear) return std::make_unique<NonlinearEstimator>(model, options);
+  return std::make_unique<ComplianceEstimator>(model, force_model, options);
 }
 
 }  // namespace taclink

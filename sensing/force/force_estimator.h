@@ -15,8 +15,11 @@ struct ForceOptions {
   double tolerance = 0.05;  ///< of the forces, as a fraction
   /// Elements per interval of the marker grid; 0: what each model does best with.
   int refinement = 0;
-  /// A load is believed if it explains the displacements by this many standard deviations.
-  double significance = 4.5;
+  /// How often noise alone may make a contact, at 30 frames a second.
+  double phantoms_per_hour = 1;
+  /// A load is believed if it explains the displacements by this many standard deviations; 0: as follows from
+  /// the above.
+  double significance = 0;
   /// Smallest standard deviation given to a marker, mm; detections correlate, so covariances alone are too
   /// proud.
   double noise_floor_mm = 0.03;

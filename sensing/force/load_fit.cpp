@@ -1,0 +1,327 @@
+#include "sensing/force/load_fit.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace taclink {
+namespace {
+
+constexpr double kRidge = 1e-6;  // of the system's diagonal: neighbours on a fine grid are nearly alike
+
+}  // namespace
+
+MarkerData::MarkerData(int markers, double noise_floor_mm)
+    : measured_mm(Eigen::VectorXd::Zero(3 * markers)),
+      residual_mm(Eigen::VectorXd::Zero(3 * markers)),
+      information_per_mm2(static_cast<size_t>(markers), Mat3::Zero()),
+      floor2_(noise_floor_mm * noise_floor_mm) {}
+
+void MarkerData::Set(const SkinShape& shape, const Eigen::VectorXd& predicted_mm,
+                     const Eigen::VectorXd& model_sigma_mm) {
+  numbers = 0;
+  for (size_t i = 0; i < information_per_mm2.size(); ++i) {
+    const auto m = static_cast<Eigen::Index>(i);
+    const MeasuredDisplacement& measured = shape.measured[i];
+    auto u = measured_mm.segment<3>(3 * m);
+    u = predicted_mm.segment<3>(3 * m);
+    information_per_mm2[i].setZero();
+    if (shape.sources[i] == MarkerSource::kInferred || !measured.displacement_mm.allFinite() ||
+        !measured.information_per_mm2.allFinite()) {
+      continue;
+    }
+    u = measured.displacement_mm;
+    numbers += shape.sources[i] == MarkerSource::kBoth ? 3 : 2;
+    // (information^-1 + variance)^-1; the information may be of rank 2.
+    const double variance = floor2_ + model_sigma_mm[m] * model_sigma_mm[m];
+    const Mat3 more = Mat3::Identity() + variance * measured.information_per_mm2;
+    const Mat3 less = more.inverse() * measured.information_per_mm2;
+    information_per_mm2[i] = 0.5 * (less + less.transpose());
+  }
+  residual_mm = measured_mm - predicted_mm;
+}
+
+double MarkerData::Deviations(int marker) const {
+  const Vec3 r = residual_mm.segment<3>(3 * marker);
+  return std::sqrt(std::max(0.0, r.dot(information_per_mm2[static_cast<size_t>(marker)] * r)));
+}
+
+void MarkerData::Weigh(const Eigen::Ref<const Eigen::VectorXd>& column,
+                       Eigen::Ref<Eigen::VectorXd> weighed) const {
+  for (size_t i = 0; i < information_per_mm2.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(3 * i);
+    weighed.segment<3>(at).noalias() = information_per_mm2[i] * column.segment<3>(at);
+  }
+}
+
+LoadFit::LoadFit(const LoadSites& sites, int markers, const LoadFitOptions& options)
+    : sites_(sites), options_(options) {
+  const int most = std::min(options.max_loads, sites.count());
+  is_in_.assign(static_cast<size_t>(sites.count()), 0);
+  near_.assign(static_cast<size_t>(sites.count()), 0);
+  sites_in_.reserve(static_cast<size_t>(most));
+  group_.reserve(static_cast<size_t>(most));
+  for (auto* v : {&load_, &trial_, &rhs_, &norms_}) v->setZero(most);
+  for (auto* m : {&columns_, &weighed_}) m->setZero(3 * markers, most);
+  for (auto* m : {&gram_, &factor_}) m->setZero(most, most);
+  for (auto* v : {&target_, &residual_, &weighed_residual_}) v->setZero(3 * markers);
+  search_.setZero(3 * markers);
+  site_norms_.setZero(sites.count());
+  scores_.setZero(sites.count());
+  totals_.setZero(most);
+  tangential_.setZero(3 * markers, 2 * most);
+  tangential_weighed_.setZero(3 * markers, 2 * most);
+}
+
+void LoadFit::Begin(const MarkerData& data) {
+  for (const int site : sites_in_) is_in_[static_cast<size_t>(site)] = 0;
+  sites_in_.clear();
+  target_ = data.residual_mm;
+  residual_ = target_;
+  site_norms_.setConstant(-1);
+  norm_scale_ = 0;
+  // Candidates: near a marker that moved by more than its noise.
+  constexpr double kMoved = 2.5;
+  std::fill(near_.begin(), near_.end(), 0);
+  const int reach = 2 * sites_.columns_per_path;
+  for (int s = 0; s < sites_.count(); ++s) {
+    const int marker = sites_.nearest_markers[static_cast<size_t>(s)];
+    if (s % sites_.columns_per_path != 0 || data.Deviations(marker) < kMoved) continue;
+    for (int row = std::max(0, sites_.Row(s) - reach);
+         row <= std::min(sites_.rows - 1, sites_.Row(s) + reach); ++row) {
+      for (int d = -reach; d <= reach; ++d) {
+        const int column = (sites_.Column(s) + d + sites_.columns) % sites_.columns;
+        near_[static_cast<size_t>(row * sites_.columns + column)] = 1;
+      }
+    }
+  }
+}
+
+double LoadFit::NormOf(const MarkerData& data, const SkinTangent& tangent, int site) {
+  if (site_norms_[site] >= 0) return site_norms_[site];
+  double squared = 0;
+  for (size_t m = 0; m < data.information_per_mm2.size(); ++m) {
+    const Vec3 g = tangent.inward_mm_n.col(site).segment<3>(static_cast<Eigen::Index>(3 * m)).cast<double>();
+    squared += g.dot(data.information_per_mm2[m] * g);
+  }
+  site_norms_[site] = std::sqrt(squared);
+  if (site_norms_[site] > 0)
+    norm_scale_ = site_norms_[site] / static_cast<double>(tangent.inward_norms[site]);
+  return site_norms_[site];
+}
+
+int LoadFit::MostSignificant(const MarkerData& data, const SkinTangent& tangent) {
+  // A norm is guessed from that of a neighbour, and computed only where it matters.
+  constexpr double kGuessIsWithin = 2;
+  data.Weigh(residual_, weighed_residual_);
+  search_ = weighed_residual_.cast<float>();
+  for (int s = 0; s < sites_.count(); ++s) {
+    const auto i = static_cast<size_t>(s);
+    scores_[s] = 0;
+    if (!near_[i] || is_in_[i]) continue;
+    const float pull = tangent.inward_mm_n.col(s).dot(search_);
+    if (pull > 0) scores_[s] = static_cast<double>(pull / tangent.inward_norms[s]);
+  }
+  int best = -1;
+  double best_score = options_.significance;
+  for (int tried = 0; tried < sites_.count(); ++tried) {
+    Eigen::Index site = 0;
+    const double most = scores_.maxCoeff(&site);
+    if (most <= 0 || (norm_scale_ > 0 && most < best_score * norm_scale_ / kGuessIsWithin)) break;
+    const auto s = static_cast<int>(site);
+    const double norm = NormOf(data, tangent, s);
+    const double score = norm > 0 ? most * static_cast<double>(tangent.inward_norms[s]) / norm : 0;
+    if (score > best_score) {
+      best = s;
+      best_score = score;
+    }
+    scores_[site] = 0;
+  }
+  return best;
+}
+
+void LoadFit::Add(const MarkerData& data, int site, const Eigen::Ref<const Eigen::VectorXd>& column,
+                  double load_n) {
+  const auto k = static_cast<Eigen::Index>(sites_in_.size());
+  columns_.col(k) = column;
+  data.Weigh(columns_.col(k), weighed_.col(k));
+  for (Eigen::Index i = 0; i <= k; ++i) {
+    gram_(k, i) = weighed_.col(k).dot(columns_.col(i));
+    gram_(i, k) = gram_(k, i);
+  }
+  norms_[k] = std::sqrt(gram_(k, k));
+  rhs_[k] = weighed_.col(k).dot(target_);
+  load_[k] = load_n;
+  sites_in_.push_back(site);
+  is_in_[static_cast<size_t>(site)] = 1;
+}
+
+void LoadFit::Remove(size_t k) {
+  const auto n = static_cast<Eigen::Index>(sites_in_.size());
+  is_in_[static_cast<size_t>(sites_in_[k])] = 0;
+  sites_in_.erase(sites_in_.begin() + static_cast<std::ptrdiff_t>(k));
+  for (auto i = static_cast<Eigen::Index>(k); i + 1 < n; ++i) {
+    columns_.col(i) = columns_.col(i + 1);
+    weighed_.col(i) = weighed_.col(i + 1);
+    load_[i] = load_[i + 1];
+    rhs_[i] = rhs_[i + 1];
+    norms_[i] = norms_[i + 1];
+    for (Eigen::Index j = 0; j < n; ++j) gram_(i, j) = gram_(i + 1, j);
+  }
+  for (auto i = static_cast<Eigen::Index>(k); i + 1 < n; ++i) {
+    for (Eigen::Index j = 0; j + 1 < n; ++j) gram_(j, i) = gram_(j, i + 1);
+  }
+}
+
+// The minimum over the sites that are in, sign free, into trial_.
+void LoadFit::Solve(double significance) {
+  const auto n = static_cast<Eigen::Index>(sites_in_.size());
+  auto factor = factor_.topLeftCorner(n, n);
+  factor = gram_.topLeftCorner(n, n);
+  factor.diagonal() *= 1 + kRidge;
+  Eigen::Ref<Eigen::MatrixXd> in_place(factor);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(in_place);
+  auto solution = trial_.head(n);
+  solution = rhs_.head(n) - significance * norms_.head(n);
+  const auto lower = factor.triangularView<Eigen::Lower>();
+  lower.solveInPlace(solution);
+  lower.transpose().solveInPlace(solution);
+}
+
+// One step of the inner loop: towards the minimum, as far as no load has to pull; that one leaves. True: the
+// minimum was reached.
+bool LoadFit::StepToOptimum(double significance) {
+  if (sites_in_.empty()) return true;
+  Solve(significance);
+  const auto n = static_cast<Eigen::Index>(sites_in_.size());
+  double step = 1;
+  Eigen::Index blocking = -1;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (trial_[k] > 0) continue;
+    const double reach = load_[k] > 0 ? load_[k] / (load_[k] - trial_[k]) : 0.0;
+    if (reach < step || blocking < 0) {
+      step = std::min(step, reach);
+      blocking = k;
+    }
+  }
+  load_.head(n) += step * (trial_.head(n) - load_.head(n));
+  if (blocking < 0) return true;
+  Remove(static_cast<size_t>(blocking));
+  return false;
+}
+
+void LoadFit::Optimise(double significance) {
+  while (!StepToOptimum(significance)) {
+  }
+  UpdateResidual();
+}
+
+void LoadFit::UpdateResidual() {
+  const auto n = static_cast<Eigen::Index>(sites_in_.size());
+  residual_ = target_;
+  residual_.noalias() -= columns_.leftCols(n) * load_.head(n);
+}
+
+// Connected loads are one contact.
+void LoadFit::FindGroups() {
+  group_.assign(sites_in_.size(), -1);
+  groups_ = 0;
+  for (size_t k = 0; k < sites_in_.size(); ++k) {
+    if (group_[k] >= 0) continue;
+    group_[k] = groups_;
+    for (bool grown = true; grown;) {
+      grown = false;
+      for (size_t i = 0; i < sites_in_.size(); ++i) {
+        for (size_t j = 0; j < sites_in_.size() && group_[i] < 0; ++j) {
+          if (group_[j] != groups_ || !sites_.AreNeighbours(sites_in_[i], sites_in_[j])) continue;
+          group_[i] = groups_;
+          grown = true;
+        }
+      }
+    }
+    ++groups_;
+  }
+}
+
+// All inward loads and two tangential resultants a contact, these with a prior of friction.
+void LoadFit::FitTangential(const MarkerData& data, NodalForces& forces) {
+  const auto n = static_cast<Eigen::Index>(sites_in_.size());
+  const Eigen::Index t = 2 * groups_, all = n + t;
+  system_.setZero(all, all);
+  system_rhs_.setZero(all);
+  system_.topLeftCorner(n, n) = gram_.topLeftCorner(n, n);
+  system_rhs_.head(n) = rhs_.head(n);
+  for (Eigen::Index i = 0; i < t; ++i) {
+    data.Weigh(tangential_.col(i), tangential_weighed_.col(i));
+    for (Eigen::Index j = 0; j < n; ++j) {
+      system_(n + i, j) = system_(j, n + i) = tangential_weighed_.col(i).dot(columns_.col(j));
+    }
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      system_(n + i, n + j) = system_(n + j, n + i) = tangential_weighed_.col(i).dot(tangential_.col(j));
+    }
+    const double sigma = options_.friction * totals_[i / 2];
+    system_(n + i, n + i) += 1 / (sigma * sigma);
+    system_rhs_[n + i] = tangential_weighed_.col(i).dot(target_);
+  }
+  system_.diagonal().head(n) *= 1 + kRidge;
+  const Eigen::LDLT<Eigen::MatrixXd> factor(system_);
+  solution_ = factor.solve(system_rhs_);
+  covariance_ = factor.solve(Eigen::MatrixXd::Identity(all, all));
+  // Tangential force can't turn a push into a pull: then the inward loads stay as they were.
+  if (n > 0 && solution_.head(n).minCoeff() > 0) {
+    load_.head(n) = solution_.head(n);
+  } else {
+    solution_.head(n) = load_.head(n);
+    solution_.tail(t).setZero();
+  }
+  UpdateResidual();
+  if (t > 0) residual_.noalias() -= tangential_.leftCols(t) * solution_.tail(t);
+  Write(data, forces);
+}
+
+void LoadFit::Write(const MarkerData& data, NodalForces& forces) {
+  const auto n = static_cast<Eigen::Index>(sites_in_.size());
+  const Eigen::Index t = 2 * groups_;
+  // What is left unexplained beyond the noise is the model's error; it widens the result.
+  data.Weigh(residual_, weighed_residual_);
+  const double unexplained = residual_.dot(weighed_residual_) / std::max(1, data.numbers);
+  forces.residual = std::sqrt(std::max(0.0, unexplained));
+  if (n == 0) return;
+  covariance_ *= std::max(1.0, unexplained);
+  for (const int site : sites_in_) {
+    for (const auto& [marker, share] : sites_.shares[static_cast<size_t>(site)]) {
+      if (share > 1e-9 &&
+          std::find(forces.loaded.begin(), forces.loaded.end(), marker) == forces.loaded.end()) {
+        forces.loaded.push_back(marker);
+      }
+    }
+  }
+  std::sort(forces.loaded.begin(), forces.loaded.end());
+  const auto rows = static_cast<Eigen::Index>(3 * forces.loaded.size());
+  to_markers_.setZero(rows, n + t);  // forces of the loaded markers by the unknowns
+  for (size_t k = 0; k < sites_in_.size(); ++k) {
+    const auto site = static_cast<size_t>(sites_in_[k]);
+    const Mat3& frame = sites_.frames[site];
+    const double part = load_n(k) / totals_[group_[k]];
+    for (const auto& [marker, share] : sites_.shares[site]) {
+      if (share <= 1e-9) continue;
+      const auto row =
+          3 * (std::lower_bound(forces.loaded.begin(), forces.loaded.end(), marker) - forces.loaded.begin());
+      to_markers_.block<3, 1>(row, static_cast<Eigen::Index>(k)) += share * frame.col(0);
+      to_markers_.block<3, 2>(row, n + 2 * group_[k]) += share * part * frame.rightCols<2>();
+    }
+  }
+  const Eigen::VectorXd lumped = to_markers_ * solution_;
+  if (forces.loaded_covariance.rows() < rows) forces.loaded_covariance.setZero(rows, rows);
+  forces.loaded_covariance.topLeftCorner(rows, rows).noalias() =
+      to_markers_ * covariance_ * to_markers_.transpose();
+  for (size_t i = 0; i < forces.loaded.size(); ++i) {
+    const auto m = static_cast<size_t>(forces.loaded[i]);
+    const auto row = static_cast<Eigen::Index>(3 * i);
+    forces.forces_n[m] = lumped.segment<3>(row);
+    forces.sigmas_n[m] = std::sqrt(forces.loaded_covariance.block<3, 3>(row, row).trace());
+  }
+}
+
+}  // namespace taclink

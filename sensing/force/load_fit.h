@@ -1,0 +1,126 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "sensing/core/contact.h"
+#include "sensing/core/skin_shape.h"
+#include "sensing/force/load_sites.h"
+#include "sensing/force/skin_tangent.h"
+
+namespace taclink {
+
+struct LoadFitOptions {
+  double significance = 5.6;     ///< a load comes in if it explains this many standard deviations
+  double noise_floor_mm = 0.03;  ///< smallest standard deviation of a marker, each axis
+  int max_loads = 40;
+  double min_force_n = 0.03;  ///< forces below are of no interest
+  double friction = 0.7;      ///< standard deviation of a contact's tangential force, of its normal force
+};
+
+/// The markers' displacements, and how far they can be believed.
+class MarkerData {
+ public:
+  MarkerData(int markers, double noise_floor_mm);
+
+  /// What is left of the measured displacements after `predicted_mm` (stacked); `model_sigma_mm` by marker:
+  /// what the prediction may be wrong by. Unseen markers, and numbers that are none, count nothing.
+  void Set(const SkinShape& shape, const Eigen::VectorXd& predicted_mm,
+           const Eigen::VectorXd& model_sigma_mm);
+  /// The same displacements and weights after another prediction.
+  void SetPrediction(const Eigen::VectorXd& predicted_mm) { residual_mm = measured_mm - predicted_mm; }
+
+  double Deviations(int marker) const;  ///< of the residual, in standard deviations
+  /// information * column, marker by marker.
+  void Weigh(const Eigen::Ref<const Eigen::VectorXd>& column, Eigen::Ref<Eigen::VectorXd> weighed) const;
+
+  Eigen::VectorXd measured_mm, residual_mm;  ///< stacked; unseen markers: as predicted
+  std::vector<Mat3> information_per_mm2;     ///< by marker
+  int numbers = 0;                           ///< how many were measured
+
+ private:
+  double floor2_;
+};
+
+/// Few loads that explain displacements: minimises
+///   1/2 |r - C f|^2 + s sum_j |c_j| f_j    over f >= 0, norms by the data's information,
+/// by Lawson and Hanson's active set, over the sites let in. A load stays out unless it explains s standard
+/// deviations. One thread; its memory is made at construction.
+class LoadFit {
+ public:
+  LoadFit(const LoadSites& sites, int markers, const LoadFitOptions& options);
+
+  /// No loads, data as they are: r is their residual.
+  void Begin(const MarkerData& data);
+  /// The site that explains most beyond the loads that are in, -1: none is significant. Of sites near markers
+  /// that moved only.
+  int MostSignificant(const MarkerData& data, const SkinTangent& tangent);
+  /// Lets a site in with its column (stacked markers, mm/N) and a load to start from.
+  void Add(const MarkerData& data, int site, const Eigen::Ref<const Eigen::VectorXd>& column, double load_n);
+  bool IsFull() const { return static_cast<int>(sites_in_.size()) == load_.size(); }
+  /// To the minimum over the sites that are in; those that would pull leave.
+  void Optimise(double significance);
+  /// Loads that the data want without the penalty, which makes all of them too small.
+  void RemoveBias() { Optimise(0); }
+
+  const std::vector<int>& sites_in() const { return sites_in_; }
+  double load_n(size_t k) const { return load_[static_cast<Eigen::Index>(k)]; }
+  /// Column of the k-th site that is in.
+  auto column(size_t k) const { return columns_.col(static_cast<Eigen::Index>(k)); }
+  const Eigen::VectorXd& residual_mm() const { return residual_; }
+
+  /// Adds tangential forces of the contacts, and writes all into `forces` with covariance.
+  /// `tangential(shares, direction)`: column of a force of 1 N around (0) or along (1) the axis that the
+  /// sites that are in share so.
+  template <typename Tangential>
+  void Report(const MarkerData& data, Tangential tangential, NodalForces& forces);
+
+ private:
+  double NormOf(const MarkerData& data, const SkinTangent& tangent, int site);
+  void Remove(size_t k);
+  bool StepToOptimum(double significance);
+  void Solve(double significance);
+  void UpdateResidual();
+  void FindGroups();
+  void FitTangential(const MarkerData& data, NodalForces& forces);
+  void Write(const MarkerData& data, NodalForces& forces);
+
+  const LoadSites& sites_;
+  LoadFitOptions options_;
+  std::vector<int> sites_in_;
+  std::vector<char> is_in_;
+  Eigen::VectorXd load_, trial_, rhs_, norms_;  // in the order of sites_in_
+  Eigen::MatrixXd columns_, weighed_, gram_, factor_;
+  Eigen::VectorXd target_, residual_, weighed_residual_;
+  Eigen::VectorXf search_;
+  Eigen::VectorXd scores_;
+  double norm_scale_ = 0;       // of a norm by the data to that without weights; 0: not known yet
+  Eigen::VectorXd site_norms_;  // of this frame; negative: not known yet
+  std::vector<char> near_;      // by site
+
+  // Contacts: groups of neighbouring loads, and their tangential columns, two each.
+  std::vector<int> group_;  // by load
+  int groups_ = 0;
+  Eigen::MatrixXd tangential_, tangential_weighed_;
+  Eigen::MatrixXd system_, covariance_, to_markers_;
+  Eigen::VectorXd totals_;  // inward, by contact, N
+  Eigen::VectorXd system_rhs_, solution_;
+};
+
+template <typename Tangential>
+void LoadFit::Report(const MarkerData& data, Tangential tangential, NodalForces& forces) {
+  FindGroups();
+  const auto n = static_cast<Eigen::Index>(sites_in_.size());
+  for (int group = 0; group < groups_; ++group) {
+    auto shares = trial_.head(n);
+    for (Eigen::Index k = 0; k < n; ++k) shares[k] = group_[static_cast<size_t>(k)] == group ? load_[k] : 0.0;
+    totals_[group] = shares.sum();
+    shares /= totals_[group];
+    for (int direction = 0; direction < 2; ++direction) {
+      tangential_.col(2 * group + direction) = tangential(shares, direction);
+    }
+  }
+  FitTangential(data, forces);
+}
+
+}  // namespace taclink

@@ -1,0 +1,344 @@
+#include "sensing/force/nonlinear_estimator.h"
+
+#include <Eigen/CholmodSupport>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "sensing/force/compliance_estimator.h"
+#include "sensing/force/load_fit.h"
+#include "sensing/force/load_sites.h"
+#include "sensing/force/skin_tangent.h"
+#include "sensing/mechanics/nonlinear_shell.h"
+
+namespace taclink {
+namespace {
+
+constexpr int kDefaultRefinement = 1;
+constexpr int kMostIterations = 12;       // in one frame; a jump into a deep dent takes them
+constexpr int kNewLoadsPerIteration = 3;  // the linearisation is only good near the state
+constexpr double kMaxStepMm = 4;
+constexpr double kSettledMm = 0.02;  // of a step: a fifth of the markers' noise
+constexpr double kBalanced = 5e-3;   // of the largest load: a tenth of what the markers tell
+constexpr double kSlow = 0.3;        // of the residual's decrease: time for a new tangent
+
+LoadFitOptions FitOptions(const ForceOptions& options, int sites) {
+  LoadFitOptions fit;
+  fit.noise_floor_mm = options.noise_floor_mm;
+  fit.significance =
+      options.significance > 0 ? options.significance : SignificanceFor(options.phantoms_per_hour, 30, sites);
+  return fit;
+}
+
+}  // namespace
+
+struct NonlinearEstimator::Solver {
+  Solver(const LinkModel& link, const ForceOptions& options, int refinement)
+      : model(link),
+        mesh(MakeShellMesh(link, refinement)),
+        shell(SkinSurface(mesh), link.material),
+        sites(MakeLoadSites(link, mesh)),
+        fit_options(FitOptions(options, sites.count())),
+        tangents(link, refinement, sites),
+        data(link.markers.count(), options.noise_floor_mm),
+        fit(sites, link.markers.count(), fit_options),
+        hessian(shell.Pattern()),
+        predicted(3 * link.markers.count()),
+        model_sigma(link.markers.count()) {
+    factor.cholmod().print = 0;
+    factor.analyzePattern(hessian);
+    tangents.At(0);
+    Rest();
+  }
+
+  struct Load {
+    int site = 0;
+    double load_n = 0;
+    Eigen::VectorXd motion;  // of the shell, per N, by degree of freedom
+    Eigen::VectorXd column;  // of the markers, per N
+  };
+
+  void Rest();
+  bool Refactor();
+  void SolveColumns(Load& load);
+  Eigen::VectorXd Solve(const Eigen::VectorXd& by_force) const;
+  void SolveFor(const Eigen::VectorXd& force, Eigen::VectorXd& motion, Eigen::VectorXd& column);
+  void MarkersBy(const Eigen::VectorXd& motion, Eigen::VectorXd& column) const;
+  void AddForce(int site, int direction, double load_n, Eigen::VectorXd& force) const;
+  double Unbalance(const ElementLoad& pressure);
+  void SetData(const SkinShape& shape, const SkinTangent& tangent, double pressure_mpa);
+  bool FindLoads(const SkinTangent& tangent);
+  double Advance();
+  bool Iterate(const SkinShape& shape, const SkinTangent& tangent, double pressure_mpa);
+  void Report(NodalForces& forces);
+
+  LinkModel model;
+  ShellMesh mesh;
+  NonlinearShell shell;
+  LoadSites sites;
+  LoadFitOptions fit_options;
+  PressurisedTangents tangents;
+  MarkerData data;
+  LoadFit fit;
+  Eigen::SparseMatrix<double> hessian;
+  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor;
+  bool has_factor = false;
+  // Springs that hold the loaded nodes in the factorised matrix, and what undoes them in a solution.
+  std::vector<int> held;         // first degrees of freedom of those nodes
+  Eigen::MatrixXd held_motions;  // of the shell, by a force on each of their directions
+  Eigen::MatrixXd held_undo;     // (1 / stiffness - compliance of the held)^-1
+
+  ShellState state;         // in equilibrium with `loads`, nearly
+  std::vector<Load> loads;  // those that act on it
+  Eigen::VectorXd gradient, settle, settle_column, step, force, motion, column;
+  Eigen::VectorXd predicted, model_sigma;
+  NonlinearEstimator::Work work;
+};
+
+void NonlinearEstimator::Solver::Rest() {
+  state = shell.Rest();
+  loads.clear();
+  has_factor = false;
+}
+
+// The tangent at the state. A skin that is pushed deep is unstable under given forces, though not under a
+// body that holds it: the loaded nodes are held by springs, and Solve takes these out again (Woodbury).
+bool NonlinearEstimator::Solver::Refactor() {
+  ++work.factorisations;
+  const double scale = model.material.youngs_modulus_mpa * model.thickness_mm;
+  held.clear();
+  for (const Load& load : loads) held.push_back(shell.Dof(sites.nodes[static_cast<size_t>(load.site)], 0));
+  double stiffness = 0;
+  for (const double wanted : {1.0, 8.0, 64.0}) {
+    for (const int dof : held) {
+      for (int c = 0; c < 3; ++c) hessian.coeffRef(dof + c, dof + c) += (wanted - stiffness) * scale;
+    }
+    stiffness = wanted;
+    factor.factorize(hessian);
+    if (factor.info() == Eigen::Success) break;
+  }
+  for (double shift = 1e-3; factor.info() != Eigen::Success; shift *= 8) {
+    if (shift > 1) return false;
+    for (int i = 0; i < hessian.cols(); ++i) hessian.coeffRef(i, i) *= 1 + shift;
+    factor.factorize(hessian);
+  }
+  has_factor = true;
+  if (held.empty()) return true;
+  const auto n = static_cast<Eigen::Index>(3 * held.size());
+  held_motions.resize(shell.dof_count(), n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    force.setZero(shell.dof_count());
+    force[held[static_cast<size_t>(k / 3)] + k % 3] = 1;
+    held_motions.col(k) = factor.solve(force);
+  }
+  // Where the skin would be unstable, it is taken as soft instead: the step is then too short, not wrong.
+  constexpr double kSoftest = 0.03;  // of the springs
+  held_undo.resize(n, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    held_undo.row(k) = -held_motions.row(held[static_cast<size_t>(k / 3)] + k % 3);
+    held_undo(k, k) += 1 / (stiffness * scale);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(0.5 * (held_undo + held_undo.transpose()));
+  const Eigen::VectorXd inverse = modes.eigenvalues().cwiseMax(kSoftest / (stiffness * scale)).cwiseInverse();
+  held_undo = modes.eigenvectors() * inverse.asDiagonal() * modes.eigenvectors().transpose();
+  for (Load& load : loads) SolveColumns(load);
+  return true;
+}
+
+Eigen::VectorXd NonlinearEstimator::Solver::Solve(const Eigen::VectorXd& by_force) const {
+  Eigen::VectorXd solution = factor.solve(by_force);
+  if (held.empty()) return solution;
+  Eigen::VectorXd at_held(held_undo.rows());
+  for (Eigen::Index k = 0; k < at_held.size(); ++k)
+    at_held[k] = solution[held[static_cast<size_t>(k / 3)] + k % 3];
+  solution.noalias() += held_motions * (held_undo * at_held);
+  return solution;
+}
+
+void NonlinearEstimator::Solver::AddForce(int site, int direction, double load_n, Eigen::VectorXd& to) const {
+  const auto i = static_cast<size_t>(site);
+  for (const auto& [node, share] : sites.spreads[i]) {
+    const int dof = shell.Dof(node, 0);  // only free nodes are in a spread
+    to.segment<3>(dof) += load_n * share * sites.frames[i].col(direction);
+  }
+}
+
+void NonlinearEstimator::Solver::SolveFor(const Eigen::VectorXd& by_force, Eigen::VectorXd& to_motion,
+                                          Eigen::VectorXd& to_column) {
+  to_motion = Solve(by_force);
+  MarkersBy(to_motion, to_column);
+}
+
+void NonlinearEstimator::Solver::SolveColumns(Load& load) {
+  force.setZero(shell.dof_count());
+  AddForce(load.site, 0, 1, force);
+  SolveFor(force, load.motion, load.column);
+}
+
+void NonlinearEstimator::Solver::MarkersBy(const Eigen::VectorXd& by, Eigen::VectorXd& to) const {
+  const double offset = model.thickness_mm / 2 - model.markers.center_depth_mm;
+  to.resize(3 * model.markers.count());
+  for (int m = 0; m < model.markers.count(); ++m) {
+    const int node = mesh.NodeOfMarker(model, m);
+    const auto i = static_cast<size_t>(node);
+    const Vec3& d = state.directors[i];
+    const Vec3& t = state.tangents[i];
+    const Eigen::Index at = shell.Dof(node, 0);  // a marker's node is free
+    const Vec3 turn = by[at + 3] * t + by[at + 4] * d.cross(t);
+    to.segment<3>(3 * m) = by.segment<3>(at) + offset * turn.cross(d);
+  }
+}
+
+// Residual of the shell under pressure and loads, into `gradient`; its largest entry.
+double NonlinearEstimator::Solver::Unbalance(const ElementLoad& pressure) {
+  const ElementLoad* all[] = {&pressure};
+  shell.Gradient(state, all, gradient);
+  for (const Load& load : loads) AddForce(load.site, 0, -load.load_n, gradient);
+  return gradient.cwiseAbs().maxCoeff();
+}
+
+void NonlinearEstimator::Solver::SetData(const SkinShape& shape, const SkinTangent& tangent,
+                                         double pressure_mpa) {
+  constexpr double kModelError = 0.03, kPressureError = 0.01;
+  for (Eigen::Index m = 0; m < model_sigma.size(); ++m) {
+    const Vec3 inflation = tangent.offset_mm.segment<3>(3 * m) +
+                           (pressure_mpa - tangent.pressure_mpa) * tangent.per_pressure.segment<3>(3 * m);
+    const Vec3 by_loads = shape.measured[static_cast<size_t>(m)].displacement_mm - inflation;
+    model_sigma[m] = kModelError * by_loads.norm() + kPressureError * inflation.norm();
+  }
+  MarkerDisplacements(model, mesh, state, predicted);
+  data.Set(shape, predicted, model_sigma);
+}
+
+// What the loads have to be for the linearised shell; the fit then holds them. False: too many.
+bool NonlinearEstimator::Solver::FindLoads(const SkinTangent& tangent) {
+  settle = Solve(-gradient);
+  MarkersBy(settle, settle_column);
+  data.residual_mm -= settle_column;
+  for (const Load& load : loads) data.residual_mm += load.load_n * load.column;
+  fit.Begin(data);
+  for (const Load& load : loads) fit.Add(data, load.site, load.column, load.load_n);
+  fit.Optimise(fit_options.significance);
+  for (int added = 0; added < kNewLoadsPerIteration; ++added) {
+    const int site = fit.MostSignificant(data, tangent);
+    if (site < 0) break;
+    if (fit.IsFull()) return false;
+    Load& load = loads.emplace_back();
+    load.site = site;
+    SolveColumns(load);
+    fit.Add(data, site, load.column, 0);
+    fit.Optimise(fit_options.significance);
+  }
+  fit.RemoveBias();
+  return true;
+}
+
+// Takes the state to the loads of the fit. Returns the longest motion of a node.
+double NonlinearEstimator::Solver::Advance() {
+  step = settle;
+  std::vector<double> wanted(loads.size(), 0.0);
+  for (size_t k = 0; k < fit.sites_in().size(); ++k) {
+    const int site = fit.sites_in()[k];
+    const auto at = std::find_if(loads.begin(), loads.end(), [&](const Load& l) { return l.site == site; });
+    wanted[static_cast<size_t>(at - loads.begin())] = fit.load_n(k);
+  }
+  for (size_t i = 0; i < loads.size(); ++i) step += (wanted[i] - loads[i].load_n) * loads[i].motion;
+  double longest = 0;
+  for (int node = 0; node < shell.node_count(); ++node) {
+    const int dof = shell.Dof(node, 0);
+    if (dof >= 0) longest = std::max(longest, step.segment<3>(dof).norm());
+  }
+  const double share = std::min(1.0, kMaxStepMm / std::max(longest, 1e-12));
+  shell.Step(share * step, state);
+  for (size_t i = 0; i < loads.size(); ++i) loads[i].load_n += share * (wanted[i] - loads[i].load_n);
+  std::erase_if(loads, [](const Load& load) { return load.load_n <= 0; });
+  return longest;
+}
+
+// Gauss-Newton until the state rests. False: it did not.
+bool NonlinearEstimator::Solver::Iterate(const SkinShape& shape, const SkinTangent& tangent,
+                                         double pressure_mpa) {
+  const FollowerPressure pressure(model.thickness_mm, pressure_mpa);
+  const ElementLoad* all[] = {&pressure};
+  double before = 0;
+  bool fresh = false;
+  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+    ++work.iterations;
+    const double unbalance = Unbalance(pressure);
+    double total = fit_options.min_force_n;
+    for (const Load& load : loads) total = std::max(total, load.load_n);
+    const double tolerance = kBalanced * total;
+    if (!has_factor || (iteration > 0 && !fresh && unbalance > tolerance && unbalance > kSlow * before)) {
+      shell.Hessian(state, all, gradient, hessian);
+      for (const Load& load : loads) AddForce(load.site, 0, -load.load_n, gradient);
+      if (!Refactor()) return false;
+      fresh = true;
+    } else {
+      fresh = false;
+    }
+    SetData(shape, tangent, pressure_mpa);
+    if (!FindLoads(tangent)) return false;
+    before = unbalance;
+    const double longest = Advance();
+    if (!std::isfinite(longest)) return false;
+    if (longest < kSettledMm) return true;
+  }
+  return false;
+}
+
+void NonlinearEstimator::Solver::Report(NodalForces& forces) {
+  fit.Report(
+      data,
+      [&](const auto& shares, int direction) -> const Eigen::VectorXd& {
+        force.setZero(shell.dof_count());
+        for (Eigen::Index k = 0; k < shares.size(); ++k) {
+          AddForce(fit.sites_in()[static_cast<size_t>(k)], direction + 1, shares[k], force);
+        }
+        SolveFor(force, motion, column);
+        return column;
+      },
+      forces);
+}
+
+NonlinearEstimator::NonlinearEstimator(const LinkModel& model, const ForceOptions& options)
+    : solver_(std::make_unique<Solver>(model, options,
+                                       options.refinement > 0 ? options.refinement : kDefaultRefinement)) {}
+NonlinearEstimator::~NonlinearEstimator() = default;
+
+void NonlinearEstimator::Restart() {
+  solver_->Rest();
+}
+
+const NonlinearEstimator::Work& NonlinearEstimator::work() const {
+  return solver_->work;
+}
+
+void NonlinearEstimator::Estimate(const SkinShape& shape, double pressure_mpa, NodalForces& forces) {
+  Solver& s = *solver_;
+  ++s.work.frames;
+  ClearForces(s.model.markers.count(), ForceModel::kNonlinear, forces);
+  const SkinTangent* tangent = s.tangents.At(pressure_mpa);
+  if (tangent == nullptr) {
+    forces.converged = false;
+    return;
+  }
+  if (s.loads.empty()) {
+    // Nothing acts: the skin is where the pressure has it.
+    s.predicted = tangent->offset_mm + (pressure_mpa - tangent->pressure_mpa) * tangent->per_pressure;
+    s.model_sigma.setZero();
+    s.data.Set(shape, s.predicted, s.model_sigma);
+    s.fit.Begin(s.data);
+    if (s.fit.MostSignificant(s.data, *tangent) < 0) return;
+    s.state = s.tangents.Inflated();
+    s.has_factor = false;
+  }
+  forces.converged = s.Iterate(shape, *tangent, pressure_mpa);
+  if (!forces.converged && (!s.state.mids_mm[0].allFinite() || s.fit.sites_in().empty())) {
+    s.Rest();
+    return;
+  }
+  s.Report(forces);
+}
+
+}  // namespace taclink
