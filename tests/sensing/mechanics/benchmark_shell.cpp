@@ -14,6 +14,13 @@ namespace {
 
 constexpr double kSame = 1e-6;  // of the benchmarks' lengths, 1 and more
 
+void Trace(double at, const EquilibriumSummary& summary) {
+  if (std::getenv("BENCHMARK_VERBOSE") == nullptr) return;
+  std::printf("at %.4f: %s, %d iterations, %d shifted, residual %.2g, energy %.8g, %s\n", at,
+              Name(summary.stop), summary.iterations, summary.shifted, summary.residual_n, summary.energy_nmm,
+              summary.stable ? "stable" : "not stable");
+}
+
 }  // namespace
 
 void SurfaceMesh::AddPatch(int columns, int rows, const Map& map) {
@@ -165,21 +172,39 @@ void Compare(const std::string& benchmark, const std::string& mesh, double publi
   EXPECT_NEAR(computed / published, 1, share) << benchmark << ", " << mesh;
 }
 
-void FollowLoad(const NonlinearShell& shell, const Eigen::VectorXd& load, const std::vector<double>& shares,
-                EquilibriumOptions options, bool line_search,
+void FollowLoad(const NonlinearShell& shell, const Eigen::VectorXd& load, const LoadPath& path,
                 const std::function<void(double, const ShellState&)>& at) {
-  EquilibriumSolver solver(shell, options);
+  EquilibriumSolver solver(shell, path.options);
   ShellState state = shell.Rest();
-  for (const double share : shares) {
-    const EquilibriumSummary summary = solver.Solve({}, share * load, state, line_search);
-    if (std::getenv("BENCHMARK_VERBOSE") != nullptr) {
-      std::printf("share %.4f: %s, %d iterations, %d shifted, residual %.2g, energy %.8g, stable %d\n", share,
-                  Name(summary.stop), summary.iterations, summary.shifted, summary.residual_n,
-                  summary.energy_nmm, summary.stable);
-    }
+  for (const double share : path.shares) {
+    const EquilibriumSummary summary = solver.Solve({}, share * load, state, path.line_search);
+    Trace(share, summary);
     ASSERT_TRUE(summary.ok()) << Name(summary.stop) << " at " << share << " of the load, residual "
                               << summary.residual_n;
+    if (path.stable) {
+      EXPECT_TRUE(summary.stable) << "at " << share << " of the load";
+    }
     at(share, state);
+  }
+}
+
+void FollowDisplacement(const ShellSurface& surface, const Material& material, int node, int axis,
+                        const std::vector<double>& values, const EquilibriumOptions& options,
+                        const std::function<void(double, double)>& at) {
+  const auto i = static_cast<size_t>(node), c = static_cast<size_t>(axis);
+  ShellSurface held = surface;
+  held.fixed[i][c] = true;
+  const NonlinearShell free_shell(surface, material), held_shell(held, material);
+  EquilibriumSolver solver(held_shell, options);
+  ShellState state = held_shell.Rest();
+  for (const double value : values) {
+    state.mids_mm[i][axis] = surface.mids_mm[i][axis] + value;
+    const EquilibriumSummary summary = solver.Solve({}, {}, state, false);
+    Trace(value, summary);
+    ASSERT_TRUE(summary.ok()) << Name(summary.stop) << " at " << value;
+    Eigen::VectorXd gradient;
+    free_shell.Gradient(state, {}, gradient);
+    at(value, gradient[free_shell.Dof(node, axis)]);
   }
 }
 

@@ -80,11 +80,24 @@ void Tabulate(const std::string& benchmark, const std::string& mesh, double publ
 void Compare(const std::string& benchmark, const std::string& mesh, double published, double computed,
              double share);
 
+struct LoadPath {
+  std::vector<double> shares;  ///< of the whole load, one after the other
+  EquilibriumOptions options;
+  /// Thin shells need several times fewer iterations without it.
+  bool line_search = true;
+  bool stable = true;  ///< expected: every equilibrium is a minimum of the energy
+};
+
 /// Raises a dead load to each share of it in turn and calls `at` with the share and the equilibrium; a share
 /// that doesn't converge fails the test and ends it.
-void FollowLoad(const NonlinearShell& shell, const Eigen::VectorXd& load, const std::vector<double>& shares,
-                EquilibriumOptions options, bool line_search,
+void FollowLoad(const NonlinearShell& shell, const Eigen::VectorXd& load, const LoadPath& path,
                 const std::function<void(double, const ShellState&)>& at);
+
+/// Moves one component of one node to each value in turn and calls `at` with the value and the force on it
+/// that holds it there.
+void FollowDisplacement(const ShellSurface& surface, const Material& material, int node, int axis,
+                        const std::vector<double>& values, const EquilibriumOptions& options,
+                        const std::function<void(double, double)>& at);
 
 std::string MeshName(int columns, int rows);
 
