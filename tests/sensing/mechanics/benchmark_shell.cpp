@@ -14,13 +14,6 @@ namespace {
 
 constexpr double kSame = 1e-6;  // of the benchmarks' lengths, 1 and more
 
-void Trace(double at, const EquilibriumSummary& summary) {
-  if (std::getenv("BENCHMARK_VERBOSE") == nullptr) return;
-  std::printf("at %.4f: %s, %d iterations, %d shifted, residual %.2g, energy %.8g, %s\n", at,
-              Name(summary.stop), summary.iterations, summary.shifted, summary.residual_n, summary.energy_nmm,
-              summary.stable ? "stable" : "not stable");
-}
-
 }  // namespace
 
 void SurfaceMesh::AddPatch(int columns, int rows, const Map& map) {
@@ -178,7 +171,6 @@ void FollowLoad(const NonlinearShell& shell, const Eigen::VectorXd& load, const 
   ShellState state = shell.Rest();
   for (const double share : path.shares) {
     const EquilibriumSummary summary = solver.Solve({}, share * load, state, path.line_search);
-    Trace(share, summary);
     ASSERT_TRUE(summary.ok()) << Name(summary.stop) << " at " << share << " of the load, residual "
                               << summary.residual_n;
     if (path.stable) {
@@ -200,7 +192,6 @@ void FollowDisplacement(const ShellSurface& surface, const Material& material, i
   for (const double value : values) {
     state.mids_mm[i][axis] = surface.mids_mm[i][axis] + value;
     const EquilibriumSummary summary = solver.Solve({}, {}, state, false);
-    Trace(value, summary);
     ASSERT_TRUE(summary.ok()) << Name(summary.stop) << " at " << value;
     Eigen::VectorXd gradient;
     free_shell.Gradient(state, {}, gradient);
