@@ -33,6 +33,8 @@ EquilibriumSolver::EquilibriumSolver(const NonlinearShell& shell, const Equilibr
   factor_->llt.cholmod().print = 0;
   factor_->ldlt.cholmod().print = 0;
   factor_->llt.analyzePattern(hessian_);
+  shell_.Hessian(shell_.Rest(), {}, gradient_, hessian_);
+  rest_diagonal_ = hessian_.diagonal();
 }
 
 EquilibriumSolver::~EquilibriumSolver() = default;
@@ -55,13 +57,11 @@ bool EquilibriumSolver::FindStep(bool line_search, EquilibriumSummary& summary) 
     return true;
   }
   ++summary.shifted;
-  const Eigen::VectorXd diagonal = hessian_.diagonal().cwiseAbs();
-  const double floor = 1e-6 * diagonal.maxCoeff();
+  // Under compression a rotation's own entry may all but vanish next to its neighbours'.
+  const Eigen::VectorXd scale = hessian_.diagonal().cwiseAbs().cwiseMax(rest_diagonal_);
   double before = 0;
   for (shift_ = std::max(kFirst, shift_ / 8); shift_ <= kMost; shift_ *= 4) {
-    for (Eigen::Index i = 0; i < diagonal.size(); ++i) {
-      hessian_.coeffRef(i, i) += (shift_ - before) * std::max(diagonal[i], floor);
-    }
+    for (Eigen::Index i = 0; i < scale.size(); ++i) hessian_.coeffRef(i, i) += (shift_ - before) * scale[i];
     before = shift_;
     factor_->llt.factorize(hessian_);
     if (factor_->llt.info() != Eigen::Success) continue;

@@ -55,7 +55,7 @@ class EquilibriumSolver {
   const NonlinearShell& shell_;
   EquilibriumOptions options_;
   Eigen::SparseMatrix<double> hessian_;
-  Eigen::VectorXd gradient_, step_;
+  Eigen::VectorXd rest_diagonal_, gradient_, step_;
   std::unique_ptr<Factor> factor_;
   double shift_ = 0;  // of the iteration before, as a share of the diagonal
 };
