@@ -7,6 +7,7 @@
 
 #include "benchmark_shell.h"
 #include "sensing/mechanics/linear_shell.h"
+#include "sensing/mechanics/rigid_contact.h"
 #include "sensing/model/model_file.h"
 
 namespace taclink::benchmark {
@@ -174,6 +175,33 @@ TEST_P(Skin, SmallLoadsGiveTheLinearShell) {
   }
   std::printf("%s: %.1e of the largest displacement\n", GetParam().model, apart / largest);
   EXPECT_LT(apart, 1e-9 * largest);
+}
+
+// A ball pressed 15 mm deep between nodes, in few steps and in many: the same branch of equilibria. Elements
+// next to the ball are compressed until some rotations' own stiffness all but vanishes.
+TEST(SkinContact, LargeStepsEndWhereSmallOnesDo) {
+  LinkModel model = LoadLinkModel("cylinder").value();
+  model.material.law = MaterialLaw::kNeoHookean;
+  const ShellMesh mesh = MakeShellMesh(model, 1);
+  const NonlinearShell shell(SkinSurface(mesh), model.material);
+  const double angle = model.PathAngle(0) + model.markers.path_pitch_rad() / 2;
+  const Vec3 out(std::cos(angle), std::sin(angle), 0);
+  const auto press = [&](int steps) {
+    RigidContact contact(shell,
+                         {.offset_mm = model.thickness_mm / 2, .spacing_mm = 1, .stiffness_n_mm3 = 0.05});
+    const std::array<const ElementLoad*, 1> loads = {&contact};
+    EquilibriumSolver solver(shell, {.tolerance_n = 1e-7, .max_iterations = 100});
+    ShellState state = shell.Rest();
+    for (const double share : EvenShares(steps)) {
+      contact.SetBody(RigidSphere{(40 + 10 - 15 * share) * out + Vec3(0, 0, 108), 10});
+      const EquilibriumSummary summary = solver.Solve(loads, {}, state);
+      EXPECT_TRUE(summary.ok() && summary.stable) << Name(summary.stop) << " at " << 15 * share << " mm";
+    }
+    return contact.Summarize(state).force_n.norm();
+  };
+  const double in_many = press(30);
+  std::printf("15 mm deep: %.6f N\n", in_many);
+  for (const int steps : {3, 6}) EXPECT_NEAR(press(steps), in_many, 1e-5) << steps << " steps";
 }
 
 INSTANTIATE_TEST_SUITE_P(Benchmark, Skin,
