@@ -24,36 +24,49 @@ const char* Name(EquilibriumStop stop) {
 
 struct EquilibriumSolver::Factor {
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> llt;
+  // Of a Hessian that isn't positive definite, as it stands.
+  Eigen::CholmodSimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> ldlt;
 };
 
 EquilibriumSolver::EquilibriumSolver(const NonlinearShell& shell, const EquilibriumOptions& options)
     : shell_(shell), options_(options), hessian_(shell.Pattern()), factor_(std::make_unique<Factor>()) {
   factor_->llt.cholmod().print = 0;
+  factor_->ldlt.cholmod().print = 0;
   factor_->llt.analyzePattern(hessian_);
+  shell_.Hessian(shell_.Rest(), {}, gradient_, hessian_);
+  rest_diagonal_ = hessian_.diagonal();
 }
 
 EquilibriumSolver::~EquilibriumSolver() = default;
 
-// Adds to the diagonal until the Hessian is positive definite.
-bool EquilibriumSolver::Factorise(EquilibriumSummary& summary) {
+// Sets step_. Of a Hessian that is not positive definite: adds to its diagonal until it is; without a line
+// search there is no energy to go down, and a saddle is as good.
+bool EquilibriumSolver::FindStep(bool line_search, EquilibriumSummary& summary) {
   constexpr double kFirst = 1e-4, kMost = 1e2;
   factor_->llt.factorize(hessian_);
   summary.stable = factor_->llt.info() == Eigen::Success;
   if (summary.stable) {
     shift_ = 0;
+    step_ = factor_->llt.solve(-gradient_);
+    return true;
+  }
+  if (!line_search) {
+    factor_->ldlt.compute(hessian_);
+    if (factor_->ldlt.info() != Eigen::Success) return false;
+    step_ = factor_->ldlt.solve(-gradient_);
     return true;
   }
   ++summary.shifted;
-  const Eigen::VectorXd diagonal = hessian_.diagonal().cwiseAbs();
-  const double floor = 1e-6 * diagonal.maxCoeff();
+  // Under compression a rotation's own entry may all but vanish next to its neighbours'.
+  const Eigen::VectorXd scale = hessian_.diagonal().cwiseAbs().cwiseMax(rest_diagonal_);
   double before = 0;
   for (shift_ = std::max(kFirst, shift_ / 8); shift_ <= kMost; shift_ *= 4) {
-    for (Eigen::Index i = 0; i < diagonal.size(); ++i) {
-      hessian_.coeffRef(i, i) += (shift_ - before) * std::max(diagonal[i], floor);
-    }
+    for (Eigen::Index i = 0; i < scale.size(); ++i) hessian_.coeffRef(i, i) += (shift_ - before) * scale[i];
     before = shift_;
     factor_->llt.factorize(hessian_);
-    if (factor_->llt.info() == Eigen::Success) return true;
+    if (factor_->llt.info() != Eigen::Success) continue;
+    step_ = factor_->llt.solve(-gradient_);
+    return true;
   }
   return false;
 }
@@ -109,11 +122,10 @@ EquilibriumSummary EquilibriumSolver::Solve(NonlinearShell::Loads loads, const E
       summary.stop = EquilibriumStop::kMaxIterations;
       return summary;
     }
-    if (!Factorise(summary)) {
+    if (!FindStep(line_search, summary)) {
       summary.stop = EquilibriumStop::kSingular;
       return summary;
     }
-    step_ = factor_->llt.solve(-gradient_);
     double share = LimitOf(step_);
     const double slope = gradient_.dot(step_);
     bool found = !line_search;

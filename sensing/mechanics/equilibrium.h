@@ -13,7 +13,7 @@ enum class EquilibriumStop {
   kMaxIterations,  ///< still moving
   kNoDescent,      ///< no step lowers the energy: at the limit of rounding
   kNotFinite,      ///< the state or the energy is not a number
-  kSingular,       ///< no positive definite matrix was found
+  kSingular,       ///< no matrix to solve with was found
 };
 const char* Name(EquilibriumStop stop);
 
@@ -26,7 +26,7 @@ struct EquilibriumOptions {
 struct EquilibriumSummary {
   EquilibriumStop stop = EquilibriumStop::kConverged;
   int iterations = 0;
-  int shifted = 0;        ///< iterations whose Hessian was not positive definite
+  int shifted = 0;        ///< iterations whose Hessian was made positive definite
   double residual_n = 0;  ///< largest entry
   double energy_nmm = 0;
   bool stable = true;  ///< the last Hessian was positive definite: a minimum of the energy
@@ -42,19 +42,20 @@ class EquilibriumSolver {
   ~EquilibriumSolver();
 
   /// From `state` to an equilibrium. `dead_load`: by degree of freedom, N or N mm; empty: none. A moment on a
-  /// rotation has no potential: use `line_search` false with it.
+  /// rotation has no potential: use `line_search` false with it, and load steps. It is then plain Newton,
+  /// which may end in a saddle of the energy.
   EquilibriumSummary Solve(NonlinearShell::Loads loads, const Eigen::VectorXd& dead_load, ShellState& state,
                            bool line_search = true);
 
  private:
   struct Factor;
-  bool Factorise(EquilibriumSummary& summary);
+  bool FindStep(bool line_search, EquilibriumSummary& summary);
   double LimitOf(const Eigen::VectorXd& step) const;
 
   const NonlinearShell& shell_;
   EquilibriumOptions options_;
   Eigen::SparseMatrix<double> hessian_;
-  Eigen::VectorXd gradient_, step_;
+  Eigen::VectorXd rest_diagonal_, gradient_, step_;
   std::unique_ptr<Factor> factor_;
   double shift_ = 0;  // of the iteration before, as a share of the diagonal
 };
