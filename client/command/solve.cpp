@@ -72,10 +72,10 @@ Result<LinkState> SolveMarkers(const SolveOptions& options, const LinkModel& mod
   LinkState state;
   state.shape = std::move(*shape);
   InferUnseen(model, {.mpa = options.pressure_kpa * 1e-3}, state.shape);
-  LinearForceEstimator estimator(model);
+  const auto estimator = MakeForceEstimator(model, {});
   ContactFinder finder(model);
   const int64_t start = SystemClock().MonotonicNs();
-  estimator.Estimate(state.shape, options.pressure_kpa * 1e-3, state.forces);
+  estimator->Estimate(state.shape, options.pressure_kpa * 1e-3, state.forces);
   finder.Find(state.shape, state.forces, state.contacts);
   state.stage_ms.force = static_cast<double>(SystemClock().MonotonicNs() - start) * 1e-6;
   for (const auto& contact : state.contacts) state.total_force_n += contact.force_n;

@@ -69,6 +69,7 @@ LoadFit::LoadFit(const LoadSites& sites, int markers, const LoadFitOptions& opti
   search_.setZero(3 * markers);
   site_norms_.setZero(sites.count());
   scores_.setZero(sites.count());
+  guessed_norms_.setZero(sites.count());
   totals_.setZero(most);
   tangential_.setZero(3 * markers, 2 * most);
   tangential_weighed_.setZero(3 * markers, 2 * most);
@@ -80,7 +81,6 @@ void LoadFit::Begin(const MarkerData& data) {
   target_ = data.residual_mm;
   residual_ = target_;
   site_norms_.setConstant(-1);
-  norm_scale_ = 0;
   // Candidates: near a marker that moved by more than its noise.
   constexpr double kMoved = 2.5;
   std::fill(near_.begin(), near_.end(), 0);
@@ -106,32 +106,31 @@ double LoadFit::NormOf(const MarkerData& data, const SkinTangent& tangent, int s
     squared += g.dot(data.information_per_mm2[m] * g);
   }
   site_norms_[site] = std::sqrt(squared);
-  if (site_norms_[site] > 0)
-    norm_scale_ = site_norms_[site] / static_cast<double>(tangent.inward_norms[site]);
+  guessed_norms_[site] = site_norms_[site];
   return site_norms_[site];
 }
 
 int LoadFit::MostSignificant(const MarkerData& data, const SkinTangent& tangent) {
-  // A norm is guessed from that of a neighbour, and computed only where it matters.
-  constexpr double kGuessIsWithin = 2;
+  // Norms change little from frame to frame: the last one tells where it is worth while to know it now.
+  constexpr double kGuessIsWithin = 1.5;
   data.Weigh(residual_, weighed_residual_);
   search_ = weighed_residual_.cast<float>();
   for (int s = 0; s < sites_.count(); ++s) {
     const auto i = static_cast<size_t>(s);
     scores_[s] = 0;
     if (!near_[i] || is_in_[i]) continue;
-    const float pull = tangent.inward_mm_n.col(s).dot(search_);
-    if (pull > 0) scores_[s] = static_cast<double>(pull / tangent.inward_norms[s]);
+    const auto pull = static_cast<double>(tangent.inward_mm_n.col(s).dot(search_));
+    if (pull > 0) scores_[s] = pull / (guessed_norms_[s] > 0 ? guessed_norms_[s] : NormOf(data, tangent, s));
   }
   int best = -1;
   double best_score = options_.significance;
   for (int tried = 0; tried < sites_.count(); ++tried) {
     Eigen::Index site = 0;
-    const double most = scores_.maxCoeff(&site);
-    if (most <= 0 || (norm_scale_ > 0 && most < best_score * norm_scale_ / kGuessIsWithin)) break;
+    const double guess = scores_.maxCoeff(&site);
+    if (!(guess > best_score / kGuessIsWithin)) break;
     const auto s = static_cast<int>(site);
-    const double norm = NormOf(data, tangent, s);
-    const double score = norm > 0 ? most * static_cast<double>(tangent.inward_norms[s]) / norm : 0;
+    const double guessed_norm = guessed_norms_[s];
+    const double score = guess * guessed_norm / NormOf(data, tangent, s);
     if (score > best_score) {
       best = s;
       best_score = score;

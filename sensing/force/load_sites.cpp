@@ -13,9 +13,9 @@ bool LoadSites::AreNeighbours(int a, int b) const {
 
 namespace {
 
-std::vector<LoadSites::Spread> SpreadAt(const ShellMesh& mesh, int column, int row) {
+std::vector<LoadSites::Spread> SpreadAt(const ShellMesh& mesh, int column, int row, LoadSpread kind) {
   constexpr double kCenter = 0.5;
-  if (mesh.refinement == 1) return {{mesh.Node(column, row), 1}};
+  if (mesh.refinement == 1 || kind == LoadSpread::kPoint) return {{mesh.Node(column, row), 1}};
   std::vector<LoadSites::Spread> spread = {{mesh.Node(column, row), kCenter}};
   for (const int node : {mesh.Node(column - 1, row), mesh.Node(column + 1, row), mesh.Node(column, row - 1),
                          mesh.Node(column, row + 1)}) {
@@ -29,7 +29,7 @@ std::vector<LoadSites::Spread> SpreadAt(const ShellMesh& mesh, int column, int r
 
 }  // namespace
 
-LoadSites MakeLoadSites(const LinkModel& model, const ShellMesh& mesh) {
+LoadSites MakeLoadSites(const LinkModel& model, const ShellMesh& mesh, LoadSpread spread) {
   const int refinement = mesh.refinement;
   const int step = refinement % 2 == 0 ? refinement / 2 : 1;
   const int paths = model.markers.paths, rings = model.markers.rings();
@@ -45,7 +45,7 @@ LoadSites MakeLoadSites(const LinkModel& model, const ShellMesh& mesh) {
       Mat3 frame;
       frame << -normal, around, normal.cross(around);
       sites.nodes.push_back(node);
-      sites.spreads.push_back(SpreadAt(mesh, column * step, row * step));
+      sites.spreads.push_back(SpreadAt(mesh, column * step, row * step, spread));
       sites.frames.push_back(frame);
       const double path = static_cast<double>(column) / sites.columns_per_path;
       const double ring = std::clamp(static_cast<double>(row) / sites.columns_per_path - 1, 0.0, rings - 1.0);

@@ -22,8 +22,8 @@ struct LoadSites {
   int rows = 0;              ///< along it
   int columns_per_path = 1;  ///< sites in one interval between paths
   std::vector<int> nodes;    ///< of the mesh
-  /// How a load spreads over nodes. On a fine mesh it takes in the neighbours: no contact is a point, and a
-  /// point load folds a fine mesh.
+  /// How a load spreads over nodes. As a patch it takes in the neighbours on a mesh finer than the markers:
+  /// no contact is a point, and a point load folds a fine mesh at large displacements.
   struct Spread {
     int node = 0;
     double share = 0;
@@ -40,6 +40,8 @@ struct LoadSites {
   bool AreNeighbours(int a, int b) const;
 };
 
-LoadSites MakeLoadSites(const LinkModel& model, const ShellMesh& mesh);
+enum class LoadSpread { kPoint, kPatch };
+LoadSites MakeLoadSites(const LinkModel& model, const ShellMesh& mesh,
+                        LoadSpread spread = LoadSpread::kPoint);
 
 }  // namespace taclink

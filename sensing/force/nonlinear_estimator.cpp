@@ -38,7 +38,7 @@ struct NonlinearEstimator::Solver {
       : model(link),
         mesh(MakeShellMesh(link, refinement)),
         shell(SkinSurface(mesh), link.material),
-        sites(MakeLoadSites(link, mesh)),
+        sites(MakeLoadSites(link, mesh, LoadSpread::kPatch)),
         fit_options(FitOptions(options, sites.count())),
         tangents(link, refinement, sites),
         data(link.markers.count(), options.noise_floor_mm),
@@ -262,23 +262,19 @@ bool NonlinearEstimator::Solver::Iterate(const SkinShape& shape, const SkinTange
   const FollowerPressure pressure(model.thickness_mm, pressure_mpa);
   const ElementLoad* all[] = {&pressure};
   double before = 0;
-  bool fresh = false;
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     ++work.iterations;
     const double unbalance = Unbalance(pressure);
     double total = fit_options.min_force_n;
     for (const Load& load : loads) total = std::max(total, load.load_n);
     const double tolerance = kBalanced * total;
-    if (!has_factor || (iteration > 0 && !fresh && unbalance > tolerance && unbalance > kSlow * before)) {
+    if (!has_factor || (iteration > 0 && unbalance > tolerance && unbalance > kSlow * before)) {
       shell.Hessian(state, all, gradient, hessian);
       for (const Load& load : loads) AddForce(load.site, 0, -load.load_n, gradient);
       if (!Refactor()) return false;
-      fresh = true;
-    } else {
-      fresh = false;
     }
     SetData(shape, tangent, pressure_mpa);
-    if (!FindLoads(tangent)) return false;
+    if (!std::isfinite(unbalance) || !FindLoads(tangent)) return false;
     before = unbalance;
     const double longest = Advance();
     if (!std::isfinite(longest)) return false;
@@ -303,7 +299,11 @@ void NonlinearEstimator::Solver::Report(NodalForces& forces) {
 
 NonlinearEstimator::NonlinearEstimator(const LinkModel& model, const ForceOptions& options)
     : solver_(std::make_unique<Solver>(model, options,
-                                       options.refinement > 0 ? options.refinement : kDefaultRefinement)) {}
+                                       options.refinement > 0 ? options.refinement : kDefaultRefinement)) {
+  ForceOptions cheaper = options;
+  cheaper.refinement = 1;
+  fallback_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, cheaper);
+}
 NonlinearEstimator::~NonlinearEstimator() = default;
 
 void NonlinearEstimator::Restart() {
@@ -333,9 +333,12 @@ void NonlinearEstimator::Estimate(const SkinShape& shape, double pressure_mpa, N
     s.state = s.tangents.Inflated();
     s.has_factor = false;
   }
-  forces.converged = s.Iterate(shape, *tangent, pressure_mpa);
-  if (!forces.converged && (!s.state.mids_mm[0].allFinite() || s.fit.sites_in().empty())) {
+  if (!s.Iterate(shape, *tangent, pressure_mpa)) {
+    // No equilibrium found: the next frame starts anew, and this one says what the cheaper model knows.
     s.Rest();
+    fallback_->Restart();
+    fallback_->Estimate(shape, pressure_mpa, forces);
+    forces.converged = false;
     return;
   }
   s.Report(forces);

@@ -27,6 +27,7 @@ class NonlinearEstimator final : public ForceEstimator {
  private:
   struct Solver;
   std::unique_ptr<Solver> solver_;
+  std::unique_ptr<ForceEstimator> fallback_;  // where no equilibrium is found; tells so
 };
 
 }  // namespace taclink

@@ -46,7 +46,6 @@ void FillBySymmetry(const LinkModel& model, const LoadSites& sites, SkinTangent&
       }
     }
   }
-  tangent.inward_norms = tangent.inward_mm_n.colwise().norm();
 }
 
 }  // namespace

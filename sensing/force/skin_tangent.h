@@ -17,7 +17,6 @@ struct SkinTangent {
   Eigen::VectorXd offset_mm;     ///< displacement that the pressure alone makes
   Eigen::VectorXd per_pressure;  ///< its derivative, mm / MPa
   Eigen::MatrixXf inward_mm_n;   ///< a column a site: a force inwards
-  Eigen::VectorXf inward_norms;  ///< of its columns
   Eigen::MatrixXf around_mm_n;   ///< the same, around the axis
   Eigen::MatrixXf along_mm_n;    ///< the same, along it
 };

@@ -51,7 +51,7 @@ struct LinkPipeline::Stages {
       : model(link_model),
         options(pipeline_options),
         clock(pipeline_clock),
-        estimator(link_model, pipeline_options.force),
+        estimator(MakeForceEstimator(link_model, pipeline_options.force)),
         finder(link_model, pipeline_options.contact) {
     BeginRest(options.rig, options.rest_frames);
   }
@@ -80,7 +80,7 @@ struct LinkPipeline::Stages {
   uint64_t sequence = 0;                         // of the frame before
   LabelledMarkers acquired, labels;
   std::vector<Vec3> predicted_mm;  // the shape of the last frame that had one
-  LinearForceEstimator estimator;
+  std::unique_ptr<ForceEstimator> estimator;
   ContactFinder finder;
 
   std::string camera_trouble;  // of the frame in work
@@ -288,7 +288,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   s.predicted_mm = state.shape.positions_mm;
   timed(state.stage_ms.force, [&] {
     const double pressure_change_mpa = pressure_mpa - s.baseline_pressure_mpa;
-    s.estimator.Estimate(state.shape, pressure_change_mpa, state.forces);
+    s.estimator->Estimate(state.shape, pressure_change_mpa, state.forces);
     s.finder.Find(state.shape, state.forces, state.contacts);
   });
   state.total_force_n.setZero();

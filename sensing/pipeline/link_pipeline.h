@@ -11,7 +11,7 @@
 #include "sensing/core/link_state.h"
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
-#include "sensing/force/linear_estimator.h"
+#include "sensing/force/force_estimator.h"
 #include "sensing/markers/marker_tracker.h"
 
 namespace taclink {
@@ -26,7 +26,7 @@ struct PipelineOptions {
   /// Search the full pictures in every frame instead of following the markers.
   bool always_acquire = false;
   MarkerTrackerOptions tracking;
-  LinearEstimatorOptions force;
+  ForceOptions force;
   ContactOptions contact;
 };
 

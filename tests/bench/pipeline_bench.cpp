@@ -8,7 +8,7 @@
 
 #include "sensing/capture/decode.h"
 #include "sensing/contact/contact_finder.h"
-#include "sensing/force/linear_estimator.h"
+#include "sensing/force/force_estimator.h"
 #include "sensing/markers/detector.h"
 #include "sensing/markers/marker_tracker.h"
 #include "sensing/markers/path_tracker.h"
@@ -174,12 +174,12 @@ void Reconstruct(benchmark::State& state) {
 void ForceAndContacts(benchmark::State& state) {
   Bench& bench = For(state);
   Stages s(bench);
-  LinearForceEstimator estimator(bench.model);
+  const auto estimator = MakeForceEstimator(bench.model, {});
   ContactFinder finder(bench.model);
   NodalForces forces;
   std::vector<Contact> contacts;
   for (auto _ : state) {
-    estimator.Estimate(s.shape, 0, forces);
+    estimator->Estimate(s.shape, 0, forces);
     finder.Find(s.shape, forces, contacts);
   }
   state.counters["contacts"] = static_cast<double>(contacts.size());

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sensing/force/linear_estimator.h"
+#include "sensing/force/force_estimator.h"
 #include "sensing/model/model_file.h"
 #include "tests/sensing/force/support.h"
 
@@ -14,14 +14,14 @@ class ContactFinderTest : public testing::Test {
   std::vector<Contact> Contacts(const std::vector<TrueLoad>& loads, unsigned seed = 1) {
     const SkinShape shape = ShapeUnder(model_, loads, 0, 2, 0.05, seed);
     NodalForces forces;
-    estimator_.Estimate(shape, 0, forces);
+    estimator_->Estimate(shape, 0, forces);
     std::vector<Contact> contacts;
     finder_.Find(shape, forces, contacts);
     return contacts;
   }
 
   const LinkModel model_ = LoadLinkModel("cylinder").value();
-  LinearForceEstimator estimator_{model_};
+  std::unique_ptr<ForceEstimator> estimator_ = MakeForceEstimator(model_, {});
   ContactFinder finder_{model_};
 };
 

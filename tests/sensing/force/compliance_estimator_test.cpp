@@ -1,4 +1,4 @@
-#include "sensing/force/linear_estimator.h"
+#include "sensing/force/compliance_estimator.h"
 
 #include <gtest/gtest.h>
 
@@ -17,14 +17,14 @@ double TotalN(const NodalForces& forces) {
   return total;
 }
 
-class LinearEstimatorTest : public testing::TestWithParam<std::string> {
+class LinearModelTest : public testing::TestWithParam<std::string> {
  protected:
   const LinkModel model_ = LoadLinkModel(GetParam()).value();
-  LinearForceEstimator estimator_{model_};
+  ComplianceEstimator estimator_{model_, ForceModel::kLinear, {}};
   NodalForces forces_;
 };
 
-TEST_P(LinearEstimatorTest, ExactDataGiveTheLoadBack) {
+TEST_P(LinearModelTest, ExactDataGiveTheLoadBack) {
   const int marker = model_.MarkerIndex(6, 4);
   estimator_.Estimate(ShapeUnder(model_, {{6, 4, 0.2}}, 0, 2, 0, 1), 0, forces_);
   EXPECT_EQ(forces_.loaded, std::vector<int>{marker});
@@ -34,14 +34,14 @@ TEST_P(LinearEstimatorTest, ExactDataGiveTheLoadBack) {
             0);
 }
 
-TEST_P(LinearEstimatorTest, NoiseAloneGivesNoForce) {
+TEST_P(LinearModelTest, NoiseAloneGivesNoForce) {
   for (unsigned seed = 0; seed < 200; ++seed) {
     estimator_.Estimate(ShapeUnder(model_, {}, 0, 3, 0.1, seed), 0, forces_);
     EXPECT_EQ(TotalN(forces_), 0) << "seed " << seed;
   }
 }
 
-TEST_P(LinearEstimatorTest, NoisyPushIsFoundWithItsUncertainty) {
+TEST_P(LinearModelTest, NoisyPushIsFoundWithItsUncertainty) {
   int within_two_sigma = 0;
   const int trials = 30;
   for (unsigned seed = 0; seed < trials; ++seed) {
@@ -53,7 +53,7 @@ TEST_P(LinearEstimatorTest, NoisyPushIsFoundWithItsUncertainty) {
   EXPECT_GE(within_two_sigma, trials * 8 / 10);
 }
 
-TEST_P(LinearEstimatorTest, TwoPushesAreToldApart) {
+TEST_P(LinearModelTest, TwoPushesAreToldApart) {
   estimator_.Estimate(ShapeUnder(model_, {{2, 3, 0.1}, {11, 7, 0.15}}, 0, 3, 0.05, 7), 0, forces_);
   double first = 0, second = 0;
   for (const int m : forces_.loaded) {
@@ -63,14 +63,14 @@ TEST_P(LinearEstimatorTest, TwoPushesAreToldApart) {
   EXPECT_NEAR(second, 0.15, 0.02);
 }
 
-TEST_P(LinearEstimatorTest, PressureIsNotAForce) {
+TEST_P(LinearModelTest, PressureIsNotAForce) {
   estimator_.Estimate(ShapeUnder(model_, {{6, 4, 0.2}}, 1e-3, 3, 0.05, 3), 1e-3, forces_);
   EXPECT_NEAR(TotalN(forces_), 0.2, 0.02);
   estimator_.Estimate(ShapeUnder(model_, {}, 1.5e-3, 3, 0.05, 4), 1.5e-3, forces_);
   EXPECT_EQ(TotalN(forces_), 0);
 }
 
-TEST_P(LinearEstimatorTest, MissingMarkersAreLeftOut) {
+TEST_P(LinearModelTest, MissingMarkersAreLeftOut) {
   SkinShape shape = ShapeUnder(model_, {{6, 4, 0.2}}, 0, 3, 0.05, 9);
   for (size_t i = 0; i < shape.sources.size(); i += 3) {
     shape.sources[i] = MarkerSource::kInferred;
@@ -80,7 +80,7 @@ TEST_P(LinearEstimatorTest, MissingMarkersAreLeftOut) {
   EXPECT_NEAR(TotalN(forces_), 0.2, 0.03);
 }
 
-TEST_P(LinearEstimatorTest, NotANumberIsLeftOut) {
+TEST_P(LinearModelTest, NotANumberIsLeftOut) {
   SkinShape shape = ShapeUnder(model_, {{6, 4, 0.2}}, 0, 3, 0.05, 9);
   shape.measured[10].displacement_mm = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   shape.measured[20].information_per_mm2(0, 0) = std::numeric_limits<double>::infinity();
@@ -88,7 +88,7 @@ TEST_P(LinearEstimatorTest, NotANumberIsLeftOut) {
   EXPECT_NEAR(TotalN(forces_), 0.2, 0.03);
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, LinearEstimatorTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, LinearModelTest, testing::Values("cylinder", "barrel"));
 
 }  // namespace
 }  // namespace taclink
