@@ -78,13 +78,13 @@ class Deck:
             rows += ["*NODE PRINT, NSET=DISC, TOTALS=ONLY", "RF"]
         self.steps += [*rows, "*END STEP"]
 
-    def write(self, path, watched):
+    def text(self, watched):
+        """The deck; displacements of the `watched` nodes are printed."""
         rows = ["*NODE, NSET=ALL"]
         rows += [f"{n}, {x:.9g}, {y:.9g}, {z:.9g}" for n, (x, y, z) in self.nodes.items()]
         rows += self.body + listing("WATCHED", "NSET", watched) + self.law + self.contact
         rows += ["*BOUNDARY", *self.bounds, *self.steps]
-        with open(path, "w", encoding="ascii") as out:
-            out.write("\n".join(rows) + "\n")
+        return "\n".join(rows) + "\n"
 
 
 class Result:
@@ -106,9 +106,6 @@ class Result:
                 self.forces.append((step, tuple(map(float, cells))))
         self.nodes = nodes
 
-    def finished(self, steps):
-        return float(steps) in self.displacements
-
     def displacement(self, step, node):
         return self.displacements[float(step)][node]
 
@@ -120,19 +117,41 @@ class Result:
         return next(f for t, f in self.forces if abs(t - step) < 1e-6)
 
 
-def solve(deck, folder, name, watched, steps, limit_s=1200):
-    """Runs ccx in `folder` unless the result of this very deck is there. Raises RuntimeError when it does not get to the end."""
+def ended(log):
+    """Whether ccx ran to its end, good or bad: an interrupted run says neither."""
+    if not os.path.exists(log):
+        return False
+    words = open(log, encoding="ascii", errors="replace").read()
+    return "Job finished" in words or "*ERROR" in words
+
+
+def solve(deck, folder, name, watched, steps, limit_s):
+    """Runs ccx in `folder`, unless it already came to an end with this very deck there. The result has the steps that converged;
+    `result.reached` of them. Raises RuntimeError when there is none, no ccx, or no end in time."""
     os.makedirs(folder, exist_ok=True)
     base = os.path.join(folder, name)
+    words = deck.text(watched)
     before = open(base + ".inp", encoding="ascii").read() if os.path.exists(base + ".inp") else None
-    deck.write(base + ".inp", watched)
-    same = before == open(base + ".inp", encoding="ascii").read()
-    if same:
-        result = Result(base + ".dat", deck.nodes)
-        if result.finished(steps):
-            return result
-    if os.path.exists(base + ".dat"):
-        os.remove(base + ".dat")
+    if before != words or not ended(base + ".log"):
+        if limit_s <= 0:
+            raise RuntimeError(f"{base}: not solved yet")
+        for suffix in (".log", ".dat"):
+            if os.path.exists(base + suffix):
+                os.remove(base + suffix)
+        with open(base + ".inp", "w", encoding="ascii") as out:
+            out.write(words)
+        run(base, limit_s)
+    result = Result(base + ".dat", deck.nodes)
+    result.reached = next((n for n in range(steps) if float(n + 1) not in result.displacements), steps)
+    if result.reached < steps:
+        print(f"  {name}: converged in {result.reached} of {steps} steps", flush=True)
+    if result.reached == 0:
+        raise RuntimeError(f"{base}: no step converged; see {base}.log")
+    return result
+
+
+def run(base, limit_s):
+    folder, name = os.path.split(base)
     began = time.monotonic()
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     with open(base + ".log", "w", encoding="ascii") as log:
@@ -146,7 +165,3 @@ def solve(deck, folder, name, watched, steps, limit_s=1200):
     for suffix in (".frd", ".12d", ".cvg"):
         if os.path.exists(base + suffix):
             os.remove(base + suffix)
-    result = Result(base + ".dat", deck.nodes)
-    if not result.finished(steps):
-        raise RuntimeError(f"{base}: ccx stopped before the last step; see {base}.log")
-    return result
