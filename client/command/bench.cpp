@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -47,8 +48,11 @@ Result<std::vector<LinkModel>> LoadModels(const std::string& name) {
 }
 
 Result<std::vector<VisionMethodKind>> ChooseMethods(const std::vector<std::string>& names) {
-  if (names.empty()) return VisionMethodKinds();
   std::vector<VisionMethodKind> chosen;
+  if (names.empty()) {
+    std::copy_if(VisionMethodKinds().begin(), VisionMethodKinds().end(), std::back_inserter(chosen),
+                 [](const VisionMethodKind& kind) { return kind.by_default; });
+  }
   for (const std::string& name : names) {
     std::string known;
     const size_t before = chosen.size();
@@ -222,7 +226,8 @@ void AddBench(CLI::App& app, Selected& selected) {
   vision->add_option("--seed", options->seed, "Of all scenes")->capture_default_str();
   vision->add_option("--model", options->model, "cylinder, barrel, both, or a YAML file")
       ->capture_default_str();
-  vision->add_option("--methods", options->methods, "Some of them, comma-separated")->delimiter(',');
+  vision->add_option("--methods", options->methods, "Some of them, comma-separated; half only if named")
+      ->delimiter(',');
   vision->add_option("--scene", options->scene, "One scene by its name, frame by frame");
   vision->add_option("--keep", options->keep, "Folder for the pictures of --scene")->needs("--scene");
   vision->add_option("--json", options->json, "File for all numbers");

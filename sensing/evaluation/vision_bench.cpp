@@ -61,6 +61,8 @@ Result<SceneOutcome> Play(const Link& link, const EvaluationScene& scene, const 
       PackYuyv(gray[Index(id)], renderer.chroma(id), pictures.images[Index(id)]);
     }
     pictures.sequence = static_cast<uint64_t>(frame);
+    pictures.times.exposure_monotonic_ns =
+        static_cast<int64_t>((frame + 1) / scene.scene.frame_rate_hz * 1e9);  // 0 would be none
     pictures.pressure_mpa = skin_truth.pressure_mpa;
     for (size_t i = 0; i < methods.size(); ++i) methods[i]->Process(pictures, results[i]);
     MakeVisionTruth(model, rig, renderer, skin_truth, truth);

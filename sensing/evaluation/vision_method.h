@@ -37,6 +37,7 @@ struct VisionMethodKind {
   std::string name;
   std::string description;
   std::function<std::unique_ptr<VisionMethod>(const LinkModel&)> make;
+  bool by_default = true;  ///< false: only where it is asked for
 };
 
 /// All there are; the first is the product as it runs.

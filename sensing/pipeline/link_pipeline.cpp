@@ -21,6 +21,10 @@ constexpr double kDegradedFraction = 0.7;
 constexpr double kLostFraction = 0.4;
 // Markers are followed across a gap of so many frames.
 constexpr uint64_t kMaxStep = 3;
+// Between a refused rest pair and the next that is tried, of exposure time: labelling what is no rest picture
+// takes far longer than a frame. Begins with the first and doubles; with the second a link still begins
+// within a second once its pictures serve.
+constexpr int64_t kFirstWaitNs = 66'000'000, kLongestWaitNs = 600'000'000;
 
 void SetStatus(LinkState& state, LinkStatus status, std::string reason) {
   state.status = status;
@@ -67,6 +71,7 @@ struct LinkPipeline::Stages {
   std::array<Detections, kCameraCount> detections;
   std::optional<RestPose> rest;  // while rest pairs are taken
   RestProgress rest_progress;
+  int64_t refused_ns = 0, wait_ns = 0;  // exposure of the pair last refused; until the next is tried
   // Made when the rest pose is known.
   std::optional<CalibrationSummary> calibration;
   std::optional<PathTracker> acquirer;
@@ -148,16 +153,36 @@ struct LinkPipeline::Stages {
   void BeginRest(const std::optional<StereoRig>& rig, int pairs) {
     rest.emplace(model, rig, pairs);
     rest_progress = {.taken = 0, .wanted = pairs, .refusal = {}};
+    wait_ns = 0;
+  }
+
+  // Too soon after a pair that was refused. A frame without a time is always tried.
+  bool WaitsForRest(const FrameTimes& times) const {
+    const int64_t now_ns = times.exposure_monotonic_ns;
+    return rest && rest_progress.refusal && now_ns > refused_ns && now_ns < refused_ns + wait_ns;
+  }
+
+  void SkipRest(LinkState& state) {
+    ClearMeasurement(state);
+    state.tracking = {};
+    for (size_t i = 0; i < kCameraCount; ++i)
+      state.cameras[i].detections = static_cast<int>(detections[i].size());
+    SetStatus(state, LinkStatus::kCalibrating,
+              camera_trouble.empty() ? rest_progress.refusal->message : camera_trouble);
   }
 
   // A pair before the baseline is known.
-  void TakeRest(double pressure_mpa, LinkState& state) {
+  void TakeRest(const FrameTimes& times, double pressure_mpa, LinkState& state) {
     ClearMeasurement(state);
     if (!camera_trouble.empty()) return SetStatus(state, LinkStatus::kCalibrating, camera_trouble);
     const auto complete = rest->Add(detections);
     rest_progress.taken = rest->taken();
     rest_progress.refusal = complete ? std::nullopt : std::optional(complete.error());
-    if (!complete) return SetStatus(state, LinkStatus::kCalibrating, complete.error().message);
+    if (!complete) {
+      refused_ns = times.exposure_monotonic_ns;
+      wait_ns = std::clamp(2 * wait_ns, kFirstWaitNs, kLongestWaitNs);
+      return SetStatus(state, LinkStatus::kCalibrating, complete.error().message);
+    }
     SetStatus(state, LinkStatus::kCalibrating, "taking the rest shape; do not touch the skin");
     if (!*complete) return;
     calibration = rest->calibration();
@@ -275,9 +300,10 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
     stage_ms = s.MsSince(start);
   };
   timed(state.stage_ms.decode, [&] { s.Decode(frame); });
+  if (s.WaitsForRest(frame.times)) return s.SkipRest(state);
   timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });
   if (s.rest) {
-    s.TakeRest(pressure_mpa, state);
+    s.TakeRest(frame.times, pressure_mpa, state);
     return;
   }
   timed(state.stage_ms.register_, [&] { s.Label(state); });

@@ -45,7 +45,8 @@ class LinkPipeline {
   LinkPipeline(LinkPipeline&&) noexcept;
 
   /// Takes one pair through all stages. Until there is a baseline, pairs are taken as rest pictures (status
-  /// kCalibrating, with the reason while they don't serve). `state`'s buffers are reused. Never fails: what
+  /// kCalibrating, with the reason while they don't serve; after a refusal not every pair is tried, but one
+  /// every 0.6 s of exposure time at least). `state`'s buffers are reused. Never fails: what
   /// is wrong is in the state's status and reason.
   void Process(const StereoFrame& frame, LinkState& state);
 

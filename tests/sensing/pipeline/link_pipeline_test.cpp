@@ -138,6 +138,31 @@ TEST_F(LinkPipelineTest, TouchedSkinIsNoBaseline) {
   EXPECT_THAT(state_.status_reason, HasSubstr("moved"));
 }
 
+TEST_F(LinkPipelineTest, RefusedRestIsTriedAgainAtGrowingIntervalsAndBeginsWithinASecond) {
+  LinkPipeline pipeline(model_, options_);
+  constexpr int64_t kFrameNs = 33'333'333;
+  int64_t now_ns = 0, good_from_ns = 0;
+  int tried = 0;
+  const auto process = [&](StereoFrame frame) {
+    frame.times.exposure_monotonic_ns = now_ns += kFrameNs;
+    pipeline.Process(frame, state_);
+  };
+  StereoFrame dark = Frame(0);
+  for (auto& image : dark.images) std::fill(image.bytes.begin(), image.bytes.end(), uint8_t{16});
+  for (int k = 0; k < 90; ++k) {
+    process(dark);
+    EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+    EXPECT_FALSE(state_.status_reason.empty());
+    tried += state_.stage_ms.detect > 0 ? 1 : 0;
+  }
+  EXPECT_GE(tried, 5);
+  EXPECT_LE(tried, 10);
+  good_from_ns = now_ns;
+  while (!pipeline.calibration() && now_ns < good_from_ns + 2'000'000'000) process(Frame(0));
+  EXPECT_TRUE(pipeline.calibration().has_value()) << state_.status_reason;
+  EXPECT_LT(now_ns - good_from_ns, 1'000'000'000);
+}
+
 TEST_F(LinkPipelineTest, PicturesOfAnotherModelAreRefused) {
   LinkPipeline pipeline(LoadLinkModel("barrel").value(), options_);
   for (int k = 0; k < options_.rest_frames; ++k) pipeline.Process(Frame(0), state_);
