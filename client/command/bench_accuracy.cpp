@@ -163,8 +163,7 @@ std::string Settings(const Run& run, const Options& options) {
   double cpu_s = 0;
   for (const auto& truths : run.truths) {
     for (const PathTruth& truth : truths) {
-      int there = truth.path.bodies.empty() && truth.failure.empty() ? 1 : 0;
-      for (const TrueStage& stage : truth.stages) there += stage.stage.scored ? 1 : 0;
+      const int there = ScenesOf(truth);
       scenes += there;
       left_out += truth.path.scenes() - there;
       cpu_s += truth.cpu_s;

@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kExactMm = 0.01, kAxial = 3;
 constexpr int kExactFrames = 2;
+constexpr double kFrameMm = 2.5;  // that bodies move from frame to frame, at most
 
 std::unique_ptr<ForceEstimator> Make(const LinkModel& model, const AccuracyMethod& method) {
   ForceOptions options;
@@ -52,16 +53,30 @@ class Player {
       return;
     }
     Show(path.inflated, nullptr);
+    const TrueStage* from = &path.inflated;
     for (const TrueStage& stage : path.stages) {
-      if (stage.stage.scored) {
-        Score(stage, &outcome_.cpu_ms);
-      } else {
-        Show(stage, &outcome_.cpu_ms);
-      }
+      Approach(*from, stage);
+      Score(stage, &outcome_.cpu_ms);
+      from = &stage;
     }
   }
 
  private:
+  // On the way from stage to stage the markers move straight.
+  void Approach(const TrueStage& from, const TrueStage& to) {
+    const double way =
+        std::hypot(to.stage.depth_mm - from.stage.depth_mm, to.stage.drag_mm - from.stage.drag_mm);
+    const int parts = static_cast<int>(std::ceil(way / kFrameMm));
+    TrueStage between = to;
+    for (int part = 1; part < parts; ++part) {
+      const double share = static_cast<double>(part) / parts;
+      for (size_t m = 0; m < to.displacements_mm.size(); ++m) {
+        between.displacements_mm[m] = (1 - share) * from.displacements_mm[m] + share * to.displacements_mm[m];
+      }
+      Show(between, &outcome_.cpu_ms);
+    }
+  }
+
   void Show(const TrueStage& stage, std::vector<float>* times) {
     seed_ = MixBits(seed_);
     MakeShape(model_, stage, outcome_.noise_mm, seed_, shape_);

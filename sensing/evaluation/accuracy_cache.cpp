@@ -21,7 +21,7 @@ void Put(std::ostream& out, const std::vector<Vec3>& points) {
 }
 
 void Put(std::ostream& out, const TrueStage& stage) {
-  out << stage.stage.depth_mm << ' ' << stage.stage.drag_mm << ' ' << stage.stage.scored << '\n';
+  out << stage.stage.depth_mm << ' ' << stage.stage.drag_mm << '\n';
   Put(out, stage.displacements_mm);
   out << stage.contacts.size() << '\n';
   for (const BodyContact& contact : stage.contacts) {
@@ -56,7 +56,7 @@ bool Get(std::istream& in, std::vector<Vec3>& points) {
 }
 
 bool Get(std::istream& in, TrueStage& stage) {
-  if (!(in >> stage.stage.depth_mm >> stage.stage.drag_mm >> stage.stage.scored)) return false;
+  if (!(in >> stage.stage.depth_mm >> stage.stage.drag_mm)) return false;
   return Get(in, stage.displacements_mm) && GetList(in, stage.contacts, [&](BodyContact& contact) {
            return Get(in, contact.force_n) && Get(in, contact.center_mm) && Get(in, contact.touched_mm);
          });

@@ -214,15 +214,19 @@ std::vector<ReportTable> AccuracyTables(const std::vector<AccuracyOutcome>& outc
   return tables;
 }
 
+int ScenesOf(const PathTruth& truth) {
+  if (!truth.path.bodies.empty()) return static_cast<int>(truth.stages.size());
+  return truth.failure.empty() ? 1 : 0;
+}
+
 ReportTable FailedPaths(const std::vector<PathTruth>& truths) {
   ReportTable table{
       "Scenes left out: the forward solver did not get there", {"path", "scenes", "left out", "why"}, {}};
   for (const PathTruth& truth : truths) {
     if (truth.failure.empty()) continue;
-    const auto there = std::count_if(truth.stages.begin(), truth.stages.end(),
-                                     [](const TrueStage& s) { return s.stage.scored; });
+    const int there = ScenesOf(truth);
     table.rows.push_back({truth.path.name, std::to_string(truth.path.scenes()),
-                          std::to_string(truth.path.scenes() - static_cast<int>(there)), truth.failure});
+                          std::to_string(truth.path.scenes() - there), truth.failure});
   }
   return table;
 }

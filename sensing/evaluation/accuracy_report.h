@@ -30,6 +30,8 @@ AccuracySummary Summarize(const AccuracyOutcome& outcome);
 /// as another force model than asked for are named in a table of their own and left out of the others.
 std::vector<ReportTable> AccuracyTables(const std::vector<AccuracyOutcome>& outcomes, double detail_noise_mm);
 
+/// How many of the path's scenes there are.
+int ScenesOf(const PathTruth& truth);
 /// What is not in the scenes, and why.
 ReportTable FailedPaths(const std::vector<PathTruth>& truths);
 

@@ -85,20 +85,20 @@ std::vector<PressStage> Stages(PressKind kind) {
     case PressKind::kStampBetween:
     case PressKind::kSphereMarker:
     case PressKind::kSphereBetween:
-      return {{2}, {3.5, 0, false}, {5}, {7.5, 0, false}, {10}, {12.5, 0, false}, {15}};
+      return {{2}, {5}, {10}, {15}};
     case PressKind::kStampEnd:
       return {{2}, {4}, {6}};
     case PressKind::kSphereEnd:
-      return {{2}, {3.5, 0, false}, {5}, {6.5, 0, false}, {8}};
+      return {{2}, {5}, {8}};
     case PressKind::kTwo:
     case PressKind::kThree:
     case PressKind::kPlate:
     case PressKind::kBar:
-      return {{2.5, 0, false}, {5}, {7.5, 0, false}, {10}};
+      return {{5}, {10}};
     case PressKind::kPinch:
-      return {{2.5, 0, false}, {5}, {7.5, 0, false}, {10}, {12.5, 0, false}, {15}};
+      return {{5}, {10}, {15}};
     case PressKind::kDrag:
-      return {{3, 0, false}, {5.5, 0, false}, {8}, {8, 2.5}, {8, 5}};
+      return {{8}, {8, 2.5}, {8, 5}};
   }
   return {};
 }
@@ -111,12 +111,6 @@ const char* Name(PressKind kind) {
       "stamp-end", "sphere-end",   "two",           "three",         "plate",
       "pinch",     "bar",          "drag"};
   return kNames[static_cast<size_t>(kind)];
-}
-
-int PressPath::scenes() const {
-  if (bodies.empty()) return 1;
-  return static_cast<int>(
-      std::count_if(stages.begin(), stages.end(), [](const PressStage& s) { return s.scored; }));
 }
 
 PressPath MakePressPath(const LinkModel& model, PressKind kind, double pressure_mpa) {

@@ -41,10 +41,9 @@ struct PressBody {
 struct PressStage {
   double depth_mm = 0;  ///< of every body, from where it touches the undeformed skin
   double drag_mm = 0;
-  bool scored = true;  ///< else only on the way there
 };
 
-/// Bodies that are pressed into a skin under constant pressure, stage by stage. Every scored stage is a
+/// Bodies that are pressed into a skin under constant pressure, stage by stage. Every stage is a
 /// scene; a path without bodies is one too.
 struct PressPath {
   std::string name;  ///< "<kind>-<model>-<pressure>kPa"
@@ -54,7 +53,7 @@ struct PressPath {
   std::vector<PressBody> bodies;
   std::vector<PressStage> stages;
 
-  int scenes() const;
+  int scenes() const { return bodies.empty() ? 1 : static_cast<int>(stages.size()); }
 };
 
 /// Every kind at every pressure, MPa. Depends on nothing else.
