@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "sensing/contact/contact_finder.h"
-#include "sensing/evaluation/process_memory.h"
+#include "sensing/evaluation/child_process.h"
 #include "sensing/evaluation/thread_clock.h"
 #include "sensing/force/force_estimator.h"
 #include "sensing/simulation/random.h"

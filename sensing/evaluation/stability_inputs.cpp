@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "sensing/evaluation/accuracy_bench.h"
+#include "sensing/evaluation/child_process.h"
 #include "sensing/evaluation/stability_cases.h"
 #include "sensing/force/force_estimator.h"
 #include "sensing/mechanics/pressed_skin.h"
@@ -19,6 +20,21 @@ constexpr int kTruthRefinement = 2;
 
 StabilityRow Row(const std::string& name, Ending ending, const std::string& reason) {
   return {name, ending, reason, kNan, kNan, kNan, kNan, kNan};
+}
+
+// In a process of its own: a case that crashes or never ends must not take the others along.
+StabilityRow Guarded(const std::string& name, const std::function<StabilityRow()>& run) {
+  constexpr int kMostSeconds = 60;
+  const auto answer = InChildProcess(
+      [&] {
+        const StabilityRow row = run();
+        return std::to_string(static_cast<int>(row.ending)) + row.reason;
+      },
+      kMostSeconds);
+  if (!answer || answer->empty())
+    return Row(name, Ending::kWrong,
+               "crashes, or does not end within " + std::to_string(kMostSeconds) + " s");
+  return Row(name, static_cast<Ending>(answer->front() - '0'), answer->substr(1));
 }
 
 enum class Expected {
@@ -132,12 +148,14 @@ void RunEstimator(const LinkModel& model, const AccuracyMethod& method, const Tr
   const Vec3 clean_n = Total(forces);
   add(Judge(who + "no defect", Expected::kSameForce, forces, truth.contacts.front().force_n));
   for (const InputCase& input : InputCases()) {
-    SkinShape shape = clean;
-    double pressure = kPressureMpa;
-    input.spoil(shape, pressed, pressure);
-    estimator->Restart();
-    estimator->Estimate(shape, pressure, forces);
-    add(Judge(who + input.name, input.expected, forces, clean_n));
+    add(Guarded(who + input.name, [&] {
+      SkinShape shape = clean;
+      double pressure = kPressureMpa;
+      input.spoil(shape, pressed, pressure);
+      estimator->Restart();
+      estimator->Estimate(shape, pressure, forces);
+      return Judge(who + input.name, input.expected, forces, clean_n);
+    }));
   }
 }
 
@@ -167,19 +185,23 @@ bool IsFinite(const PressedSkin& skin) {
 
 void RunPressedSkin(const LinkModel& model, const std::function<void(const StabilityRow&)>& add) {
   for (const double pressure : {kNan, kInf, 1e3}) {
-    PressedSkin skin(model, {.refinement = 1});
-    const PressSummary summary = skin.Inflate(pressure);
-    const bool clean = !summary.ok() && IsFinite(skin);
-    add(Refusal("pressed skin: inflated by " + std::to_string(pressure) + " MPa", clean,
-                summary.Text() + (IsFinite(skin) ? "" : "; leaves a pressure or state that is not finite")));
+    const std::string name = "pressed skin: inflated by " + std::to_string(pressure) + " MPa";
+    add(Guarded(name, [&] {
+      PressedSkin skin(model, {.refinement = 1});
+      const PressSummary summary = skin.Inflate(pressure);
+      return Refusal(name, !summary.ok() && IsFinite(skin),
+                     summary.Text() + (IsFinite(skin) ? "" : "; leaves what is not finite behind"));
+    }));
   }
   for (const double way : {kNan, kInf}) {
-    PressedSkin skin(model, {.refinement = 1});
-    skin.AddBody(RigidSphere{Vec3(60, 0, model.length_mm / 2), 10}, false);
-    const Vec3 by(way, 0, 0);
-    const PressSummary summary = skin.Move({&by, 1});
-    add(Refusal("pressed skin: body moved by " + std::to_string(way) + " mm", !summary.ok() && IsFinite(skin),
-                summary.Text()));
+    const std::string name = "pressed skin: body moved by " + std::to_string(way) + " mm";
+    add(Guarded(name, [&] {
+      PressedSkin skin(model, {.refinement = 1});
+      skin.AddBody(RigidSphere{Vec3(60, 0, model.length_mm / 2), 10}, false);
+      const Vec3 by(way, 0, 0);
+      const PressSummary summary = skin.Move({&by, 1});
+      return Refusal(name, !summary.ok() && IsFinite(skin), summary.Text());
+    }));
   }
 }
 

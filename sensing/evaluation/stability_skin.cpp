@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSphereMm = 10, kClearMm = 0.1;
-constexpr int kIntervals = 16;  // of each path, for the work
+constexpr int kIntervals = 8;  // of each path, for the work
 constexpr double kMostResidual = 2e-7, kMostEnergyError = 0.01, kMostReciprocity = 1e-4,
                  kMostScalingMm = 1e-4, kMostLinearError = 0.01, kMostBackward = 1e-12;
 
