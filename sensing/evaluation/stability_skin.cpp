@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSphereMm = 10, kClearMm = 0.1;
-constexpr int kIntervals = 8;  // of each path, for the work
+constexpr int kInflations = 32, kPresses = 8;  // steps of each path, for the work
 constexpr double kMostResidual = 2e-7, kMostEnergyError = 0.01, kMostReciprocity = 1e-4,
                  kMostScalingMm = 1e-4, kMostLinearError = 0.01, kMostBackward = 1e-12;
 
@@ -76,9 +76,9 @@ double VolumeOf(const SkinCase& c, const PressedSkin& skin) {
 // Work of the pressure is the integral of p by V = p V at the end less that of V by p.
 void Inflate(const SkinCase& c, Path& path) {
   std::vector<double> volumes = {VolumeOf(c, path.skin)};
-  const double step = c.pressure_mpa / kIntervals;
-  for (int i = 1; i <= kIntervals && path.refused.empty(); ++i) {
-    Note(path, path.skin.Inflate(i == kIntervals ? c.pressure_mpa : i * step), "inflating");
+  const double step = c.pressure_mpa / kInflations;
+  for (int i = 1; i <= kInflations && path.refused.empty(); ++i) {
+    Note(path, path.skin.Inflate(i == kInflations ? c.pressure_mpa : i * step), "inflating");
     volumes.push_back(VolumeOf(c, path.skin));
   }
   if (path.refused.empty()) path.work_nmm = c.pressure_mpa * volumes.back() - Simpson(volumes, step);
@@ -99,9 +99,9 @@ void Press(const SkinCase& c, Path& path) {
   path.body = RigidSphere{surface + (kSphereMm + start) * out, kSphereMm};
   path.skin.AddBody(path.body, false);
   const double before = EnergyWithLoads(c, path), work_before = path.work_nmm;
-  const Vec3 by = -(start + c.depth_mm) / kIntervals * out;
+  const Vec3 by = -(start + c.depth_mm) / kPresses * out;
   std::vector<double> power = {0};
-  for (int i = 1; i <= kIntervals && path.refused.empty(); ++i) {
+  for (int i = 1; i <= kPresses && path.refused.empty(); ++i) {
     Note(path, path.skin.Move({&by, 1}), "pressing");
     if (!path.refused.empty()) break;
     path.body = Moved(path.body, by);
