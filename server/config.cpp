@@ -86,6 +86,10 @@ LinkConfig Reader::ReadLink(YamlMap link) const {
   config.source = ReadSource(link);
   if (link.Has("calibration")) config.calibration = Path(link.Text("calibration"));
   if (link.Has("pressure_kpa")) config.pressure_kpa = link.Number("pressure_kpa", {.min = -100, .max = 100});
+  if (link.Has("force_model")) {
+    const size_t model = link.Choice("force_model", {kForceModelNames.begin(), kForceModelNames.end()});
+    config.force_model = model == 0 ? std::nullopt : std::optional<ForceModel>(kForceModels[model - 1]);
+  }
   if (YamlMap pose = link.Map("pose"); link.Has("pose")) {
     const auto position = pose.Numbers("position_mm", 3, {.min = -kLongestArmMm, .max = kLongestArmMm});
     std::copy_n(position.begin(), 3, config.position_mm.begin());

@@ -14,4 +14,8 @@ inline constexpr std::array<std::string_view, 3> kSourceNames = {"v4l2", "files"
 inline constexpr std::array<std::string_view, 2> kFormatNames = {"yuyv", "mjpeg"};
 inline constexpr std::array<PixelFormat, 2> kCameraFormats = {PixelFormat::kYuyv, PixelFormat::kMjpeg};
 
+/// "auto", then as kForceModels.
+inline constexpr std::array<std::string_view, 5> kForceModelNames = {"auto", "literal", "linear",
+                                                                     "pressurised", "nonlinear"};
+
 }  // namespace taclink::server

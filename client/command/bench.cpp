@@ -1,13 +1,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include "client/command/bench_accuracy.h"
+#include "client/command/bench_files.h"
 #include "client/command/bench_json.h"
 #include "client/command/commands.h"
 #include "sensing/capture/image_io.h"
@@ -127,28 +126,6 @@ void PrintWorst(const std::vector<SceneOutcome>& outcomes, const std::vector<Lin
   }
 }
 
-Result<void> WriteText(const std::string& path, const std::string& text) {
-  if (path.empty()) return {};
-  std::ofstream file(path, std::ios::trunc);
-  file << text;
-  file.close();
-  if (!file)
-    return Error{ErrorCode::kUnavailable, path + ": cannot be written; check the folder and the disk"};
-  return {};
-}
-
-// Between the two marks of a page, if there are any; else the file holds the tables alone.
-Result<void> WriteMarkdown(const std::string& path, const std::string& tables) {
-  if (path.empty()) return {};
-  const std::string begin = "<!-- begin: taclink bench vision -->\n", end = "<!-- end -->";
-  std::ostringstream before;
-  if (const std::ifstream file(path); file) before << file.rdbuf();
-  const std::string page = before.str();
-  const size_t from = page.find(begin), to = page.find(end, from == std::string::npos ? 0 : from);
-  if (from == std::string::npos || to == std::string::npos) return WriteText(path, tables);
-  return WriteText(path, page.substr(0, from) + begin + "\n" + tables + page.substr(to));
-}
-
 Result<std::vector<EvaluationScene>> ChooseScenes(const VisionOptions& options,
                                                   const std::vector<LinkModel>& models) {
   if (options.scene.empty())
@@ -204,7 +181,8 @@ Result<void> Vision(const VisionOptions& options) {
         std::printf("%s: %s\n", (*methods)[i].name.c_str(), label.c_str());
     }
   }
-  if (auto written = WriteMarkdown(options.markdown, markdown); !written) return written.error();
+  if (auto written = WriteBetweenMarks(options.markdown, "taclink bench vision", markdown); !written)
+    return written.error();
   if (auto written = WriteText(options.svg, ErrorTimePlot(*outcomes, *methods)); !written)
     return written.error();
   if (options.json.empty()) return {};
@@ -236,6 +214,8 @@ void AddBench(CLI::App& app, Selected& selected) {
   vision->add_option("--svg", options->svg, "File for the plot of error against time");
   vision->add_option("--jobs", options->jobs, "Scenes at the same time")->check(CLI::Range(1, 256));
   vision->callback([options, &selected] { selected = [options] { return Vision(*options); }; });
+  AddBenchAccuracy(*bench, selected);
+  AddBenchStability(*bench, selected);
 }
 
 }  // namespace taclink::command

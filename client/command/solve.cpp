@@ -26,6 +26,14 @@ struct SolveOptions {
   bool json = false;
 };
 
+// None: auto.
+std::optional<ForceModel> ForceModelNamed(const std::string& name) {
+  for (const ForceModel model : kForceModels) {
+    if (name == Name(model)) return model;
+  }
+  return std::nullopt;
+}
+
 Json ContactJson(const Contact& contact) {
   return {{"center_mm", ToJson(contact.center_mm)},
           {"normal", ToJson(contact.normal)},
@@ -72,7 +80,7 @@ Result<LinkState> SolveMarkers(const SolveOptions& options, const LinkModel& mod
   LinkState state;
   state.shape = std::move(*shape);
   InferUnseen(model, {.mpa = options.pressure_kpa * 1e-3}, state.shape);
-  const auto estimator = MakeForceEstimator(model, {});
+  const auto estimator = MakeForceEstimator(model, {.model = ForceModelNamed(options.force_model)});
   ContactFinder finder(model);
   const int64_t start = SystemClock().MonotonicNs();
   estimator->Estimate(state.shape, options.pressure_kpa * 1e-3, state.forces);
@@ -91,6 +99,7 @@ Result<void> ReadPair(const std::vector<std::string>& paths, StereoFrame& frame)
 
 Result<LinkState> SolvePictures(const SolveOptions& options, const LinkModel& model) {
   PipelineOptions pipeline_options;
+  pipeline_options.force.model = ForceModelNamed(options.force_model);
   pipeline_options.rest_frames = 1;
   if (!options.calibration.empty()) {
     auto rig = LoadCalibration(options.calibration, model);
@@ -156,8 +165,8 @@ void AddSolve(CLI::App& app, Selected& selected) {
       ->add_option("--sigma-mm", options->sigma_mm,
                    "With --markers: their standard deviation in x and y; z: 3 times")
       ->check(Within(1e-4, 10));
-  command->add_option("--force-model", options->force_model, "Only linear so far")
-      ->check(CLI::IsMember({"linear"}));
+  command->add_option("--force-model", options->force_model, "auto: the cheapest that is good enough")
+      ->check(CLI::IsMember({"auto", "literal", "linear", "pressurised", "nonlinear"}));
   command->add_flag("--json", options->json, "One JSON object");
   command->callback([options, markers, images, &selected] {
     if (markers->count() == 0 && images->count() == 0) {

@@ -1,8 +1,11 @@
+#include "sensing/evaluation/error_plot.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 
+#include "sensing/core/geometry.h"
 #include "sensing/evaluation/vision_report.h"
 
 namespace taclink {
@@ -11,12 +14,6 @@ namespace {
 constexpr double kWidth = 760, kHeight = 460, kLeft = 80, kRight = 190, kTop = 30, kBottom = 60;
 constexpr std::array<const char*, 6> kColours = {"#1b6ca8", "#d1495b", "#2e8b57",
                                                  "#8a5fbf", "#c77d0a", "#555555"};
-
-struct Point {
-  double x, y;
-  size_t method;
-  std::string label;
-};
 
 // A decade axis that holds all values.
 struct LogAxis {
@@ -74,13 +71,13 @@ std::string Plain(double value) {
   return text;
 }
 
-std::vector<Point> Points(const std::vector<SceneOutcome>& outcomes,
-                          const std::vector<VisionMethodKind>& methods) {
+std::vector<PlotPoint> Points(const std::vector<SceneOutcome>& outcomes,
+                              const std::vector<VisionMethodKind>& methods) {
   std::vector<std::string> models;
   for (const SceneOutcome& o : outcomes) {
     if (std::find(models.begin(), models.end(), o.model) == models.end()) models.push_back(o.model);
   }
-  std::vector<Point> points;
+  std::vector<PlotPoint> points;
   for (size_t i = 0; i < methods.size(); ++i) {
     for (const std::string& model : models) {
       const VisionScore s = SumScores(outcomes, i, [&](const SceneOutcome& o) { return o.model == model; });
@@ -93,9 +90,8 @@ std::vector<Point> Points(const std::vector<SceneOutcome>& outcomes,
 
 }  // namespace
 
-std::string ErrorTimePlot(const std::vector<SceneOutcome>& outcomes,
-                          const std::vector<VisionMethodKind>& methods) {
-  const std::vector<Point> points = Points(outcomes, methods);
+std::string LogPlot(const std::vector<PlotPoint>& points, const std::string& x_label,
+                    const std::string& y_label) {
   std::string svg =
       Format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %.0f %.0f\" ", kWidth, kHeight) +
       "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" "
@@ -103,7 +99,7 @@ std::string ErrorTimePlot(const std::vector<SceneOutcome>& outcomes,
   if (points.empty())
     return svg + Text(kWidth / 2, kHeight / 2, "middle", "nothing was measured") + "</svg>\n";
   std::vector<double> times, errors;
-  for (const Point& p : points) {
+  for (const PlotPoint& p : points) {
     times.push_back(p.x);
     errors.push_back(p.y);
   }
@@ -127,15 +123,15 @@ std::string ErrorTimePlot(const std::vector<SceneOutcome>& outcomes,
     svg += Format(line, kLeft, at_y(v), kWidth - kRight, at_y(v)) + colour + "\"/>\n";
     svg += Text(kLeft - 6, at_y(v) + 4, "end", Plain(v));
   });
-  svg += Text((kLeft + kWidth - kRight) / 2, kHeight - 16, "middle",
-              "CPU time of detection, labels and shape per stereo pair, median, ms");
+  svg += Text((kLeft + kWidth - kRight) / 2, kHeight - 16, "middle", x_label);
   const std::string turned = Format(" transform=\"rotate(-90 %.1f %.1f)\"", 20, kHeight / 2);
-  svg += Text(20, kHeight / 2, "middle", "RMSE of marker positions, 3-D, mm", turned.c_str());
+  svg += Text(20, kHeight / 2, "middle", y_label, turned.c_str());
   std::vector<Box> taken;
   taken.reserve(2 * points.size());
-  for (const Point& p : points) taken.push_back({at_x(p.x) - 6, at_y(p.y) - 6, at_x(p.x) + 6, at_y(p.y) + 6});
-  for (const Point& p : points) {
-    const std::string colour = kColours[p.method % kColours.size()];
+  for (const PlotPoint& p : points)
+    taken.push_back({at_x(p.x) - 6, at_y(p.y) - 6, at_x(p.x) + 6, at_y(p.y) + 6});
+  for (const PlotPoint& p : points) {
+    const std::string colour = kColours[p.series % kColours.size()];
     svg +=
         Format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"5\" fill=\"", at_x(p.x), at_y(p.y)) + colour + "\"/>\n";
     const Box box = PlaceLabel(at_x(p.x), at_y(p.y), p.label.size(), taken);
@@ -143,6 +139,13 @@ std::string ErrorTimePlot(const std::vector<SceneOutcome>& outcomes,
     svg += Text(box.left, box.bottom - 4, "start", p.label, (" fill=\"" + colour + "\"").c_str());
   }
   return svg + "</svg>\n";
+}
+
+std::string ErrorTimePlot(const std::vector<SceneOutcome>& outcomes,
+                          const std::vector<VisionMethodKind>& methods) {
+  return LogPlot(Points(outcomes, methods),
+                 "CPU time of detection, labels and shape per stereo pair, median, ms",
+                 "RMSE of marker positions, 3-D, mm");
 }
 
 }  // namespace taclink

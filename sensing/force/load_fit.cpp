@@ -70,6 +70,13 @@ LoadFit::LoadFit(const LoadSites& sites, int markers, const LoadFitOptions& opti
   site_norms_.setZero(sites.count());
   scores_.setZero(sites.count());
   guessed_norms_.setZero(sites.count());
+  // A site is told by up to four markers, and brings two tangential unknowns if it is alone.
+  const Eigen::Index unknowns = Eigen::Index{3} * most, told = std::min<Eigen::Index>(12 * most, 3 * markers);
+  for (auto* m : {&system_, &covariance_}) m->setZero(unknowns, unknowns);
+  for (auto* v : {&system_rhs_, &solution_}) v->setZero(unknowns);
+  to_markers_.setZero(told, unknowns);
+  spread_.setZero(unknowns, told);
+  lumped_.setZero(told);
   totals_.setZero(most);
   tangential_.setZero(3 * markers, 2 * most);
   tangential_weighed_.setZero(3 * markers, 2 * most);
@@ -247,8 +254,6 @@ void LoadFit::FindGroups() {
 void LoadFit::FitTangential(const MarkerData& data, NodalForces& forces) {
   const auto n = static_cast<Eigen::Index>(sites_in_.size());
   const Eigen::Index t = 2 * groups_, all = n + t;
-  system_.setZero(all, all);
-  system_rhs_.setZero(all);
   system_.topLeftCorner(n, n) = gram_.topLeftCorner(n, n);
   system_rhs_.head(n) = rhs_.head(n);
   for (Eigen::Index i = 0; i < t; ++i) {
@@ -264,18 +269,27 @@ void LoadFit::FitTangential(const MarkerData& data, NodalForces& forces) {
     system_rhs_[n + i] = tangential_weighed_.col(i).dot(target_);
   }
   system_.diagonal().head(n) *= 1 + kRidge;
-  const Eigen::LDLT<Eigen::MatrixXd> factor(system_);
-  solution_ = factor.solve(system_rhs_);
-  covariance_ = factor.solve(Eigen::MatrixXd::Identity(all, all));
+  auto system = system_.topLeftCorner(all, all);
+  Eigen::Ref<Eigen::MatrixXd> in_place(system);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(in_place);
+  const auto lower = system.triangularView<Eigen::Lower>();
+  auto solution = solution_.head(all);
+  solution = system_rhs_.head(all);
+  lower.solveInPlace(solution);
+  lower.transpose().solveInPlace(solution);
+  auto covariance = covariance_.topLeftCorner(all, all);
+  covariance.setIdentity();
+  lower.solveInPlace(covariance);
+  lower.transpose().solveInPlace(covariance);
   // Tangential force can't turn a push into a pull: then the inward loads stay as they were.
   if (n > 0 && solution_.head(n).minCoeff() > 0) {
     load_.head(n) = solution_.head(n);
   } else {
     solution_.head(n) = load_.head(n);
-    solution_.tail(t).setZero();
+    solution_.segment(n, t).setZero();
   }
   UpdateResidual();
-  if (t > 0) residual_.noalias() -= tangential_.leftCols(t) * solution_.tail(t);
+  if (t > 0) residual_.noalias() -= tangential_.leftCols(t) * solution_.segment(n, t);
   Write(data, forces);
 }
 
@@ -287,7 +301,7 @@ void LoadFit::Write(const MarkerData& data, NodalForces& forces) {
   const double unexplained = residual_.dot(weighed_residual_) / std::max(1, data.numbers);
   forces.residual = std::sqrt(std::max(0.0, unexplained));
   if (n == 0) return;
-  covariance_ *= std::max(1.0, unexplained);
+  covariance_.topLeftCorner(n + t, n + t) *= std::max(1.0, unexplained);
   for (const int site : sites_in_) {
     for (const auto& [marker, share] : sites_.shares[static_cast<size_t>(site)]) {
       if (share > 1e-9 &&
@@ -298,7 +312,8 @@ void LoadFit::Write(const MarkerData& data, NodalForces& forces) {
   }
   std::sort(forces.loaded.begin(), forces.loaded.end());
   const auto rows = static_cast<Eigen::Index>(3 * forces.loaded.size());
-  to_markers_.setZero(rows, n + t);  // forces of the loaded markers by the unknowns
+  auto to_markers = to_markers_.topLeftCorner(rows, n + t);  // forces of the loaded markers by the unknowns
+  to_markers.setZero();
   for (size_t k = 0; k < sites_in_.size(); ++k) {
     const auto site = static_cast<size_t>(sites_in_[k]);
     const Mat3& frame = sites_.frames[site];
@@ -307,14 +322,18 @@ void LoadFit::Write(const MarkerData& data, NodalForces& forces) {
       if (share <= 1e-9) continue;
       const auto row =
           3 * (std::lower_bound(forces.loaded.begin(), forces.loaded.end(), marker) - forces.loaded.begin());
-      to_markers_.block<3, 1>(row, static_cast<Eigen::Index>(k)) += share * frame.col(0);
-      to_markers_.block<3, 2>(row, n + 2 * group_[k]) += share * part * frame.rightCols<2>();
+      to_markers.block<3, 1>(row, static_cast<Eigen::Index>(k)) += share * frame.col(0);
+      to_markers.block<3, 2>(row, n + 2 * group_[k]) += share * part * frame.rightCols<2>();
     }
   }
-  const Eigen::VectorXd lumped = to_markers_ * solution_;
-  if (forces.loaded_covariance.rows() < rows) forces.loaded_covariance.setZero(rows, rows);
-  forces.loaded_covariance.topLeftCorner(rows, rows).noalias() =
-      to_markers_ * covariance_ * to_markers_.transpose();
+  auto lumped = lumped_.head(rows);
+  lumped.noalias() = to_markers * solution_.head(n + t);
+  if (forces.loaded_covariance.rows() < rows) {
+    forces.loaded_covariance.setZero(lumped_.size(), lumped_.size());
+  }
+  auto spread = spread_.topLeftCorner(n + t, rows);
+  spread.noalias() = covariance_.topLeftCorner(n + t, n + t) * to_markers.transpose();
+  forces.loaded_covariance.topLeftCorner(rows, rows).noalias() = to_markers * spread;
   for (size_t i = 0; i < forces.loaded.size(); ++i) {
     const auto m = static_cast<size_t>(forces.loaded[i]);
     const auto row = static_cast<Eigen::Index>(3 * i);

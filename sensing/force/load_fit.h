@@ -102,9 +102,9 @@ class LoadFit {
   std::vector<int> group_;  // by load
   int groups_ = 0;
   Eigen::MatrixXd tangential_, tangential_weighed_;
-  Eigen::MatrixXd system_, covariance_, to_markers_;
+  Eigen::MatrixXd system_, covariance_, to_markers_, spread_;
   Eigen::VectorXd totals_;  // inward, by contact, N
-  Eigen::VectorXd system_rhs_, solution_;
+  Eigen::VectorXd system_rhs_, solution_, lumped_;
 };
 
 template <typename Tangential>

@@ -1,0 +1,262 @@
+#include "client/command/bench_accuracy.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/command/bench_files.h"
+#include "client/command/json.h"
+#include "sensing/evaluation/accuracy_report.h"
+#include "sensing/model/model_file.h"
+
+namespace taclink::command {
+namespace {
+
+constexpr double kDetailNoiseMm = 0.05;
+
+struct Options {
+  std::string model = "cylinder";
+  std::vector<std::string> force_models;
+  std::vector<int> refinements = {1, 2, 3};
+  std::vector<double> noises_mm = {0, kDetailNoiseMm, 0.1};
+  std::vector<double> pressures_kpa = {0, 0.5, 1, 1.5};
+  std::vector<std::string> kinds;
+  int truth_refinement = 4;
+  std::string truth;
+  int frames = 4, jobs = 1;
+  uint64_t seed = 1;
+  bool quick = false;
+  std::string markdown, svg, json;
+};
+
+Result<std::vector<LinkModel>> LoadModels(const std::string& name) {
+  const std::vector<std::string> names =
+      name == "all" ? std::vector<std::string>{"cylinder", "barrel"} : std::vector<std::string>{name};
+  std::vector<LinkModel> models;
+  for (const std::string& one : names) {
+    auto model = LoadLinkModel(one);
+    if (!model) return model.error();
+    models.push_back(std::move(*model));
+  }
+  return models;
+}
+
+Result<std::vector<AccuracyMethod>> Methods(const Options& options) {
+  std::vector<std::optional<ForceModel>> known(std::begin(kForceModels), std::end(kForceModels));
+  known.emplace_back();
+  std::vector<AccuracyMethod> methods;
+  for (const auto& model : known) {
+    const std::string name = AccuracyMethod{model, 1}.name();
+    const auto& chosen = options.force_models;
+    if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), name) == chosen.end()) continue;
+    for (const int refinement : options.refinements) methods.push_back({model, refinement});
+  }
+  for (const std::string& name : options.force_models) {
+    const bool there =
+        std::any_of(methods.begin(), methods.end(), [&](const auto& m) { return m.name() == name; });
+    if (!there)
+      return Error{ErrorCode::kInvalidArgument, "no force model '" + name +
+                                                    "'; there are literal, linear, pressurised, nonlinear "
+                                                    "and auto"};
+  }
+  return methods;
+}
+
+Result<std::vector<PressPath>> Paths(const LinkModel& model, const Options& options) {
+  std::vector<double> pressures = options.pressures_kpa;
+  if (options.quick) pressures = {0, 1};
+  for (double& pressure : pressures) pressure *= 1e-3;
+  std::vector<PressPath> paths = PressPaths(model, pressures);
+  std::vector<std::string> kinds = options.kinds;
+  if (options.quick && kinds.empty()) kinds = {"rest", "stamp-marker", "two"};
+  if (kinds.empty()) return paths;
+  for (const std::string& kind : kinds) {
+    const bool there =
+        std::any_of(paths.begin(), paths.end(), [&](const auto& p) { return Name(p.kind) == kind; });
+    if (!there) return Error{ErrorCode::kInvalidArgument, "no kind of scene '" + kind + "'"};
+  }
+  std::erase_if(paths, [&](const PressPath& path) {
+    return std::find(kinds.begin(), kinds.end(), Name(path.kind)) == kinds.end();
+  });
+  return paths;
+}
+
+std::function<void(int, int)> Progress(const std::string& what) {
+  return [what](int done, int all) {
+    std::fprintf(stderr, "\r%s %d of %d%s", what.c_str(), done, all, done == all ? "\n" : "");
+  };
+}
+
+Json SceneJson(const SceneScores& scene) {
+  Json json = {{"name", scene.path->path.name},
+               {"depth_mm", scene.truth->stage.depth_mm},
+               {"drag_mm", scene.truth->stage.drag_mm},
+               {"frames", Json::array()}};
+  for (const FrameScore& frame : scene.frames) {
+    Json contacts = Json::array();
+    for (const ContactScore& c : frame.contacts)
+      contacts.push_back({{"true_n", c.true_n},
+                          {"size_error_n", c.size_error_n},
+                          {"vector_error_n", c.vector_error_n},
+                          {"direction_deg", c.direction_deg},
+                          {"center_mm", c.center_mm},
+                          {"missed", c.missed}});
+    json["frames"].push_back(
+        {{"phantom_n", frame.phantom_n}, {"stray_n", frame.stray_n}, {"contacts", contacts}});
+  }
+  return json;
+}
+
+Json OutcomeJson(const AccuracyOutcome& outcome) {
+  Json json = {{"force_model", outcome.method.name()},
+               {"refinement", outcome.method.refinement},
+               {"link", outcome.model},
+               {"noise_mm", outcome.noise_mm},
+               {"answered", outcome.answered},
+               {"frames", outcome.frames},
+               {"not_converged", outcome.not_converged},
+               {"construction_s", outcome.construction_s},
+               {"memory_mb", outcome.memory_mb},
+               {"cpu_ms",
+                {{"p50", Percentile(outcome.cpu_ms, 0.5)},
+                 {"p95", Percentile(outcome.cpu_ms, 0.95)},
+                 {"p99", Percentile(outcome.cpu_ms, 0.99)},
+                 {"at_rest_p50", Percentile(outcome.rest_cpu_ms, 0.5)}}},
+               {"scenes", Json::array()}};
+  for (const SceneScores& scene : outcome.scenes) json["scenes"].push_back(SceneJson(scene));
+  return json;
+}
+
+struct Run {
+  std::vector<std::vector<PathTruth>> truths;  // by link
+  std::vector<AccuracyOutcome> outcomes;
+};
+
+Result<Run> Play(const std::vector<LinkModel>& models, const Options& options) {
+  auto methods = Methods(options);
+  if (!methods) return methods.error();
+  Run run;
+  for (const LinkModel& model : models) {
+    const auto paths = Paths(model, options);
+    if (!paths) return paths.error();
+    auto truths = MakeTruths(model, *paths, options.truth_refinement, options.truth, options.jobs,
+                             Progress("truth, " + model.name + ": path"));
+    if (!truths) return truths.error();
+    run.truths.push_back(std::move(*truths));
+    AccuracyOptions bench{.methods = *methods,
+                          .noises_mm = options.noises_mm,
+                          .frames = options.frames,
+                          .seed = options.seed,
+                          .jobs = options.jobs,
+                          .progress = Progress("force models: run")};
+    for (AccuracyOutcome& outcome : RunAccuracyBench(model, run.truths.back(), bench))
+      run.outcomes.push_back(std::move(outcome));
+  }
+  return run;
+}
+
+std::string Settings(const Run& run, const Options& options) {
+  int scenes = 0, left_out = 0, paths = 0;
+  double cpu_s = 0;
+  for (const auto& truths : run.truths) {
+    for (const PathTruth& truth : truths) {
+      const int there = ScenesOf(truth);
+      scenes += there;
+      left_out += truth.path.scenes() - there;
+      cpu_s += truth.cpu_s;
+      ++paths;
+    }
+  }
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "%d scenes on %d paths (%d more left out, see below), truth at refinement %d (%.1f CPU "
+                "seconds a path), %d noisy frames a scene (2 exact ones), seed %llu.\n\n",
+                scenes, paths, left_out, options.truth_refinement, paths > 0 ? cpu_s / paths : 0.0,
+                options.frames, static_cast<unsigned long long>(options.seed));
+  return text;
+}
+
+double DetailNoise(const Options& options) {
+  const auto& noises = options.noises_mm;
+  const bool there = std::find(noises.begin(), noises.end(), kDetailNoiseMm) != noises.end();
+  return there ? kDetailNoiseMm : noises.back();
+}
+
+Result<void> Accuracy(const Options& options) {
+  const auto models = LoadModels(options.model);
+  if (!models) return models.error();
+  // Outcomes point into the truths, whose places moving a Run does not change.
+  const auto run = Play(*models, options);
+  if (!run) return run.error();
+  const double detail = DetailNoise(options);
+  std::vector<ReportTable> tables = AccuracyTables(run->outcomes, detail);
+  for (const auto& truths : run->truths) {
+    if (ReportTable failed = FailedPaths(truths); !failed.rows.empty()) tables.push_back(failed);
+  }
+  std::string markdown = Settings(*run, options);
+  std::printf("%s", markdown.c_str());
+  for (const ReportTable& table : tables) {
+    std::printf("%s\n", AlignedText(table).c_str());
+    markdown += Markdown(table) + "\n";
+  }
+  if (auto written = WriteBetweenMarks(options.markdown, "taclink bench accuracy", markdown); !written)
+    return written.error();
+  if (auto written = WriteText(options.svg, AccuracyPlot(run->outcomes, detail)); !written)
+    return written.error();
+  if (options.json.empty()) return {};
+  Json json = {
+      {"seed", options.seed}, {"truth_refinement", options.truth_refinement}, {"runs", Json::array()}};
+  for (const AccuracyOutcome& outcome : run->outcomes) json["runs"].push_back(OutcomeJson(outcome));
+  return WriteText(options.json, json.dump(1) + "\n");
+}
+
+void AddScenes(CLI::App& command, Options& options) {
+  command.add_option("--model", options.model, "cylinder, barrel, all, or a YAML file")
+      ->capture_default_str();
+  command.add_option("--pressures-kpa", options.pressures_kpa, "Gauge pressures of the scenes")
+      ->delimiter(',')
+      ->check(Within(-5, 5))
+      ->capture_default_str();
+  command.add_option("--kinds", options.kinds, "Some kinds of scenes, comma-separated")->delimiter(',');
+  command.add_flag("--quick", options.quick, "A few scenes at 0 and 1 kPa");
+  command.add_option("--truth-refinement", options.truth_refinement, "Of the truth's mesh")
+      ->check(CLI::Range(1, 8))
+      ->capture_default_str();
+  command.add_option("--truth", options.truth,
+                     "Folder that keeps the truth; delete it when the solver changed");
+}
+
+}  // namespace
+
+void AddBenchAccuracy(CLI::App& bench, Selected& selected) {
+  auto options = std::make_shared<Options>();
+  CLI::App* accuracy = bench.add_subcommand(
+      "accuracy", "From marker displacements to contact forces, against the nonlinear forward solver");
+  AddScenes(*accuracy, *options);
+  accuracy->add_option("--force-models", options->force_models, "Some of them, comma-separated")
+      ->delimiter(',');
+  accuracy->add_option("--refinements", options->refinements, "Elements per interval of the marker grid")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 4))
+      ->capture_default_str();
+  accuracy->add_option("--noise", options->noises_mm, "Standard deviations of the markers, mm; 0: exact")
+      ->delimiter(',')
+      ->check(Within(0, 5))
+      ->capture_default_str();
+  accuracy->add_option("--frames", options->frames, "Noisy frames a scene")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  accuracy->add_option("--jobs", options->jobs, "Paths or force models at the same time")
+      ->check(CLI::Range(1, 256));
+  accuracy->add_option("--seed", options->seed, "Of the noise")->capture_default_str();
+  accuracy->add_option("--markdown", options->markdown,
+                       "File for the tables, or a page with marks to put them between");
+  accuracy->add_option("--svg", options->svg, "File for the plot of error against time");
+  accuracy->add_option("--json", options->json, "File for all numbers");
+  accuracy->callback([options, &selected] { selected = [options] { return Accuracy(*options); }; });
+}
+
+}  // namespace taclink::command

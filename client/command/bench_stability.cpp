@@ -1,0 +1,114 @@
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/command/bench_accuracy.h"
+#include "client/command/bench_files.h"
+#include "sensing/evaluation/stability_cases.h"
+#include "sensing/evaluation/vision_report.h"
+#include "sensing/model/model_file.h"
+
+namespace taclink::command {
+namespace {
+
+struct Options {
+  std::string markdown, only;
+  int refinement = 2, jobs = 1;
+};
+
+std::string Short(double value) {
+  if (!std::isfinite(value)) return std::isnan(value) ? "-" : "inf";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1e", value);
+  return text;
+}
+
+std::vector<StabilityRow> RunSkins(const std::vector<SkinCase>& cases, const Options& options) {
+  std::vector<StabilityRow> rows(cases.size());
+  std::atomic<size_t> next = 0;
+  std::mutex mutex;
+  const auto work = [&] {
+    for (size_t i = next++; i < cases.size(); i = next++) {
+      rows[i] = RunSkinCase(cases[i], options.refinement);
+      const std::lock_guard lock(mutex);
+      std::fprintf(stderr, "%-50s %s: %s\n", rows[i].name.c_str(), Name(rows[i].ending),
+                   rows[i].reason.c_str());
+    }
+  };
+  std::vector<std::thread> workers;
+  for (int i = 1; i < options.jobs; ++i) workers.emplace_back(work);
+  work();
+  for (std::thread& worker : workers) worker.join();
+  return rows;
+}
+
+ReportTable SkinTable(const std::vector<StabilityRow>& rows) {
+  ReportTable table{"The forward solver: a skin inflated, then pressed by a sphere",
+                    {"case", "ends", "condition", "backward error", "float error", "energy", "reciprocity",
+                     "checks, or the reason"},
+                    {}};
+  for (const StabilityRow& row : rows)
+    table.rows.push_back({row.name, Name(row.ending), Short(row.condition), Short(row.backward_error),
+                          Short(row.float_error), Short(row.energy_error), Short(row.reciprocity),
+                          row.reason});
+  return table;
+}
+
+ReportTable InputTable(const std::vector<StabilityRow>& rows) {
+  ReportTable table{"Numbers that are none, markers that are gone", {"case", "ends", "how"}, {}};
+  for (const StabilityRow& row : rows) table.rows.push_back({row.name, Name(row.ending), row.reason});
+  return table;
+}
+
+std::string Count(const std::vector<StabilityRow>& rows, const char* what) {
+  const auto of = [&](Ending ending) {
+    return std::count_if(rows.begin(), rows.end(), [&](const StabilityRow& r) { return r.ending == ending; });
+  };
+  char text[160];
+  std::snprintf(text, sizeof text, "%s: %zu cases, %td right, %td refused, %td wrong.\n", what, rows.size(),
+                of(Ending::kRight), of(Ending::kRefused), of(Ending::kWrong));
+  return text;
+}
+
+Result<void> Stability(const Options& options) {
+  const auto base = LoadLinkModel("cylinder");
+  if (!base) return base.error();
+  std::vector<SkinCase> cases = SkinCases(*base);
+  std::erase_if(cases, [&](const SkinCase& c) { return c.name.find(options.only) == std::string::npos; });
+  const std::vector<StabilityRow> skins = RunSkins(cases, options);
+  std::vector<StabilityRow> inputs = RunInputCases(*base, [](const StabilityRow& row) {
+    std::fprintf(stderr, "%-70s %s: %s\n", row.name.c_str(), Name(row.ending), row.reason.c_str());
+  });
+  std::string markdown = "Mesh of refinement " + std::to_string(options.refinement) + ".\n\n" +
+                         Count(skins, "Forward solver") + "\n" + Count(inputs, "Input") + "\n";
+  std::printf("%s", markdown.c_str());
+  for (const ReportTable& table : {SkinTable(skins), InputTable(inputs)}) {
+    std::printf("%s\n", AlignedText(table).c_str());
+    markdown += Markdown(table) + "\n";
+  }
+  return WriteBetweenMarks(options.markdown, "taclink bench stability", markdown);
+}
+
+}  // namespace
+
+void AddBenchStability(CLI::App& bench, Selected& selected) {
+  auto options = std::make_shared<Options>();
+  CLI::App* stability =
+      bench.add_subcommand("stability", "The mechanics at extreme skins, loads and inputs, case by case");
+  stability->add_option("--only", options->only, "Skins whose name holds this");
+  stability->add_option("--refinement", options->refinement, "Of the mesh")
+      ->check(CLI::Range(1, 4))
+      ->capture_default_str();
+  stability->add_option("--jobs", options->jobs, "Cases at the same time")->check(CLI::Range(1, 256));
+  stability->add_option("--markdown", options->markdown,
+                        "File for the tables, or a page with marks to put them between");
+  stability->callback([options, &selected] { selected = [options] { return Stability(*options); }; });
+}
+
+}  // namespace taclink::command

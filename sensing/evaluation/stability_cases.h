@@ -1,0 +1,53 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "sensing/core/link_model.h"
+
+namespace taclink {
+
+/// How a case ended.
+enum class Ending {
+  kRight,    ///< every check passed
+  kRefused,  ///< no answer, and a reason
+  kWrong,    ///< an answer that fails a check, or none without a reason
+};
+const char* Name(Ending ending);
+
+struct StabilityRow {
+  std::string name;
+  Ending ending = Ending::kWrong;
+  std::string reason;  ///< what was checked, why it was refused, or what failed
+  /// Of cases that reached an equilibrium, else NaN: see TangentNumbers; work done by bodies and pressure
+  /// against the stored energy, by the larger; Reciprocity.
+  double condition, backward_error, float_error, energy_error, reciprocity;
+};
+
+/// A skin inflated and then pressed by a frictionless sphere of radius 10 mm.
+struct SkinCase {
+  std::string name;
+  LinkModel model;
+  double pressure_mpa = 0;
+  double depth_mm = 0;  ///< from the undeformed surface; 0: no body
+  /// The same skin of another stiffness under loads scaled alike: must move alike.
+  double reference_modulus_mpa = 0;  ///< 0: none
+};
+
+/// The shipped geometry with another modulus, thickness (same mid-surface), Poisson's ratio or law. A
+/// neo-Hookean skin has Poisson's ratio 0.5.
+LinkModel VariedModel(const LinkModel& base, double modulus_mpa, double thickness_by_radius, double poisson,
+                      MaterialLaw law);
+/// The pressure that strains a skin as `pressure_kpa` strains the shipped one (E = 0.1 MPa).
+double ScaledPressureMpa(const LinkModel& base, const LinkModel& model, double pressure_kpa);
+
+std::vector<SkinCase> SkinCases(const LinkModel& base);
+/// `refinement` of the mesh.
+StabilityRow RunSkinCase(const SkinCase& skin_case, int refinement);
+
+/// NaN, infinities and missing markers for the estimators; NaN and impossible pushes for the forward solver.
+std::vector<StabilityRow> RunInputCases(const LinkModel& base,
+                                        const std::function<void(const StabilityRow&)>& done);
+
+}  // namespace taclink
