@@ -18,17 +18,8 @@ constexpr int kInflations = 32, kPresses = 8;  // steps of each path, for the wo
 constexpr double kMostResidual = 2e-7, kMostEnergyError = 0.01, kMostReciprocity = 1e-4,
                  kMostScalingMm = 1e-4, kMostLinearError = 0.01, kMostBackward = 1e-12;
 
-// The default's longest pressure step is for soft skins; a stiff one would take millions.
-PressedSkinOptions OptionsFor(const LinkModel& model, int refinement) {
-  PressedSkinOptions options{.refinement = refinement};
-  constexpr double kModulusMpa = 0.1, kThicknessMm = 3.5;
-  options.pressure_step_mpa *=
-      model.material.youngs_modulus_mpa / kModulusMpa * model.thickness_mm / kThicknessMm;
-  return options;
-}
-
 struct Path {
-  explicit Path(const SkinCase& c, int refinement) : skin(c.model, OptionsFor(c.model, refinement)) {}
+  explicit Path(const SkinCase& c, int refinement) : skin(c.model, {.refinement = refinement}) {}
 
   PressedSkin skin;
   std::string refused;  // empty: arrived

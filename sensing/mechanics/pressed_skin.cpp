@@ -8,6 +8,14 @@ namespace taclink {
 namespace {
 
 constexpr double kTolerance = 1e-7;  // of E t^2
+constexpr double kMostSteps = 1000;  // of one motion; who asks for more has the wrong unit
+
+PressSummary Refused(EquilibriumStop stop) {
+  PressSummary summary;
+  summary.stop = stop;
+  summary.reached = 0;
+  return summary;
+}
 
 EquilibriumOptions SolverOptions(const LinkModel& model) {
   EquilibriumOptions options;
@@ -126,9 +134,14 @@ PressSummary PressedSkin::Follow(double longest, double least, Advance advance) 
 }
 
 PressSummary PressedSkin::Inflate(double pressure_mpa) {
+  if (!std::isfinite(pressure_mpa)) return Refused(EquilibriumStop::kNotFinite);
   const double from = pressure_mpa_, change = pressure_mpa - from;
   if (change == 0) return {};
-  const double longest = std::min(1.0, options_.pressure_step_mpa / std::abs(change));
+  const double radius = model_.PointAtDepth(0, model_.length_mm / 2, model_.thickness_mm / 2).x();
+  const double step =
+      options_.pressure_step * model_.material.youngs_modulus_mpa * model_.thickness_mm / radius;
+  if (std::abs(change) > kMostSteps * step) return Refused(EquilibriumStop::kMaxIterations);
+  const double longest = std::min(1.0, step / std::abs(change));
   return Follow(longest, longest / 256, [&](double at) {
     pressure_mpa_ = from + at * change;
     pressure_ = FollowerPressure(model_.thickness_mm, pressure_mpa_);
@@ -137,8 +150,12 @@ PressSummary PressedSkin::Inflate(double pressure_mpa) {
 
 PressSummary PressedSkin::Move(std::span<const Vec3> by_mm) {
   double distance = 0;
-  for (const Vec3& by : by_mm) distance = std::max(distance, by.norm());
+  for (const Vec3& by : by_mm) {
+    if (!by.allFinite()) return Refused(EquilibriumStop::kNotFinite);
+    distance = std::max(distance, by.norm());
+  }
   if (distance == 0) return {};
+  if (distance > kMostSteps * options_.step_mm) return Refused(EquilibriumStop::kMaxIterations);
   std::vector<RigidBody> from;
   from.reserve(bodies_.size());
   for (const RigidContact& body : bodies_) from.push_back(body.body());

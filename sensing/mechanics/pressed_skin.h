@@ -14,12 +14,12 @@
 namespace taclink {
 
 struct PressedSkinOptions {
-  int refinement = 2;           ///< elements per interval of the marker grid
-  double step_mm = 1;           ///< longest motion of a body from one equilibrium to the next
-  double least_step_mm = 0.01;  ///< gives up below
-  double pressure_step_mpa = 4e-4;
-  double spacing_mm = 0.8;  ///< of contact points
-  double stiffness = 1000;  ///< of contact, times Young's modulus / thickness
+  int refinement = 2;            ///< elements per interval of the marker grid
+  double step_mm = 1;            ///< longest motion of a body from one equilibrium to the next
+  double least_step_mm = 0.01;   ///< gives up below
+  double pressure_step = 0.044;  ///< likewise of the pressure: times Young's modulus times thickness / radius
+  double spacing_mm = 0.8;       ///< of contact points
+  double stiffness = 1000;       ///< of contact, times Young's modulus / thickness
 };
 
 /// Why a skin's way to a new state ended, and what it took.
