@@ -12,7 +12,7 @@ set(force core mechanics)
 set(contact core)
 set(simulation core yaml model camera mechanics capture)
 set(pipeline core camera capture markers shape mechanics force contact)
-set(evaluation core model camera capture markers mechanics simulation pipeline)
+set(evaluation core model camera capture markers mechanics force contact simulation pipeline)
 set(all_sensing core yaml model camera capture markers shape mechanics force contact simulation pipeline
     evaluation)
 

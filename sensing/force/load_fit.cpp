@@ -251,7 +251,7 @@ void LoadFit::FindGroups() {
 }
 
 // All inward loads and two tangential resultants a contact, these with a prior of friction.
-void LoadFit::FitTangential(const MarkerData& data, NodalForces& forces) {
+Eigen::Index LoadFit::FitTangential(const MarkerData& data) {
   const auto n = static_cast<Eigen::Index>(sites_in_.size());
   const Eigen::Index t = 2 * groups_, all = n + t;
   system_.topLeftCorner(n, n) = gram_.topLeftCorner(n, n);
@@ -281,16 +281,12 @@ void LoadFit::FitTangential(const MarkerData& data, NodalForces& forces) {
   covariance.setIdentity();
   lower.solveInPlace(covariance);
   lower.transpose().solveInPlace(covariance);
-  // Tangential force can't turn a push into a pull: then the inward loads stay as they were.
-  if (n > 0 && solution_.head(n).minCoeff() > 0) {
-    load_.head(n) = solution_.head(n);
-  } else {
-    solution_.head(n) = load_.head(n);
-    solution_.segment(n, t).setZero();
-  }
+  Eigen::Index pulling = -1;
+  if (n > 0 && solution.head(n).minCoeff(&pulling) <= 0) return pulling;
+  load_.head(n) = solution.head(n);
   UpdateResidual();
   if (t > 0) residual_.noalias() -= tangential_.leftCols(t) * solution_.segment(n, t);
-  Write(data, forces);
+  return -1;
 }
 
 void LoadFit::Write(const MarkerData& data, NodalForces& forces) {

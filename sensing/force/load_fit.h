@@ -82,7 +82,8 @@ class LoadFit {
   void Solve(double significance);
   void UpdateResidual();
   void FindGroups();
-  void FitTangential(const MarkerData& data, NodalForces& forces);
+  /// Returns the load that would pull most, -1: none.
+  Eigen::Index FitTangential(const MarkerData& data);
   void Write(const MarkerData& data, NodalForces& forces);
 
   const LoadSites& sites_;
@@ -109,18 +110,25 @@ class LoadFit {
 
 template <typename Tangential>
 void LoadFit::Report(const MarkerData& data, Tangential tangential, NodalForces& forces) {
-  FindGroups();
-  const auto n = static_cast<Eigen::Index>(sites_in_.size());
-  for (int group = 0; group < groups_; ++group) {
-    auto shares = trial_.head(n);
-    for (Eigen::Index k = 0; k < n; ++k) shares[k] = group_[static_cast<size_t>(k)] == group ? load_[k] : 0.0;
-    totals_[group] = shares.sum();
-    shares /= totals_[group];
-    for (int direction = 0; direction < 2; ++direction) {
-      tangential_.col(2 * group + direction) = tangential(shares, direction);
+  // Loads that only made up for a tangential force would pull now, and leave.
+  for (Eigen::Index pulling = 0; pulling >= 0;) {
+    FindGroups();
+    const auto n = static_cast<Eigen::Index>(sites_in_.size());
+    for (int group = 0; group < groups_; ++group) {
+      auto shares = trial_.head(n);
+      for (Eigen::Index k = 0; k < n; ++k) {
+        shares[k] = group_[static_cast<size_t>(k)] == group ? load_[k] : 0.0;
+      }
+      totals_[group] = shares.sum();
+      shares /= totals_[group];
+      for (int direction = 0; direction < 2; ++direction) {
+        tangential_.col(2 * group + direction) = tangential(shares, direction);
+      }
     }
+    pulling = FitTangential(data);
+    if (pulling >= 0) Remove(static_cast<size_t>(pulling));
   }
-  FitTangential(data, forces);
+  Write(data, forces);
 }
 
 }  // namespace taclink

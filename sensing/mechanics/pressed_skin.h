@@ -19,7 +19,9 @@ struct PressedSkinOptions {
   double least_step_mm = 0.01;   ///< gives up below
   double pressure_step = 0.044;  ///< likewise of the pressure: times Young's modulus times thickness / radius
   double spacing_mm = 0.8;       ///< of contact points
-  double stiffness = 1000;       ///< of contact, times Young's modulus / thickness
+  /// Of the wall under a body, times Young's modulus / thickness: a soft wall gives way locally, which a shell
+  /// does not know. The default makes its forces those of three-dimensional bricks (docs/calculix.md).
+  double stiffness = 0.35;
 };
 
 /// Why a skin's way to a new state ended, and what it took.
