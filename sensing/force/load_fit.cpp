@@ -75,7 +75,7 @@ LoadFit::LoadFit(const LoadSites& sites, int markers, const LoadFitOptions& opti
   for (auto* m : {&system_, &covariance_}) m->setZero(unknowns, unknowns);
   for (auto* v : {&system_rhs_, &solution_}) v->setZero(unknowns);
   to_markers_.setZero(told, unknowns);
-  spread_.setZero(unknowns, told);
+  spread_.setZero(unknowns, std::max(unknowns, told));
   lumped_.setZero(told);
   totals_.setZero(most);
   tangential_.setZero(3 * markers, 2 * most);
@@ -250,6 +250,23 @@ void LoadFit::FindGroups() {
   }
 }
 
+void LoadFit::SolveSystem(Eigen::Index size, bool with_covariance) {
+  auto factor = spread_.topLeftCorner(size, size);
+  factor = system_.topLeftCorner(size, size);
+  Eigen::Ref<Eigen::MatrixXd> in_place(factor);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(in_place);
+  const auto lower = factor.triangularView<Eigen::Lower>();
+  auto solution = solution_.head(size);
+  solution = system_rhs_.head(size);
+  lower.solveInPlace(solution);
+  lower.transpose().solveInPlace(solution);
+  if (!with_covariance) return;
+  auto covariance = covariance_.topLeftCorner(size, size);
+  covariance.setIdentity();
+  lower.solveInPlace(covariance);
+  lower.transpose().solveInPlace(covariance);
+}
+
 // All inward loads and two tangential resultants a contact, these with a prior of friction.
 Eigen::Index LoadFit::FitTangential(const MarkerData& data) {
   const auto n = static_cast<Eigen::Index>(sites_in_.size());
@@ -269,18 +286,23 @@ Eigen::Index LoadFit::FitTangential(const MarkerData& data) {
     system_rhs_[n + i] = tangential_weighed_.col(i).dot(target_);
   }
   system_.diagonal().head(n) *= 1 + kRidge;
-  auto system = system_.topLeftCorner(all, all);
-  Eigen::Ref<Eigen::MatrixXd> in_place(system);
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(in_place);
-  const auto lower = system.triangularView<Eigen::Lower>();
-  auto solution = solution_.head(all);
-  solution = system_rhs_.head(all);
-  lower.solveInPlace(solution);
-  lower.transpose().solveInPlace(solution);
-  auto covariance = covariance_.topLeftCorner(all, all);
-  covariance.setIdentity();
-  lower.solveInPlace(covariance);
-  lower.transpose().solveInPlace(covariance);
+  SolveSystem(all, true);
+  // A tangential force that noise could make is not told; its uncertainty is.
+  bool dropped = false;
+  for (Eigen::Index i = n; i < all; i += 2) {
+    const Vec2 force = solution_.segment<2>(i);
+    const Mat2 covariance = covariance_.block<2, 2>(i, i);
+    if (force.dot(covariance.inverse() * force) > options_.significance * options_.significance) continue;
+    for (Eigen::Index k = i; k < i + 2; ++k) {
+      system_.row(k).head(all).setZero();
+      system_.col(k).head(all).setZero();
+      system_(k, k) = 1;
+      system_rhs_[k] = 0;
+    }
+    dropped = true;
+  }
+  if (dropped) SolveSystem(all, false);
+  const auto solution = solution_.head(all);
   Eigen::Index pulling = -1;
   if (n > 0 && solution.head(n).minCoeff(&pulling) <= 0) return pulling;
   load_.head(n) = solution.head(n);
@@ -325,7 +347,7 @@ void LoadFit::Write(const MarkerData& data, NodalForces& forces) {
   auto lumped = lumped_.head(rows);
   lumped.noalias() = to_markers * solution_.head(n + t);
   if (forces.loaded_covariance.rows() < rows) {
-    forces.loaded_covariance.setZero(lumped_.size(), lumped_.size());
+    forces.loaded_covariance.setZero(rows, rows);
   }
   auto spread = spread_.topLeftCorner(n + t, rows);
   spread.noalias() = covariance_.topLeftCorner(n + t, n + t) * to_markers.transpose();

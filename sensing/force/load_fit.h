@@ -82,6 +82,7 @@ class LoadFit {
   void Solve(double significance);
   void UpdateResidual();
   void FindGroups();
+  void SolveSystem(Eigen::Index size, bool with_covariance);
   /// Returns the load that would pull most, -1: none.
   Eigen::Index FitTangential(const MarkerData& data);
   void Write(const MarkerData& data, NodalForces& forces);
@@ -103,7 +104,8 @@ class LoadFit {
   std::vector<int> group_;  // by load
   int groups_ = 0;
   Eigen::MatrixXd tangential_, tangential_weighed_;
-  Eigen::MatrixXd system_, covariance_, to_markers_, spread_;
+  Eigen::MatrixXd system_, covariance_, to_markers_;
+  Eigen::MatrixXd spread_;  // scratch
   Eigen::VectorXd totals_;  // inward, by contact, N
   Eigen::VectorXd system_rhs_, solution_, lumped_;
 };
