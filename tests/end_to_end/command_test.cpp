@@ -76,16 +76,18 @@ TEST_F(CommandTest, DetectFindsTheMarkersOfARealPicture) {
 }
 
 TEST_F(CommandTest, SkinPushAnswersWithForceAndInflation) {
-  const auto push = [&](const char* force_model) {
-    const Finished run = Taclink({"skin", "push", "--model", "cylinder", "--node", "7,5", "--depth-mm", "10",
-                                  "--pressure-kpa", "0.5", "--force-model", force_model, "--json"});
+  const auto push = [&](const char* force_model, const char* refinement) {
+    const Finished run =
+        Taclink({"skin", "push", "--model", "cylinder", "--node", "7,5", "--depth-mm", "10", "--pressure-kpa",
+                 "0.5", "--force-model", force_model, "--refinement", refinement, "--json"});
     EXPECT_EQ(run.exit_code, 0) << run.err;
     return json::parse(run.out);
   };
-  const json real = push("nonlinear");
+  const json real = push("nonlinear", "3");
   EXPECT_NEAR(real.at("force_n").get<double>(), 0.59, 0.06);  // measured with a probe
   EXPECT_NEAR(real.at("inflation_mm").get<double>(), 1.5, 0.1);
-  EXPECT_NEAR(push("linear").at("force_n").get<double>(), 0.30, 0.02);  // linear column of the probe table
+  EXPECT_NEAR(push("linear", "1").at("force_n").get<double>(), 0.30,
+              0.02);  // linear column of the probe table
 }
 
 }  // namespace
