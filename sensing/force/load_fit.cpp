@@ -68,8 +68,6 @@ LoadFit::LoadFit(const LoadSites& sites, int markers, const LoadFitOptions& opti
   for (auto* v : {&target_, &residual_, &weighed_residual_}) v->setZero(3 * markers);
   search_.setZero(3 * markers);
   site_norms_.setZero(sites.count());
-  scores_.setZero(sites.count());
-  guessed_norms_.setZero(sites.count());
   // A site is told by up to four markers, and brings two tangential unknowns if it is alone.
   const Eigen::Index unknowns = Eigen::Index{3} * most, told = std::min<Eigen::Index>(12 * most, 3 * markers);
   for (auto* m : {&system_, &covariance_}) m->setZero(unknowns, unknowns);
@@ -113,36 +111,24 @@ double LoadFit::NormOf(const MarkerData& data, const SkinTangent& tangent, int s
     squared += g.dot(data.information_per_mm2[m] * g);
   }
   site_norms_[site] = std::sqrt(squared);
-  guessed_norms_[site] = site_norms_[site];
   return site_norms_[site];
 }
 
 int LoadFit::MostSignificant(const MarkerData& data, const SkinTangent& tangent) {
-  // Norms change little from frame to frame: the last one tells where it is worth while to know it now.
-  constexpr double kGuessIsWithin = 1.5;
   data.Weigh(residual_, weighed_residual_);
   search_ = weighed_residual_.cast<float>();
-  for (int s = 0; s < sites_.count(); ++s) {
-    const auto i = static_cast<size_t>(s);
-    scores_[s] = 0;
-    if (!near_[i] || is_in_[i]) continue;
-    const auto pull = static_cast<double>(tangent.inward_mm_n.col(s).dot(search_));
-    if (pull > 0) scores_[s] = pull / (guessed_norms_[s] > 0 ? guessed_norms_[s] : NormOf(data, tangent, s));
-  }
   int best = -1;
   double best_score = options_.significance;
-  for (int tried = 0; tried < sites_.count(); ++tried) {
-    Eigen::Index site = 0;
-    const double guess = scores_.maxCoeff(&site);
-    if (!(guess > best_score / kGuessIsWithin)) break;
-    const auto s = static_cast<int>(site);
-    const double guessed_norm = guessed_norms_[s];
-    const double score = guess * guessed_norm / NormOf(data, tangent, s);
-    if (score > best_score) {
+  for (int s = 0; s < sites_.count(); ++s) {
+    const auto i = static_cast<size_t>(s);
+    if (!near_[i] || is_in_[i]) continue;
+    const auto pull = static_cast<double>(tangent.inward_mm_n.col(s).dot(search_));
+    if (pull <= 0) continue;
+    const double norm = NormOf(data, tangent, s);
+    if (norm > 0 && pull > best_score * norm) {
       best = s;
-      best_score = score;
+      best_score = pull / norm;
     }
-    scores_[site] = 0;
   }
   return best;
 }

@@ -95,10 +95,8 @@ class LoadFit {
   Eigen::MatrixXd columns_, weighed_, gram_, factor_;
   Eigen::VectorXd target_, residual_, weighed_residual_;
   Eigen::VectorXf search_;
-  Eigen::VectorXd scores_;
-  Eigen::VectorXd guessed_norms_;  // of the last frame that asked; 0: none did
-  Eigen::VectorXd site_norms_;     // of this frame; negative: not known yet
-  std::vector<char> near_;         // by site
+  Eigen::VectorXd site_norms_;  // of this frame; negative: not known yet
+  std::vector<char> near_;      // by site
 
   // Contacts: groups of neighbouring loads, and their tangential columns, two each.
   std::vector<int> group_;  // by load
