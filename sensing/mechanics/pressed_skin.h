@@ -19,8 +19,8 @@ struct PressedSkinOptions {
   double least_step_mm = 0.01;   ///< gives up below
   double pressure_step = 0.044;  ///< likewise of the pressure: times Young's modulus times thickness / radius
   double spacing_mm = 0.8;       ///< of contact points
-  /// Of the wall under a body, times Young's modulus / thickness: a soft wall gives way locally, which a shell
-  /// does not know. The default makes its forces those of three-dimensional bricks (docs/calculix.md).
+  /// Of the wall under a body, times Young's modulus / thickness: a soft wall gives way locally, which a
+  /// shell does not know. The default makes its forces those of three-dimensional bricks (docs/calculix.md).
   double stiffness = 0.35;
 };
 
