@@ -14,7 +14,6 @@
 #include "sensing/evaluation/scene_generator.h"
 #include "sensing/evaluation/vision_bench.h"
 #include "sensing/evaluation/vision_report.h"
-#include "sensing/model/model_file.h"
 
 namespace taclink::command {
 namespace {
@@ -27,25 +26,13 @@ struct VisionOptions {
   int scenes = kScenes;
   bool quick = false;
   uint64_t seed = 1;
-  std::string model = "both";
+  std::string model = "all";
   std::vector<std::string> methods;
   std::string scene;
   std::string keep;
   std::string json, markdown, svg;
   int jobs = 1;
 };
-
-Result<std::vector<LinkModel>> LoadModels(const std::string& name) {
-  const std::vector<std::string> names =
-      name == "both" ? std::vector<std::string>{"cylinder", "barrel"} : std::vector<std::string>{name};
-  std::vector<LinkModel> models;
-  for (const std::string& one : names) {
-    auto model = LoadLinkModel(one);
-    if (!model) return model.error();
-    models.push_back(std::move(*model));
-  }
-  return models;
-}
 
 Result<std::vector<VisionMethodKind>> ChooseMethods(const std::vector<std::string>& names) {
   std::vector<VisionMethodKind> chosen;
@@ -144,7 +131,7 @@ std::string Settings(const std::vector<EvaluationScene>& scenes, const VisionOpt
 }
 
 Result<void> Vision(const VisionOptions& options) {
-  const auto models = LoadModels(options.model);
+  const auto models = LoadBenchModels(options.model);
   if (!models) return models.error();
   const auto methods = ChooseMethods(options.methods);
   if (!methods) return methods.error();
@@ -203,7 +190,7 @@ void AddBench(CLI::App& app, Selected& selected) {
       ->capture_default_str();
   vision->add_flag("--quick", options->quick, "One scene of each category and model");
   vision->add_option("--seed", options->seed, "Of all scenes")->capture_default_str();
-  vision->add_option("--model", options->model, "cylinder, barrel, both, or a YAML file")
+  vision->add_option("--model", options->model, "cylinder, barrel, all, or a YAML file")
       ->capture_default_str();
   vision->add_option("--methods", options->methods, "Some of them, comma-separated; half only if named")
       ->delimiter(',');

@@ -32,18 +32,6 @@ struct Options {
   std::string markdown, svg, json;
 };
 
-Result<std::vector<LinkModel>> LoadModels(const std::string& name) {
-  const std::vector<std::string> names =
-      name == "all" ? std::vector<std::string>{"cylinder", "barrel"} : std::vector<std::string>{name};
-  std::vector<LinkModel> models;
-  for (const std::string& one : names) {
-    auto model = LoadLinkModel(one);
-    if (!model) return model.error();
-    models.push_back(std::move(*model));
-  }
-  return models;
-}
-
 Result<std::vector<AccuracyMethod>> Methods(const Options& options) {
   std::vector<std::optional<ForceModel>> known(std::begin(kForceModels), std::end(kForceModels));
   known.emplace_back();
@@ -186,7 +174,7 @@ double DetailNoise(const Options& options) {
 }
 
 Result<void> Accuracy(const Options& options) {
-  const auto models = LoadModels(options.model);
+  const auto models = LoadBenchModels(options.model);
   if (!models) return models.error();
   // Outcomes point into the truths, whose places moving a Run does not change.
   const auto run = Play(*models, options);

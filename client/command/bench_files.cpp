@@ -2,8 +2,23 @@
 
 #include <fstream>
 #include <sstream>
+#include <utility>
+
+#include "sensing/model/model_file.h"
 
 namespace taclink::command {
+
+Result<std::vector<LinkModel>> LoadBenchModels(const std::string& name) {
+  const std::vector<std::string> names =
+      name == "all" ? std::vector<std::string>{"cylinder", "barrel"} : std::vector<std::string>{name};
+  std::vector<LinkModel> models;
+  for (const std::string& one : names) {
+    auto model = LoadLinkModel(one);
+    if (!model) return model.error();
+    models.push_back(std::move(*model));
+  }
+  return models;
+}
 
 Result<void> WriteText(const std::string& path, const std::string& text) {
   if (path.empty()) return {};

@@ -7,13 +7,14 @@
 #include "sensing/force/compliance_estimator.h"
 #include "sensing/force/nonlinear_estimator.h"
 #include "sensing/force/skin_tangent.h"
-#include "sensing/mechanics/pressed_skin.h"
 
 namespace taclink {
 namespace {
 
 constexpr double kStampRadiusMm = 2.75;
 constexpr double kStartMm = 0.1;
+// At which errors are learned, of PressureScale: up to 1.5 kPa for a skin of 0.1 MPa.
+constexpr double kLearnedPressures[] = {0, 0.022, 0.082, 0.165};
 constexpr double kHysteresis = 0.8;  // of the tolerance, to go back to a cheaper model
 
 // The shape of a pushed skin as exact measurements.
@@ -43,39 +44,41 @@ double RelativeError(ForceEstimator& estimator, const SkinShape& shape, double p
 
 }  // namespace
 
-AutoEstimator::AutoEstimator(const LinkModel& model, const ForceOptions& options) : options_(options) {
+AutoEstimator::AutoEstimator(const LinkModel& model, const ForceOptions& options)
+    : model_(model), options_(options) {
   linear_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kLinear, options);
   pressurised_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, options);
   nonlinear_ = std::make_unique<NonlinearEstimator>(model, options);
-  const double scale = model.material.youngs_modulus_mpa / 0.1;
-  const int marker = model.MarkerIndex(0, model.markers.rings() / 2);
-  for (const double pressure_mpa : {0.0, 0.2e-3 * scale, 0.75e-3 * scale, 1.5e-3 * scale}) {
+  for (const double share : kLearnedPressures) {
     PressedSkin skin(model, {.refinement = 1});
-    if (!skin.Inflate(pressure_mpa).ok()) break;
-    const auto node = static_cast<size_t>(skin.mesh().NodeOfMarker(model, marker));
-    const Vec3 axis = skin.mesh().normals[node];
-    const Vec3 start = skin.state().mids_mm[node] + (model.thickness_mm / 2 + kStartMm) * axis;
-    skin.AddBody(RigidStamp{start, -axis, kStampRadiusMm, 0.25}, true);
-    const Vec3 inflated = skin.Marker(marker);
-    std::vector<double> linear, pressurised;
-    depths_mm_.clear();
-    double depth = -kStartMm;
-    for (const double wanted : {1.0, 2.0, 4.0, 8.0}) {
-      const Vec3 by = -(wanted - depth) * axis;
-      if (!skin.Move({&by, 1}).ok()) break;
-      depth = wanted;
-      const SkinShape shape = ShapeOf(model, skin);
-      const Vec3 truth = skin.ContactOf(0).force_n;
-      depths_mm_.push_back((skin.Marker(marker) - inflated).norm());
-      linear.push_back(RelativeError(*linear_, shape, pressure_mpa, truth));
-      pressurised.push_back(RelativeError(*pressurised_, shape, pressure_mpa, truth));
-    }
-    pressures_mpa_.push_back(pressure_mpa);
-    linear_errors_.push_back(std::move(linear));
-    pressurised_errors_.push_back(std::move(pressurised));
+    if (!skin.Inflate(share * PressureScale(model)).ok()) break;
+    learned_.push_back(Learn(skin, share * PressureScale(model)));
   }
   const LoadSites sites = MakeLoadSites(model, MakeShellMesh(model, 1));
   inflation_per_mpa_ = LinearTangent(model, 1, sites).per_pressure;
+}
+
+// Pushes a marker in the middle with a stamp, deeper and deeper.
+AutoEstimator::Learned AutoEstimator::Learn(PressedSkin& skin, double pressure_mpa) {
+  Learned learned{pressure_mpa, {}, {}, {}};
+  const int marker = model_.MarkerIndex(0, model_.markers.rings() / 2);
+  const auto node = static_cast<size_t>(skin.mesh().NodeOfMarker(model_, marker));
+  const Vec3 axis = skin.mesh().normals[node];
+  const Vec3 start = skin.state().mids_mm[node] + (model_.thickness_mm / 2 + kStartMm) * axis;
+  skin.AddBody(RigidStamp{start, -axis, kStampRadiusMm, 0.25}, true);
+  const Vec3 inflated = skin.Marker(marker);
+  double depth = -kStartMm;
+  for (const double wanted : {1.0, 2.0, 4.0, 8.0}) {
+    const Vec3 by = -(wanted - depth) * axis;
+    if (!skin.Move({&by, 1}).ok()) break;
+    depth = wanted;
+    const SkinShape shape = ShapeOf(model_, skin);
+    const Vec3 truth = skin.ContactOf(0).force_n;
+    learned.depths_mm.push_back((skin.Marker(marker) - inflated).norm());
+    learned.linear_errors.push_back(RelativeError(*linear_, shape, pressure_mpa, truth));
+    learned.pressurised_errors.push_back(RelativeError(*pressurised_, shape, pressure_mpa, truth));
+  }
+  return learned;
 }
 
 AutoEstimator::~AutoEstimator() = default;
@@ -90,17 +93,16 @@ void AutoEstimator::Restart() {
 // The worst of the learned ones up to the pressure and depth at hand; beyond them, not known.
 double AutoEstimator::ErrorOf(ForceModel model, double pressure_mpa, double displacement_mm) const {
   if (model == ForceModel::kNonlinear) return 0;
-  const auto& errors = model == ForceModel::kLinear ? linear_errors_ : pressurised_errors_;
   double worst = 0;
-  for (size_t p = 0; p < pressures_mpa_.size(); ++p) {
-    const bool last_needed = pressures_mpa_[p] >= std::abs(pressure_mpa);
+  for (const Learned& at : learned_) {
+    const auto& errors = model == ForceModel::kLinear ? at.linear_errors : at.pressurised_errors;
     size_t d = 0;
-    for (; d < errors[p].size(); ++d) {
-      worst = std::max(worst, errors[p][d]);
-      if (depths_mm_[d] >= displacement_mm) break;
+    for (; d < errors.size(); ++d) {
+      worst = std::max(worst, errors[d]);
+      if (at.depths_mm[d] >= displacement_mm) break;
     }
-    if (d == errors[p].size()) return std::numeric_limits<double>::infinity();
-    if (last_needed) return worst;
+    if (d == errors.size()) break;
+    if (at.pressure_mpa >= std::abs(pressure_mpa)) return worst;
   }
   return std::numeric_limits<double>::infinity();
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sensing/force/force_estimator.h"
+#include "sensing/mechanics/pressed_skin.h"
 
 namespace taclink {
 
@@ -23,14 +24,19 @@ class AutoEstimator final : public ForceEstimator {
   double ErrorOf(ForceModel model, double pressure_mpa, double displacement_mm) const;
 
  private:
+  // What the cheaper models get wrong at one pressure, by how far the pushed marker moved; ascending.
+  struct Learned {
+    double pressure_mpa = 0;
+    std::vector<double> depths_mm, linear_errors, pressurised_errors;
+  };
+  Learned Learn(PressedSkin& skin, double pressure_mpa);
   ForceModel Choose(const SkinShape& shape, double pressure_mpa) const;
 
+  LinkModel model_;
   ForceOptions options_;
   std::unique_ptr<ForceEstimator> linear_, pressurised_, nonlinear_;
   ForceModel last_ = ForceModel::kLinear;
-  // Relative errors by depth, at pressures[i]; ascending.
-  std::vector<double> pressures_mpa_, depths_mm_;
-  std::vector<std::vector<double>> linear_errors_, pressurised_errors_;
+  std::vector<Learned> learned_;       // ascending pressures
   Eigen::VectorXd inflation_per_mpa_;  // of the markers, stacked
 };
 

@@ -7,39 +7,11 @@ namespace {
 
 constexpr int kDefaultRefinement = 2;
 
-LoadFitOptions FitOptions(const ForceOptions& options, int sites) {
-  LoadFitOptions fit;
-  fit.noise_floor_mm = options.noise_floor_mm;
-  fit.significance =
-      options.significance > 0 ? options.significance : SignificanceFor(options.phantoms_per_hour, 30, sites);
-  return fit;
-}
-
 int RefinementOf(const ForceOptions& options) {
   return options.refinement > 0 ? options.refinement : kDefaultRefinement;
 }
 
 }  // namespace
-
-double SignificanceFor(double per_hour, double frames_per_second, int sites) {
-  const double wanted = per_hour / (3600 * frames_per_second * sites);
-  double low = 0, high = 40;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    (0.5 * std::erfc(middle / std::sqrt(2.0)) > wanted ? low : high) = middle;
-  }
-  return high;
-}
-
-void ClearForces(int markers, ForceModel model, NodalForces& forces) {
-  forces.model = model;
-  forces.forces_n.assign(static_cast<size_t>(markers), Vec3::Zero());
-  forces.sigmas_n.assign(static_cast<size_t>(markers), 0.0);
-  forces.loaded.clear();
-  forces.loaded_covariance.setZero();
-  forces.residual = 0;
-  forces.converged = true;
-}
 
 ComplianceEstimator::ComplianceEstimator(const LinkModel& model, ForceModel force_model,
                                          const ForceOptions& options)
@@ -105,7 +77,9 @@ void ComplianceEstimator::Estimate(const SkinShape& shape, double pressure_mpa, 
   SetData(shape, pressure_mpa, *tangent);
   FindLoads(*tangent, forces);
   last_.clear();
-  for (size_t k = 0; k < fit_.sites_in().size(); ++k) last_.push_back({fit_.sites_in()[k], fit_.load_n(k)});
+  for (size_t k = 0; k < fit_.sites_in().size(); ++k) {
+    if (std::isfinite(fit_.load_n(k))) last_.push_back({fit_.sites_in()[k], fit_.load_n(k)});
+  }
   fit_.RemoveBias();
   fit_.Report(
       data_,

@@ -45,11 +45,4 @@ class ComplianceEstimator final : public ForceEstimator {
   std::vector<Load> last_;  // of the frame before
 };
 
-/// No forces, buffers kept.
-void ClearForces(int markers, ForceModel model, NodalForces& forces);
-
-/// Significance that noise alone passes in at most `per_hour` frames an hour, at `frames_per_second` and any
-/// of `sites` sites (Bonferroni's bound: the true rate is lower, as neighbouring sites ask the same).
-double SignificanceFor(double per_hour, double frames_per_second, int sites);
-
 }  // namespace taclink

@@ -28,6 +28,9 @@ struct ForceOptions {
 /// From marker displacements to what the world exerts on the skin. Holds scratch memory: one thread.
 class ForceEstimator {
  public:
+  ForceEstimator() = default;
+  ForceEstimator(const ForceEstimator&) = delete;
+  ForceEstimator& operator=(const ForceEstimator&) = delete;
   virtual ~ForceEstimator() = default;
   /// Uses the shape's measured displacements; its others are not independent of each other. `pressure_mpa`:
   /// gauge pressure now less that of the baseline. `forces`' buffers are reused.

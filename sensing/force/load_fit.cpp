@@ -12,6 +12,33 @@ constexpr double kRidge = 1e-6;  // of the system's diagonal: neighbours on a fi
 
 }  // namespace
 
+double SignificanceFor(double per_hour, double frames_per_second, int sites) {
+  const double wanted = per_hour / (3600 * frames_per_second * sites);
+  double low = 0, high = 40;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (0.5 * std::erfc(middle / std::sqrt(2.0)) > wanted ? low : high) = middle;
+  }
+  return high;
+}
+
+LoadFitOptions FitOptions(const ForceOptions& options, int sites) {
+  LoadFitOptions fit;
+  fit.significance =
+      options.significance > 0 ? options.significance : SignificanceFor(options.phantoms_per_hour, 30, sites);
+  return fit;
+}
+
+void ClearForces(int markers, ForceModel model, NodalForces& forces) {
+  forces.model = model;
+  forces.forces_n.assign(static_cast<size_t>(markers), Vec3::Zero());
+  forces.sigmas_n.assign(static_cast<size_t>(markers), 0.0);
+  forces.loaded.clear();
+  forces.loaded_covariance.setZero();
+  forces.residual = 0;
+  forces.converged = true;
+}
+
 MarkerData::MarkerData(int markers, double noise_floor_mm)
     : measured_mm(Eigen::VectorXd::Zero(3 * markers)),
       residual_mm(Eigen::VectorXd::Zero(3 * markers)),
@@ -305,6 +332,10 @@ void LoadFit::Write(const MarkerData& data, NodalForces& forces) {
   const double unexplained = residual_.dot(weighed_residual_) / std::max(1, data.numbers);
   forces.residual = std::sqrt(std::max(0.0, unexplained));
   if (n == 0) return;
+  if (!solution_.head(n + t).allFinite() || !covariance_.topLeftCorner(n + t, n + t).allFinite()) {
+    forces.converged = false;
+    return;
+  }
   covariance_.topLeftCorner(n + t, n + t) *= std::max(1.0, unexplained);
   for (const int site : sites_in_) {
     for (const auto& [marker, share] : sites_.shares[static_cast<size_t>(site)]) {

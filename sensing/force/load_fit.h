@@ -5,18 +5,27 @@
 
 #include "sensing/core/contact.h"
 #include "sensing/core/skin_shape.h"
+#include "sensing/force/force_estimator.h"
 #include "sensing/force/load_sites.h"
 #include "sensing/force/skin_tangent.h"
 
 namespace taclink {
 
 struct LoadFitOptions {
-  double significance = 5.6;     ///< a load comes in if it explains this many standard deviations
-  double noise_floor_mm = 0.03;  ///< smallest standard deviation of a marker, each axis
+  double significance = 5.6;  ///< a load comes in if it explains this many standard deviations
   int max_loads = 40;
   double min_force_n = 0.03;  ///< forces below are of no interest
   double friction = 0.7;      ///< standard deviation of a contact's tangential force, of its normal force
 };
+
+/// Significance that noise alone passes in at most `per_hour` frames an hour, at `frames_per_second` and any
+/// of `sites` sites (Bonferroni's bound: the true rate is lower, as neighbouring sites ask the same).
+double SignificanceFor(double per_hour, double frames_per_second, int sites);
+
+LoadFitOptions FitOptions(const ForceOptions& options, int sites);
+
+/// No forces, buffers kept.
+void ClearForces(int markers, ForceModel model, NodalForces& forces);
 
 /// The markers' displacements, and how far they can be believed.
 class MarkerData {
@@ -27,8 +36,6 @@ class MarkerData {
   /// what the prediction may be wrong by. Unseen markers, and numbers that are none, count nothing.
   void Set(const SkinShape& shape, const Eigen::VectorXd& predicted_mm,
            const Eigen::VectorXd& model_sigma_mm);
-  /// The same displacements and weights after another prediction.
-  void SetPrediction(const Eigen::VectorXd& predicted_mm) { residual_mm = measured_mm - predicted_mm; }
 
   double Deviations(int marker) const;  ///< of the residual, in standard deviations
   /// information * column, marker by marker.
@@ -65,8 +72,6 @@ class LoadFit {
 
   const std::vector<int>& sites_in() const { return sites_in_; }
   double load_n(size_t k) const { return load_[static_cast<Eigen::Index>(k)]; }
-  /// Column of the k-th site that is in.
-  auto column(size_t k) const { return columns_.col(static_cast<Eigen::Index>(k)); }
   const Eigen::VectorXd& residual_mm() const { return residual_; }
 
   /// Adds tangential forces of the contacts, and writes all into `forces` with covariance.

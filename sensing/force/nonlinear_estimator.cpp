@@ -23,14 +23,6 @@ constexpr double kSettledMm = 0.02;  // of a step: a fifth of the markers' noise
 constexpr double kBalanced = 5e-3;   // of the largest load: a tenth of what the markers tell
 constexpr double kSlow = 0.3;        // of the residual's decrease: time for a new tangent
 
-LoadFitOptions FitOptions(const ForceOptions& options, int sites) {
-  LoadFitOptions fit;
-  fit.noise_floor_mm = options.noise_floor_mm;
-  fit.significance =
-      options.significance > 0 ? options.significance : SignificanceFor(options.phantoms_per_hour, 30, sites);
-  return fit;
-}
-
 }  // namespace
 
 struct NonlinearEstimator::Solver {
@@ -64,7 +56,6 @@ struct NonlinearEstimator::Solver {
   void SolveColumns(Load& load);
   Eigen::VectorXd Solve(const Eigen::VectorXd& by_force) const;
   void SolveFor(const Eigen::VectorXd& force, Eigen::VectorXd& motion, Eigen::VectorXd& column);
-  void MarkersBy(const Eigen::VectorXd& motion, Eigen::VectorXd& column) const;
   void AddForce(int site, int direction, double load_n, Eigen::VectorXd& force) const;
   double Unbalance(const ElementLoad& pressure);
   void SetData(const SkinShape& shape, const SkinTangent& tangent, double pressure_mpa);
@@ -167,27 +158,13 @@ void NonlinearEstimator::Solver::AddForce(int site, int direction, double load_n
 void NonlinearEstimator::Solver::SolveFor(const Eigen::VectorXd& by_force, Eigen::VectorXd& to_motion,
                                           Eigen::VectorXd& to_column) {
   to_motion = Solve(by_force);
-  MarkersBy(to_motion, to_column);
+  MarkerMotions(model, mesh, shell, state, to_motion, to_column);
 }
 
 void NonlinearEstimator::Solver::SolveColumns(Load& load) {
   force.setZero(shell.dof_count());
   AddForce(load.site, 0, 1, force);
   SolveFor(force, load.motion, load.column);
-}
-
-void NonlinearEstimator::Solver::MarkersBy(const Eigen::VectorXd& by, Eigen::VectorXd& to) const {
-  const double offset = model.thickness_mm / 2 - model.markers.center_depth_mm;
-  to.resize(3 * model.markers.count());
-  for (int m = 0; m < model.markers.count(); ++m) {
-    const int node = mesh.NodeOfMarker(model, m);
-    const auto i = static_cast<size_t>(node);
-    const Vec3& d = state.directors[i];
-    const Vec3& t = state.tangents[i];
-    const Eigen::Index at = shell.Dof(node, 0);  // a marker's node is free
-    const Vec3 turn = by[at + 3] * t + by[at + 4] * d.cross(t);
-    to.segment<3>(3 * m) = by.segment<3>(at) + offset * turn.cross(d);
-  }
 }
 
 // Residual of the shell under pressure and loads, into `gradient`; its largest entry.
@@ -213,8 +190,9 @@ void NonlinearEstimator::Solver::SetData(const SkinShape& shape, const SkinTange
 
 // What the loads have to be for the linearised shell; the fit then holds them. False: too many.
 bool NonlinearEstimator::Solver::FindLoads(const SkinTangent& tangent) {
+  if (static_cast<int>(loads.size()) > fit_options.max_loads) return false;
   settle = Solve(-gradient);
-  MarkersBy(settle, settle_column);
+  MarkerMotions(model, mesh, shell, state, settle, settle_column);
   data.residual_mm -= settle_column;
   for (const Load& load : loads) data.residual_mm += load.load_n * load.column;
   fit.Begin(data);
@@ -224,10 +202,13 @@ bool NonlinearEstimator::Solver::FindLoads(const SkinTangent& tangent) {
     const int site = fit.MostSignificant(data, tangent);
     if (site < 0) break;
     if (fit.IsFull()) return false;
-    Load& load = loads.emplace_back();
-    load.site = site;
-    SolveColumns(load);
-    fit.Add(data, site, load.column, 0);
+    auto load = std::find_if(loads.begin(), loads.end(), [&](const Load& l) { return l.site == site; });
+    if (load == loads.end()) {  // else one that the fit has just let go
+      load = loads.emplace(loads.end());
+      load->site = site;
+      SolveColumns(*load);
+    }
+    fit.Add(data, site, load->column, 0);
     fit.Optimise(fit_options.significance);
   }
   fit.RemoveBias();

@@ -1,12 +1,16 @@
 #include "sensing/force/skin_tangent.h"
 
 #include <Eigen/CholmodSupport>
+#include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <map>
+#include <utility>
 
 #include "sensing/mechanics/equilibrium.h"
 #include "sensing/mechanics/linear_shell.h"
+#include "sensing/mechanics/pressed_skin.h"
 
 namespace taclink {
 namespace {
@@ -50,6 +54,21 @@ void FillBySymmetry(const LinkModel& model, const LoadSites& sites, SkinTangent&
 
 }  // namespace
 
+void MarkerMotions(const LinkModel& model, const ShellMesh& mesh, const NonlinearShell& shell,
+                   const ShellState& state, const Eigen::VectorXd& step, Eigen::VectorXd& stacked_mm) {
+  const double offset = MarkerOffset(model);
+  stacked_mm.resize(3 * model.markers.count());
+  for (int m = 0; m < model.markers.count(); ++m) {
+    const int node = mesh.NodeOfMarker(model, m);
+    const auto i = static_cast<size_t>(node);
+    const Vec3& d = state.directors[i];
+    const Vec3& t = state.tangents[i];
+    const Eigen::Index at = shell.Dof(node, 0);  // a marker's node is free
+    const Vec3 turn = step[at + 3] * t + step[at + 4] * d.cross(t);
+    stacked_mm.segment<3>(3 * m) = step.segment<3>(at) + offset * turn.cross(d);
+  }
+}
+
 void MarkerDisplacements(const LinkModel& model, const ShellMesh& mesh, const ShellState& state,
                          Eigen::VectorXd& stacked_mm) {
   const double offset = MarkerOffset(model);
@@ -91,14 +110,19 @@ struct PressurisedTangents::Shell {
         solver(shell, {.tolerance_n =
                            1e-7 * link.material.youngs_modulus_mpa * link.thickness_mm * link.thickness_mm}),
         hessian(shell.Pattern()),
-        state(shell.Rest()) {
+        rest(shell.Rest()) {
     factor.cholmod().print = 0;
     factor.analyzePattern(hessian);
   }
 
-  bool Inflate(double pressure_mpa);
-  bool Compute(SkinTangent& tangent);
-  Eigen::VectorXd MarkersBy(const Eigen::VectorXd& step) const;
+  struct Known {
+    SkinTangent tangent;
+    ShellState state;
+  };
+
+  bool Inflate(double from_mpa, double to_mpa, ShellState& state);
+  bool Compute(const ShellState& state, SkinTangent& tangent);
+  const Known* Learn(int step);
 
   LinkModel model;
   LoadSites sites;
@@ -108,63 +132,47 @@ struct PressurisedTangents::Shell {
   Eigen::SparseMatrix<double> hessian;
   Eigen::VectorXd gradient;
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor;
-  ShellState state;
-  double pressure_mpa = 0;
-  std::map<int, SkinTangent> known;  // by pressure in steps of the grid
+  ShellState rest;
+  std::map<int, Known> known;  // by pressure in steps of the grid
+  const Known* last = nullptr;
 };
 
-// In steps, from the pressure before.
-bool PressurisedTangents::Shell::Inflate(double target_mpa) {
-  constexpr double kStepMpa = 4e-4;
-  const double from = pressure_mpa;
-  const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(target_mpa - from) / kStepMpa)));
-  ShellState trial = state;
+// In steps no longer than what a skin of this stiffness takes at once.
+bool PressurisedTangents::Shell::Inflate(double from_mpa, double to_mpa, ShellState& state) {
+  const double longest = kPressureStep * PressureScale(model);
+  const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(to_mpa - from_mpa) / longest)));
   for (int i = 1; i <= steps; ++i) {
-    const FollowerPressure pressure(model.thickness_mm, from + (target_mpa - from) * i / steps);
+    const FollowerPressure pressure(model.thickness_mm, from_mpa + (to_mpa - from_mpa) * i / steps);
     const ElementLoad* loads[] = {&pressure};
-    if (!solver.Solve(loads, {}, trial).ok()) return false;
+    if (!solver.Solve(loads, {}, state).ok()) return false;
   }
-  state = std::move(trial);
-  pressure_mpa = target_mpa;
   return true;
 }
 
-// The markers' motion by a small step of the shell, to first order.
-Eigen::VectorXd PressurisedTangents::Shell::MarkersBy(const Eigen::VectorXd& step) const {
-  const double offset = MarkerOffset(model);
-  Eigen::VectorXd all(3 * model.markers.count());
-  for (int m = 0; m < model.markers.count(); ++m) {
-    const int node = mesh.NodeOfMarker(model, m);
-    const auto i = static_cast<size_t>(node);
-    const auto value = [&](int c) { return shell.Dof(node, c) >= 0 ? step[shell.Dof(node, c)] : 0.0; };
-    const Vec3& d = state.directors[i];
-    const Vec3& t = state.tangents[i];
-    const Vec3 turn = value(3) * t + value(4) * d.cross(t);
-    all.segment<3>(3 * m) = Vec3(value(0), value(1), value(2)) + offset * turn.cross(d);
-  }
-  return all;
-}
-
-bool PressurisedTangents::Shell::Compute(SkinTangent& tangent) {
-  const FollowerPressure pressure(model.thickness_mm, pressure_mpa);
+bool PressurisedTangents::Shell::Compute(const ShellState& state, SkinTangent& tangent) {
+  const FollowerPressure pressure(model.thickness_mm, tangent.pressure_mpa);
   const FollowerPressure unit(model.thickness_mm, 1);
   const ElementLoad* loads[] = {&pressure};
   shell.Hessian(state, loads, gradient, hessian);
   factor.factorize(hessian);
   if (factor.info() != Eigen::Success) return false;
-  tangent.pressure_mpa = pressure_mpa;
   MarkerDisplacements(model, mesh, state, tangent.offset_mm);
   // The gradient of the pressure's energy alone: that with it less that without.
   Eigen::VectorXd with, without;
   const ElementLoad* one[] = {&unit};
   shell.Gradient(state, one, with);
   shell.Gradient(state, {}, without);
-  tangent.per_pressure = MarkersBy(factor.solve(without - with));
+  const auto markers_by = [&](const Eigen::VectorXd& force) {
+    Eigen::VectorXd all;
+    MarkerMotions(model, mesh, shell, state, factor.solve(force), all);
+    return all;
+  };
+  tangent.per_pressure = markers_by(without - with);
   FillBySymmetry(model, sites, tangent, [&](size_t site, const Vec3& force) {
     Eigen::VectorXd load = Eigen::VectorXd::Zero(shell.dof_count());
     for (const auto& [node, share] : sites.spreads[site])
       load.segment<3>(shell.Dof(node, 0)) += share * force;
-    return MarkersBy(factor.solve(load));
+    return markers_by(load);
   });
   return true;
 }
@@ -173,24 +181,40 @@ PressurisedTangents::PressurisedTangents(const LinkModel& model, int refinement,
     : shell_(std::make_unique<Shell>(model, refinement, sites)) {}
 PressurisedTangents::~PressurisedTangents() = default;
 
-const SkinTangent* PressurisedTangents::At(double pressure_mpa) {
+// From the nearest pressure that is known. Null: no equilibrium.
+const PressurisedTangents::Shell::Known* PressurisedTangents::Shell::Learn(int step) {
   constexpr size_t kMostKept = 16;
-  if (!std::isfinite(pressure_mpa)) return nullptr;
-  const int step = static_cast<int>(std::lround(pressure_mpa / kGridMpa));
-  if (const auto found = shell_->known.find(step); found != shell_->known.end()) return &found->second;
-  if (!shell_->Inflate(step * kGridMpa)) return nullptr;
-  if (shell_->known.size() >= kMostKept) {
-    const auto farthest =
-        step > shell_->known.begin()->first ? shell_->known.begin() : std::prev(shell_->known.end());
-    shell_->known.erase(farthest);
+  Known fresh{{}, rest};
+  double from_mpa = 0;
+  if (!known.empty()) {
+    const auto distance = [&](const auto& entry) { return std::abs(entry.first - step); };
+    const auto nearest = std::min_element(
+        known.begin(), known.end(), [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+    fresh.state = nearest->second.state;
+    from_mpa = nearest->second.tangent.pressure_mpa;
   }
-  SkinTangent tangent;
-  if (!shell_->Compute(tangent)) return nullptr;
-  return &shell_->known.emplace(step, std::move(tangent)).first->second;
+  fresh.tangent.pressure_mpa = step * kGridMpa;
+  if (!Inflate(from_mpa, fresh.tangent.pressure_mpa, fresh.state)) return nullptr;
+  if (!Compute(fresh.state, fresh.tangent)) return nullptr;
+  if (known.size() >= kMostKept) {
+    known.erase(step > known.begin()->first ? known.begin() : std::prev(known.end()));
+  }
+  return &known.emplace(step, std::move(fresh)).first->second;
+}
+
+const SkinTangent* PressurisedTangents::At(double pressure_mpa) {
+  const double steps = std::round(pressure_mpa / kGridMpa);
+  if (!(std::abs(steps) < 1e9)) return nullptr;  // NaN too
+  const int step = static_cast<int>(steps);
+  const auto found = shell_->known.find(step);
+  const Shell::Known* known = found != shell_->known.end() ? &found->second : shell_->Learn(step);
+  if (known == nullptr) return nullptr;
+  shell_->last = known;
+  return &known->tangent;
 }
 
 const ShellState& PressurisedTangents::Inflated() const {
-  return shell_->state;
+  return shell_->last->state;
 }
 
 }  // namespace taclink

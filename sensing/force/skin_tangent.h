@@ -34,13 +34,17 @@ class PressurisedTangents {
   /// has no equilibrium at this pressure.
   const SkinTangent* At(double pressure_mpa);
 
-  /// The skin's state at the last pressure asked for.
+  /// The skin's state at the pressure last asked for, that of the last tangent returned.
   const ShellState& Inflated() const;
 
  private:
   struct Shell;
   std::unique_ptr<Shell> shell_;
 };
+
+/// The markers' motion by a small step of the shell (by its degrees of freedom), to first order, mm.
+void MarkerMotions(const LinkModel& model, const ShellMesh& mesh, const NonlinearShell& shell,
+                   const ShellState& state, const Eigen::VectorXd& step, Eigen::VectorXd& stacked_mm);
 
 /// Displacement of all markers' centres from rest.
 void MarkerDisplacements(const LinkModel& model, const ShellMesh& mesh, const ShellState& state,

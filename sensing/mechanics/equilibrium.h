@@ -20,7 +20,7 @@ const char* Name(EquilibriumStop stop);
 struct EquilibriumOptions {
   double tolerance_n = 1e-6;  ///< largest entry of the residual, N or N mm
   int max_iterations = 60;
-  double max_step_mm = 4;  ///< longest motion of a node in one iteration; rotations likewise, by thickness
+  double max_step_mm = 4;  ///< longest motion of a node in one iteration; rotations: half a radian
 };
 
 struct EquilibriumSummary {

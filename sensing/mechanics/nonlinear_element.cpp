@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 
 #include "sensing/mechanics/plane_stress.h"
-#include "sensing/mechanics/shape_functions.h"
 
 namespace taclink {
 namespace {
@@ -99,26 +98,27 @@ NonlinearElement::NonlinearElement(const ElementState& rest, double thickness_mm
   }
 }
 
+struct NonlinearElement::Sums {
+  using Block = Eigen::Matrix<double, 12, 12>;
+  using Cross = Eigen::Matrix<double, 12, 4>;
+
+  // By the corners' points at a height z: x + z d. Kept apart by powers of z.
+  Corners mid_force = Corners::Zero(), director_force = Corners::Zero();
+  Eigen::Vector4d tying_force = Eigen::Vector4d::Zero();
+  Block mid_mid, mid_director, director_director;  // these and below: only with the Hessian
+  Cross mid_tying, director_tying;
+  Eigen::Matrix4d tying_stiffness;
+};
+
 template <DerivativeOrder kOrder>
 void NonlinearElement::AddUpTo(const ElementState& state, ElementResponse& response) const {
   const Corners mids = Mids(state), directors = Directors(state);
-  const double half = thickness_mm_ / 2;
-  const Eigen::Vector4d tying = TyingShears(mids, directors, half) - rest_tying_;
-
-  Corners mid_force = Corners::Zero(), director_force = Corners::Zero();
-  Eigen::Vector4d tying_force = Eigen::Vector4d::Zero();
-  Eigen::Matrix4d tying_stiffness = Eigen::Matrix4d::Zero();
-  // By the corners' points at a height z: x + z d. Kept apart by powers of z.
-  using Block = Eigen::Matrix<double, 12, 12>;
-  using Cross = Eigen::Matrix<double, 12, 4>;
-  Block mid_mid, mid_director, director_director;
-  Cross mid_tying, director_tying;
+  const Eigen::Vector4d tying = TyingShears(mids, directors, thickness_mm_ / 2) - rest_tying_;
+  Sums sums;
   if constexpr (kOrder == DerivativeOrder::kHessian) {
-    mid_mid.setZero();
-    mid_director.setZero();
-    director_director.setZero();
-    mid_tying.setZero();
-    director_tying.setZero();
+    for (auto* block : {&sums.mid_mid, &sums.mid_director, &sums.director_director}) block->setZero();
+    for (auto* cross : {&sums.mid_tying, &sums.director_tying}) cross->setZero();
+    sums.tying_stiffness.setZero();
   }
   for (size_t p = 0; p < 4; ++p) {
     const ShapeFunctions& n = GaussShapes()[p];
@@ -135,46 +135,64 @@ void NonlinearElement::AddUpTo(const ElementState& state, ElementResponse& respo
         const Vec2 shear_stress = w * shear_modulus_mpa_ * shear;
         const Vec3 s =
             w * point.in_plane.transpose() * sheet.stress_mpa + point.warp.transpose() * shear_stress;
-        tying_force += point.shear.transpose() * shear_stress;
+        sums.tying_force += point.shear.transpose() * shear_stress;
         const Corners force =
             (s[0] * g1 + s[2] * g2) * n.by_xi.transpose() + (s[1] * g2 + s[2] * g1) * n.by_eta.transpose();
-        mid_force += force;
-        director_force += z * force;
+        sums.mid_force += force;
+        sums.director_force += z * force;
         if constexpr (kOrder == DerivativeOrder::kHessian) {
-          Wide b;
-          for (Eigen::Index i = 0; i < 4; ++i) {
-            b.block<1, 3>(0, 3 * i) = n.by_xi[i] * g1.transpose();
-            b.block<1, 3>(1, 3 * i) = n.by_eta[i] * g2.transpose();
-            b.block<1, 3>(2, 3 * i) = n.by_eta[i] * g1.transpose() + n.by_xi[i] * g2.transpose();
-          }
-          const double g = w * shear_modulus_mpa_;
-          const Mat3 c = w * point.in_plane.transpose() * sheet.tangent_mpa * point.in_plane +
-                         g * point.warp.transpose() * point.warp;
-          Block k;
-          k.noalias() = b.transpose() * (c * b);
-          const Eigen::Matrix4d geometric =
-              s[0] * n.by_xi * n.by_xi.transpose() + s[1] * n.by_eta * n.by_eta.transpose() +
-              s[2] * (n.by_xi * n.by_eta.transpose() + n.by_eta * n.by_xi.transpose());
-          for (Eigen::Index i = 0; i < 4; ++i) {
-            for (Eigen::Index j = 0; j < 4; ++j) {
-              for (Eigen::Index a = 0; a < 3; ++a) k(3 * i + a, 3 * j + a) += geometric(i, j);
-            }
-          }
-          mid_mid += k;
-          mid_director += z * k;
-          director_director += z * z * k;
-          const Cross cross = b.transpose() * (g * point.warp.transpose() * point.shear);
-          mid_tying += cross;
-          director_tying += z * cross;
-          tying_stiffness += g * point.shear.transpose() * point.shear;
+          AddStiffness(point, n, g1, g2, s, sheet.tangent_mpa, sums);
         }
       }
     }
   }
   if constexpr (kOrder == DerivativeOrder::kEnergy) return;
 
-  // The tying shears are bilinear in points and directors.
-  Eigen::Matrix<double, 4, 24> by_state;
+  const Tied by_state = TyingByState(mids, directors);
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    response.gradient.segment<3>(6 * i) += sums.mid_force.col(i);
+    response.gradient.segment<3>(6 * i + 3) += sums.director_force.col(i);
+  }
+  response.gradient.noalias() += by_state.transpose() * sums.tying_force;
+  if constexpr (kOrder == DerivativeOrder::kHessian) AddHessian(sums, by_state, response.hessian);
+}
+
+// Of one point of integration: material, then geometric.
+void NonlinearElement::AddStiffness(const Point& point, const ShapeFunctions& n, const Vec3& g1,
+                                    const Vec3& g2, const Vec3& s, const Mat3& tangent_mpa,
+                                    Sums& sums) const {
+  const double z = point.height_mm, w = point.weight_mm3, g = w * shear_modulus_mpa_;
+  Wide b;
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    b.block<1, 3>(0, 3 * i) = n.by_xi[i] * g1.transpose();
+    b.block<1, 3>(1, 3 * i) = n.by_eta[i] * g2.transpose();
+    b.block<1, 3>(2, 3 * i) = n.by_eta[i] * g1.transpose() + n.by_xi[i] * g2.transpose();
+  }
+  const Mat3 c =
+      w * point.in_plane.transpose() * tangent_mpa * point.in_plane + g * point.warp.transpose() * point.warp;
+  Sums::Block k;
+  k.noalias() = b.transpose() * (c * b);
+  const Eigen::Matrix4d geometric = s[0] * n.by_xi * n.by_xi.transpose() +
+                                    s[1] * n.by_eta * n.by_eta.transpose() +
+                                    s[2] * (n.by_xi * n.by_eta.transpose() + n.by_eta * n.by_xi.transpose());
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    for (Eigen::Index j = 0; j < 4; ++j) {
+      for (Eigen::Index a = 0; a < 3; ++a) k(3 * i + a, 3 * j + a) += geometric(i, j);
+    }
+  }
+  sums.mid_mid += k;
+  sums.mid_director += z * k;
+  sums.director_director += z * z * k;
+  const Sums::Cross cross = b.transpose() * (g * point.warp.transpose() * point.shear);
+  sums.mid_tying += cross;
+  sums.director_tying += z * cross;
+  sums.tying_stiffness += g * point.shear.transpose() * point.shear;
+}
+
+// The tying shears are bilinear in points and directors.
+NonlinearElement::Tied NonlinearElement::TyingByState(const Corners& mids, const Corners& directors) const {
+  const double half = thickness_mm_ / 2;
+  Tied by_state;
   for (size_t t = 0; t < 4; ++t) {
     const Tying& tie = TyingPoints()[t];
     const auto row = static_cast<Eigen::Index>(t);
@@ -184,36 +202,33 @@ void NonlinearElement::AddUpTo(const ElementState& state, ElementResponse& respo
       by_state.block<1, 3>(row, 6 * i + 3) = tie.shape.value[i] * along.transpose();
     }
   }
+  return by_state;
+}
+
+void NonlinearElement::AddHessian(const Sums& sums, const Tied& by_state, ElementHessian& hessian) const {
+  Eigen::Matrix<double, 24, 4> cross;
   for (Eigen::Index i = 0; i < 4; ++i) {
-    response.gradient.segment<3>(6 * i) += mid_force.col(i);
-    response.gradient.segment<3>(6 * i + 3) += director_force.col(i);
+    for (Eigen::Index j = 0; j < 4; ++j) {
+      hessian.block<3, 3>(6 * i, 6 * j) += sums.mid_mid.block<3, 3>(3 * i, 3 * j);
+      hessian.block<3, 3>(6 * i, 6 * j + 3) += sums.mid_director.block<3, 3>(3 * i, 3 * j);
+      hessian.block<3, 3>(6 * i + 3, 6 * j) += sums.mid_director.block<3, 3>(3 * i, 3 * j);
+      hessian.block<3, 3>(6 * i + 3, 6 * j + 3) += sums.director_director.block<3, 3>(3 * i, 3 * j);
+    }
+    cross.middleRows<3>(6 * i) = sums.mid_tying.middleRows<3>(3 * i);
+    cross.middleRows<3>(6 * i + 3) = sums.director_tying.middleRows<3>(3 * i);
   }
-  response.gradient.noalias() += by_state.transpose() * tying_force;
-  if constexpr (kOrder == DerivativeOrder::kHessian) {
-    Eigen::Matrix<double, 24, 4> cross;
+  const ElementHessian mixed = cross * by_state;
+  hessian += mixed + mixed.transpose();
+  hessian.noalias() += by_state.transpose() * (sums.tying_stiffness * by_state);
+  for (size_t t = 0; t < 4; ++t) {
+    const Tying& tie = TyingPoints()[t];
+    const double force = thickness_mm_ / 2 * sums.tying_force[static_cast<Eigen::Index>(t)];
     for (Eigen::Index i = 0; i < 4; ++i) {
       for (Eigen::Index j = 0; j < 4; ++j) {
-        response.hessian.block<3, 3>(6 * i, 6 * j) += mid_mid.block<3, 3>(3 * i, 3 * j);
-        response.hessian.block<3, 3>(6 * i, 6 * j + 3) += mid_director.block<3, 3>(3 * i, 3 * j);
-        response.hessian.block<3, 3>(6 * i + 3, 6 * j) += mid_director.block<3, 3>(3 * i, 3 * j);
-        response.hessian.block<3, 3>(6 * i + 3, 6 * j + 3) += director_director.block<3, 3>(3 * i, 3 * j);
-      }
-      cross.middleRows<3>(6 * i) = mid_tying.middleRows<3>(3 * i);
-      cross.middleRows<3>(6 * i + 3) = director_tying.middleRows<3>(3 * i);
-    }
-    const ElementHessian mixed = cross * by_state;
-    response.hessian += mixed + mixed.transpose();
-    response.hessian.noalias() += by_state.transpose() * (tying_stiffness * by_state);
-    for (size_t t = 0; t < 4; ++t) {
-      const Tying& tie = TyingPoints()[t];
-      const double force = half * tying_force[static_cast<Eigen::Index>(t)];
-      for (Eigen::Index i = 0; i < 4; ++i) {
-        for (Eigen::Index j = 0; j < 4; ++j) {
-          const double entry = force * SlopeOf(tie)[i] * tie.shape.value[j];
-          for (Eigen::Index a = 0; a < 3; ++a) {
-            response.hessian(6 * i + a, 6 * j + 3 + a) += entry;
-            response.hessian(6 * j + 3 + a, 6 * i + a) += entry;
-          }
+        const double entry = force * SlopeOf(tie)[i] * tie.shape.value[j];
+        for (Eigen::Index a = 0; a < 3; ++a) {
+          hessian(6 * i + a, 6 * j + 3 + a) += entry;
+          hessian(6 * j + 3 + a, 6 * i + a) += entry;
         }
       }
     }

@@ -4,6 +4,7 @@
 
 #include "sensing/core/geometry.h"
 #include "sensing/core/link_model.h"
+#include "sensing/mechanics/shape_functions.h"
 
 namespace taclink {
 
@@ -38,9 +39,6 @@ class NonlinearElement {
   void Add(DerivativeOrder order, const ElementState& state, ElementResponse& response) const;
 
  private:
-  template <DerivativeOrder kOrder>
-  void AddUpTo(const ElementState& state, ElementResponse& response) const;
-
   // Through-thickness and in-plane Gauss point: covariant to Cartesian strains, both halves of them.
   struct Point {
     double height_mm = 0;  // above the mid-surface
@@ -50,6 +48,17 @@ class NonlinearElement {
     Eigen::Matrix<double, 2, 4> shear;  // tying shears to Cartesian transverse shears
     Vec3 rest_metric;                   // g11, g22, 2 g12 at rest
   };
+
+  struct Sums;
+  using Corners = Eigen::Matrix<double, 3, 4>;
+  using Tied = Eigen::Matrix<double, 4, 24>;  // tying shears by the element's state
+
+  template <DerivativeOrder kOrder>
+  void AddUpTo(const ElementState& state, ElementResponse& response) const;
+  void AddStiffness(const Point& point, const ShapeFunctions& n, const Vec3& g1, const Vec3& g2,
+                    const Vec3& s, const Mat3& tangent_mpa, Sums& sums) const;
+  Tied TyingByState(const Corners& mids, const Corners& directors) const;
+  void AddHessian(const Sums& sums, const Tied& by_state, ElementHessian& hessian) const;
 
   double thickness_mm_;
   Material material_;

@@ -133,13 +133,16 @@ PressSummary PressedSkin::Follow(double longest, double least, Advance advance) 
   return summary;
 }
 
+double PressureScale(const LinkModel& model) {
+  const double radius = model.PointAtDepth(0, model.length_mm / 2, model.thickness_mm / 2).head<2>().norm();
+  return model.material.youngs_modulus_mpa * model.thickness_mm / radius;
+}
+
 PressSummary PressedSkin::Inflate(double pressure_mpa) {
   if (!std::isfinite(pressure_mpa)) return Refused(EquilibriumStop::kNotFinite);
   const double from = pressure_mpa_, change = pressure_mpa - from;
   if (change == 0) return {};
-  const double radius = model_.PointAtDepth(0, model_.length_mm / 2, model_.thickness_mm / 2).x();
-  const double step =
-      options_.pressure_step * model_.material.youngs_modulus_mpa * model_.thickness_mm / radius;
+  const double step = options_.pressure_step * PressureScale(model_);
   if (std::abs(change) > kMostSteps * step) return Refused(EquilibriumStop::kMaxIterations);
   const double longest = std::min(1.0, step / std::abs(change));
   return Follow(longest, longest / 256, [&](double at) {

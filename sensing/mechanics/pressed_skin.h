@@ -13,12 +13,18 @@
 
 namespace taclink {
 
+/// Young's modulus times thickness / radius at mid-length, MPa: the pressure that would double the radius of
+/// a linear skin.
+double PressureScale(const LinkModel& model);
+/// Of it: what Newton's method takes at once.
+inline constexpr double kPressureStep = 0.044;
+
 struct PressedSkinOptions {
-  int refinement = 2;            ///< elements per interval of the marker grid
-  double step_mm = 1;            ///< longest motion of a body from one equilibrium to the next
-  double least_step_mm = 0.01;   ///< gives up below
-  double pressure_step = 0.044;  ///< likewise of the pressure: times Young's modulus times thickness / radius
-  double spacing_mm = 0.8;       ///< of contact points
+  int refinement = 2;                    ///< elements per interval of the marker grid
+  double step_mm = 1;                    ///< longest motion of a body from one equilibrium to the next
+  double least_step_mm = 0.01;           ///< gives up below
+  double pressure_step = kPressureStep;  ///< likewise of the pressure, of PressureScale
+  double spacing_mm = 0.8;               ///< of contact points
   /// Of the wall under a body, times Young's modulus / thickness: a soft wall gives way locally, which a
   /// shell does not know. The default makes its forces those of three-dimensional bricks (docs/calculix.md).
   double stiffness = 0.35;

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "sensing/mechanics/skin_push.h"
 #include "sensing/model/model_file.h"
+#include "tests/accuracy/probe.h"
 
 namespace taclink {
 namespace {
@@ -41,14 +41,6 @@ LinkModel SkinOf(const std::string& law) {
                     .poisson_ratio = rubber ? 0.5 : 0.49,
                     .law = rubber ? MaterialLaw::kNeoHookean : MaterialLaw::kSaintVenantKirchhoff};
   return model;
-}
-
-SkinPushResult Pushed(const LinkModel& model, int ring, double depth_mm, double pressure_kpa) {
-  const auto result = PushSkin(
-      model,
-      {.marker = model.MarkerIndex(6, ring - 1), .depth_mm = depth_mm, .pressure_mpa = pressure_kpa * 1e-3});
-  EXPECT_TRUE(result.ok());
-  return result.ok() ? *result : SkinPushResult{};
 }
 
 TEST(CalculiX, PushesNeedTheSameForce) {

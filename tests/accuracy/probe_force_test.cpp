@@ -3,8 +3,8 @@
 #include <array>
 #include <cmath>
 
-#include "sensing/mechanics/skin_push.h"
 #include "sensing/model/model_file.h"
+#include "tests/accuracy/probe.h"
 
 namespace taclink {
 namespace {
@@ -26,14 +26,6 @@ constexpr std::array<Measured, 12> kMeasured = {{{5, 5, 0.5, 0.3729},
                                                  {8, 10, 0.5, 0.6528},
                                                  {8, 10, 1.0, 1.0564},
                                                  {8, 10, 1.5, 1.4599}}};
-
-SkinPushResult Pushed(const LinkModel& model, int ring, double depth_mm, double pressure_kpa) {
-  const auto result = PushSkin(
-      model,
-      {.marker = model.MarkerIndex(6, ring - 1), .depth_mm = depth_mm, .pressure_mpa = pressure_kpa * 1e-3});
-  EXPECT_TRUE(result.ok());
-  return result.ok() ? *result : SkinPushResult{};
-}
 
 TEST(ProbeForce, OfTheShippedSkinIsTheRealOnes) {
   const LinkModel model = LoadLinkModel("cylinder").value();

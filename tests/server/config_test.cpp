@@ -29,10 +29,11 @@ arm:
       pose: {position_mm: [1, 2, 3], rotation_deg: [0, 0, 90]}
     - name: lower
       model: barrel
+      force_model: nonlinear
       source: files
       folder: pictures
       loop: false
-    - {name: third, model: cylinder, source: simulated, scene: press}
+    - {name: third, model: cylinder, force_model: auto, source: simulated, scene: press}
 )";
 
 std::string Replaced(std::string text, const std::string& from, const std::string& to) {
@@ -66,6 +67,8 @@ TEST(Config, ReadsEverything) {
   EXPECT_EQ(files.folder, "/etc/taclink/pictures");
   EXPECT_FALSE(files.loop);
   EXPECT_EQ(config->links[1].model, "barrel");
+  EXPECT_EQ(config->links[1].force_model, ForceModel::kNonlinear);
+  EXPECT_FALSE(config->links[2].force_model.has_value()) << "auto";
   EXPECT_EQ(std::get<SimulatedSourceConfig>(config->links[2].source).scene, "press");
   const Vec3 p_in_base = upper.BaseFromLink() * Vec3(10, 0, 0);
   EXPECT_NEAR((p_in_base - Vec3(1, 12, 3)).norm(), 0, 1e-12);
@@ -96,6 +99,8 @@ TEST(Config, MistakesAreNamedWithFileAndLine) {
               HasSubstr("arm.yaml:13: 'arm.links[0].frame_rate_hz' must be a number, not 'fast'"));
   EXPECT_THAT(Complaint(Replaced(kGood, "source: files", "source: film")),
               HasSubstr("v4l2, files, simulated"));
+  EXPECT_THAT(Complaint(Replaced(kGood, "force_model: auto", "force_model: best")),
+              HasSubstr("auto, literal, linear, pressurised, nonlinear"));
   EXPECT_THAT(Complaint(Replaced(kGood, "format: mjpeg", "format: h264")), HasSubstr("yuyv, mjpeg"));
   EXPECT_THAT(Complaint(Replaced(kGood, "name: lower", "name: upper")), HasSubstr("used by another link"));
   EXPECT_THAT(Complaint(Replaced(kGood, "name: lower", "name: 'a b'")), HasSubstr("letters"));

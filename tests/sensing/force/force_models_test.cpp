@@ -129,6 +129,40 @@ TEST_F(ForceModelsTest, AutomaticTakesTheCheapestThatIsGoodEnough) {
   EXPECT_NEAR(pressed.contacts[0].force_n.norm() / Pressed().contact.force_n.norm(), 1, 0.05);
 }
 
+// What is remembered from a frame must not mislead the next one: other covariances, other contacts, other
+// pressures.
+TEST_F(ForceModelsTest, UnlikeFramesAnswerAsIfTheyWereTheFirst) {
+  const Push elsewhere(Cylinder(), 0, 3, Vec3(0, 0, -8));
+  SkinShape one_camera = elsewhere.Measured(1);
+  for (size_t m = 0; m < one_camera.measured.size(); m += 2) {
+    one_camera.measured[m].information_per_mm2 *= 0.05;
+    one_camera.sources[m] = MarkerSource::kTop;
+  }
+  const Push rest(Cylinder(), 1, 0);
+  const std::pair<SkinShape, double> frames[] = {{Pressed().Measured(1), 1e-3},
+                                                 {one_camera, 0},
+                                                 {rest.Measured(3), 1e-3},
+                                                 {Pressed().Measured(4), 1e-3}};
+  const auto total = [](const NodalForces& forces) {
+    Vec3 sum = Vec3::Zero();
+    for (const Vec3& f : forces.forces_n) sum += f;
+    return sum;
+  };
+  for (const ForceModel model : {ForceModel::kLinear, ForceModel::kPressurised, ForceModel::kNonlinear}) {
+    const auto played = MakeForceEstimator(Cylinder(), {.model = model, .refinement = 1});
+    for (size_t i = 0; i < std::size(frames); ++i) {
+      NodalForces again, first;
+      played->Estimate(frames[i].first, frames[i].second, again);
+      MakeForceEstimator(Cylinder(), {.model = model, .refinement = 1})
+          ->Estimate(frames[i].first, frames[i].second, first);
+      EXPECT_EQ(again.converged, first.converged) << Name(model) << ", frame " << i;
+      EXPECT_LT((total(again) - total(first)).norm(), 0.02 + 0.05 * total(first).norm())
+          << Name(model) << ", frame " << i << ": " << total(again).transpose() << " instead of "
+          << total(first).transpose();
+    }
+  }
+}
+
 TEST_F(ForceModelsTest, LiteralAmplifiesNoise) {
   const auto estimator = MakeForceEstimator(Cylinder(), {.model = ForceModel::kLiteral});
   const Push rest(Cylinder(), 0, 0);

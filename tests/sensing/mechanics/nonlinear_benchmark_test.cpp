@@ -178,9 +178,9 @@ TEST(NonlinearBenchmark, PulledOutCylinder) {
   });
 }
 
-// 3.6: an octant, pinched in the middle of the length, rigid diaphragm at z = 0. It buckles on the way, and
-// takes as long as all the others together: by hand. U_B comes out up to 8 % above what is published.
-TEST(NonlinearBenchmark, DISABLED_PinchedCylinder) {
+// 3.6: an octant, pinched in the middle of the length, rigid diaphragm at z = 0. It buckles on the way. U_B
+// comes out up to 8 % above what is published, as with another program's shell: shown only.
+TEST(NonlinearBenchmark, PinchedCylinder) {
   const Published w_a = {{10, 23.164}, {25, 61.877}, {50, 73.790}, {75, 79.339}, {100, 83.102}};
   const Published u_b = {{25, 14.905}, {50, 25.381}, {75, 30.604}, {100, 34.272}};
   constexpr int kSide = 48;
