@@ -5,7 +5,11 @@ find_package(Ceres 2.1 REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
 find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 add_library(taclink_cholmod INTERFACE)
-target_link_libraries(taclink_cholmod INTERFACE ${CHOLMOD_LIBRARY})
+# OpenBLAS by name and first: Ceres brings ATLAS in, whose functions have the same names and take 1.5 times as long.
+find_library(OPENBLAS_LIBRARY NAMES openblas libopenblas.so.0 REQUIRED)
+find_package(OpenMP REQUIRED COMPONENTS CXX)
+target_link_options(taclink_cholmod INTERFACE LINKER:--push-state,--no-as-needed,${OPENBLAS_LIBRARY},--pop-state)
+target_link_libraries(taclink_cholmod INTERFACE ${CHOLMOD_LIBRARY} ${OpenMP_gomp_LIBRARY})
 target_include_directories(taclink_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
 find_package(OpenCVLite REQUIRED)
 find_package(Protobuf REQUIRED)  # module mode, before gRPC's config looks for its own

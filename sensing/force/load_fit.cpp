@@ -10,6 +10,12 @@ namespace {
 
 constexpr double kRidge = 1e-6;  // of the system's diagonal: neighbours on a fine grid are nearly alike
 
+// Of the norm of a site's column: the part of one marker.
+double SquareAt(const MarkerData& data, const SkinTangent& tangent, int site, int marker) {
+  const Vec3 g = tangent.inward_mm_n.col(site).segment<3>(Eigen::Index{3} * marker).cast<double>();
+  return g.dot(data.information_per_mm2[static_cast<size_t>(marker)] * g);
+}
+
 }  // namespace
 
 double SignificanceFor(double per_hour, double frames_per_second, int sites) {
@@ -134,11 +140,20 @@ double LoadFit::NormOf(const MarkerData& data, const SkinTangent& tangent, int s
   if (site_norms_[site] >= 0) return site_norms_[site];
   double squared = 0;
   for (size_t m = 0; m < data.information_per_mm2.size(); ++m) {
-    const Vec3 g = tangent.inward_mm_n.col(site).segment<3>(static_cast<Eigen::Index>(3 * m)).cast<double>();
-    squared += g.dot(data.information_per_mm2[m] * g);
+    squared += SquareAt(data, tangent, site, static_cast<int>(m));
   }
   site_norms_[site] = std::sqrt(squared);
   return site_norms_[site];
+}
+
+// No more than the square of the norm: what the markers about the site tell of it.
+double LoadFit::LeastSquareOf(const MarkerData& data, const SkinTangent& tangent, int site) const {
+  if (site_norms_[site] >= 0) return site_norms_[site] * site_norms_[site];
+  double squared = 0;
+  for (const int marker : sites_.around_markers[static_cast<size_t>(site)]) {
+    squared += SquareAt(data, tangent, site, marker);
+  }
+  return squared;
 }
 
 int LoadFit::MostSignificant(const MarkerData& data, const SkinTangent& tangent) {
@@ -150,7 +165,7 @@ int LoadFit::MostSignificant(const MarkerData& data, const SkinTangent& tangent)
     const auto i = static_cast<size_t>(s);
     if (!near_[i] || is_in_[i]) continue;
     const auto pull = static_cast<double>(tangent.inward_mm_n.col(s).dot(search_));
-    if (pull <= 0) continue;
+    if (pull <= 0 || pull * pull <= best_score * best_score * LeastSquareOf(data, tangent, s)) continue;
     const double norm = NormOf(data, tangent, s);
     if (norm > 0 && pull > best_score * norm) {
       best = s;

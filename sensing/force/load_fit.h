@@ -82,6 +82,7 @@ class LoadFit {
 
  private:
   double NormOf(const MarkerData& data, const SkinTangent& tangent, int site);
+  double LeastSquareOf(const MarkerData& data, const SkinTangent& tangent, int site) const;
   void Remove(size_t k);
   bool StepToOptimum(double significance);
   void Solve(double significance);

@@ -56,8 +56,13 @@ LoadSites MakeLoadSites(const LinkModel& model, const ShellMesh& mesh, LoadSprea
                                {model.MarkerIndex(path_1, ring_0), a * (1 - b)},
                                {model.MarkerIndex(path_0, ring_0 + 1), (1 - a) * b},
                                {model.MarkerIndex(path_1, ring_0 + 1), a * b}}});
-      sites.nearest_markers.push_back(model.MarkerIndex(static_cast<int>(std::lround(path)) % paths,
-                                                        static_cast<int>(std::lround(ring))));
+      const int near_path = static_cast<int>(std::lround(path)) % paths;
+      const int near_ring = static_cast<int>(std::lround(ring));
+      sites.nearest_markers.push_back(model.MarkerIndex(near_path, near_ring));
+      std::vector<int>& block = sites.around_markers.emplace_back();
+      for (int r = std::max(0, near_ring - 1); r <= std::min(rings - 1, near_ring + 1); ++r) {
+        for (int p = -1; p <= 1; ++p) block.push_back(model.MarkerIndex((near_path + p + paths) % paths, r));
+      }
     }
   }
   return sites;

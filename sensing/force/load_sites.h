@@ -32,6 +32,7 @@ struct LoadSites {
   std::vector<Mat3> frames;  ///< columns: inward, around, along; unit, at rest
   std::vector<std::array<Share, 4>> shares;
   std::vector<int> nearest_markers;
+  std::vector<std::vector<int>> around_markers;  ///< the nearest one and its neighbours
 
   int count() const { return columns * rows; }
   int Column(int site) const { return site % columns; }

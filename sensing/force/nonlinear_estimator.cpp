@@ -1,6 +1,5 @@
 #include "sensing/force/nonlinear_estimator.h"
 
-#include <Eigen/CholmodSupport>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "sensing/force/load_sites.h"
 #include "sensing/force/skin_tangent.h"
 #include "sensing/mechanics/nonlinear_shell.h"
+#include "sensing/mechanics/sparse_cholesky.h"
 
 namespace taclink {
 namespace {
@@ -20,8 +20,7 @@ constexpr int kMostIterations = 12;       // in one frame; a jump into a deep de
 constexpr int kNewLoadsPerIteration = 3;  // the linearisation is only good near the state
 constexpr double kMaxStepMm = 4;
 constexpr double kSettledMm = 0.02;  // of a step: a fifth of the markers' noise
-constexpr double kBalanced = 5e-3;   // of the largest load: a tenth of what the markers tell
-constexpr double kSlow = 0.3;        // of the residual's decrease: time for a new tangent
+constexpr double kSlow = 0.5;        // of the steps' decrease: time for a new tangent
 
 }  // namespace
 
@@ -36,10 +35,9 @@ struct NonlinearEstimator::Solver {
         data(link.markers.count(), options.noise_floor_mm),
         fit(sites, link.markers.count(), fit_options),
         hessian(shell.Pattern()),
+        factor(hessian),
         predicted(3 * link.markers.count()),
         model_sigma(link.markers.count()) {
-    factor.cholmod().print = 0;
-    factor.analyzePattern(hessian);
     tangents.At(0);
     Rest();
   }
@@ -47,15 +45,19 @@ struct NonlinearEstimator::Solver {
   struct Load {
     int site = 0;
     double load_n = 0;
-    Eigen::VectorXd motion;  // of the shell, per N, by degree of freedom
-    Eigen::VectorXd column;  // of the markers, per N
+    Eigen::VectorXd motion;    // of the shell, per N, by degree of freedom
+    Eigen::VectorXd column;    // of the markers, per N
+    Eigen::MatrixXd sideways;  // the same, around and along; empty: not solved for yet
   };
 
   void Rest();
   bool Refactor();
   void SolveColumns(Load& load);
-  Eigen::VectorXd Solve(const Eigen::VectorXd& by_force) const;
-  void SolveFor(const Eigen::VectorXd& force, Eigen::VectorXd& motion, Eigen::VectorXd& column);
+  Eigen::VectorXd Solve(const Eigen::VectorXd& by_force);
+  const Eigen::MatrixXd& Sideways(Load& load);
+  std::vector<Load>::iterator FindLoad(int site) {
+    return std::find_if(loads.begin(), loads.end(), [&](const Load& load) { return load.site == site; });
+  }
   void AddForce(int site, int direction, double load_n, Eigen::VectorXd& force) const;
   double Unbalance(const ElementLoad& pressure);
   void SetData(const SkinShape& shape, const SkinTangent& tangent, double pressure_mpa);
@@ -73,16 +75,18 @@ struct NonlinearEstimator::Solver {
   MarkerData data;
   LoadFit fit;
   Eigen::SparseMatrix<double> hessian;
-  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor;
+  SparseCholesky factor;
   bool has_factor = false;
+  double shrinkage = kSlow;  // of one step to the next, seen with this tangent
   // Springs that hold the loaded nodes in the factorised matrix, and what undoes them in a solution.
   std::vector<int> held;         // first degrees of freedom of those nodes
+  Eigen::MatrixXd unit_forces;   // scratch
   Eigen::MatrixXd held_motions;  // of the shell, by a force on each of their directions
   Eigen::MatrixXd held_undo;     // (1 / stiffness - compliance of the held)^-1
 
   ShellState state;         // in equilibrium with `loads`, nearly
   std::vector<Load> loads;  // those that act on it
-  Eigen::VectorXd gradient, settle, settle_column, step, force, motion, column;
+  Eigen::VectorXd gradient, settle, settle_column, step, force, column, sum;
   Eigen::VectorXd predicted, model_sigma;
   NonlinearEstimator::Work work;
 };
@@ -101,28 +105,27 @@ bool NonlinearEstimator::Solver::Refactor() {
   held.clear();
   for (const Load& load : loads) held.push_back(shell.Dof(sites.nodes[static_cast<size_t>(load.site)], 0));
   double stiffness = 0;
+  bool definite = false;
   for (const double wanted : {1.0, 8.0, 64.0}) {
     for (const int dof : held) {
       for (int c = 0; c < 3; ++c) hessian.coeffRef(dof + c, dof + c) += (wanted - stiffness) * scale;
     }
     stiffness = wanted;
-    factor.factorize(hessian);
-    if (factor.info() == Eigen::Success) break;
+    definite = factor.Factorise(hessian);
+    if (definite) break;
   }
-  for (double shift = 1e-3; factor.info() != Eigen::Success; shift *= 8) {
+  for (double shift = 1e-3; !definite; shift *= 8) {
     if (shift > 1) return false;
     for (int i = 0; i < hessian.cols(); ++i) hessian.coeffRef(i, i) *= 1 + shift;
-    factor.factorize(hessian);
+    definite = factor.Factorise(hessian);
   }
   has_factor = true;
+  shrinkage = kSlow;
   if (held.empty()) return true;
   const auto n = static_cast<Eigen::Index>(3 * held.size());
-  held_motions.resize(shell.dof_count(), n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    force.setZero(shell.dof_count());
-    force[held[static_cast<size_t>(k / 3)] + k % 3] = 1;
-    held_motions.col(k) = factor.solve(force);
-  }
+  unit_forces.setZero(shell.dof_count(), n);
+  for (Eigen::Index k = 0; k < n; ++k) unit_forces(held[static_cast<size_t>(k / 3)] + k % 3, k) = 1;
+  factor.Solve(unit_forces, held_motions);
   // Where the skin would be unstable, it is taken as soft instead: the step is then too short, not wrong.
   constexpr double kSoftest = 0.03;  // of the springs
   held_undo.resize(n, n);
@@ -137,8 +140,8 @@ bool NonlinearEstimator::Solver::Refactor() {
   return true;
 }
 
-Eigen::VectorXd NonlinearEstimator::Solver::Solve(const Eigen::VectorXd& by_force) const {
-  Eigen::VectorXd solution = factor.solve(by_force);
+Eigen::VectorXd NonlinearEstimator::Solver::Solve(const Eigen::VectorXd& by_force) {
+  Eigen::VectorXd solution = factor.Solve(by_force);
   if (held.empty()) return solution;
   Eigen::VectorXd at_held(held_undo.rows());
   for (Eigen::Index k = 0; k < at_held.size(); ++k)
@@ -155,16 +158,24 @@ void NonlinearEstimator::Solver::AddForce(int site, int direction, double load_n
   }
 }
 
-void NonlinearEstimator::Solver::SolveFor(const Eigen::VectorXd& by_force, Eigen::VectorXd& to_motion,
-                                          Eigen::VectorXd& to_column) {
-  to_motion = Solve(by_force);
-  MarkerMotions(model, mesh, shell, state, to_motion, to_column);
-}
-
 void NonlinearEstimator::Solver::SolveColumns(Load& load) {
   force.setZero(shell.dof_count());
   AddForce(load.site, 0, 1, force);
-  SolveFor(force, load.motion, load.column);
+  load.motion = Solve(force);
+  MarkerMotions(model, mesh, shell, state, load.motion, load.column);
+  load.sideways.resize(load.column.size(), 0);
+}
+
+const Eigen::MatrixXd& NonlinearEstimator::Solver::Sideways(Load& load) {
+  if (load.sideways.cols() > 0) return load.sideways;
+  load.sideways.resize(load.column.size(), 2);
+  for (int direction = 0; direction < 2; ++direction) {
+    force.setZero(shell.dof_count());
+    AddForce(load.site, direction + 1, 1, force);
+    MarkerMotions(model, mesh, shell, state, Solve(force), column);
+    load.sideways.col(direction) = column;
+  }
+  return load.sideways;
 }
 
 // Residual of the shell under pressure and loads, into `gradient`; its largest entry.
@@ -202,7 +213,7 @@ bool NonlinearEstimator::Solver::FindLoads(const SkinTangent& tangent) {
     const int site = fit.MostSignificant(data, tangent);
     if (site < 0) break;
     if (fit.IsFull()) return false;
-    auto load = std::find_if(loads.begin(), loads.end(), [&](const Load& l) { return l.site == site; });
+    auto load = FindLoad(site);
     if (load == loads.end()) {  // else one that the fit has just let go
       load = loads.emplace(loads.end());
       load->site = site;
@@ -220,8 +231,7 @@ double NonlinearEstimator::Solver::Advance() {
   step = settle;
   std::vector<double> wanted(loads.size(), 0.0);
   for (size_t k = 0; k < fit.sites_in().size(); ++k) {
-    const int site = fit.sites_in()[k];
-    const auto at = std::find_if(loads.begin(), loads.end(), [&](const Load& l) { return l.site == site; });
+    const auto at = FindLoad(fit.sites_in()[k]);
     wanted[static_cast<size_t>(at - loads.begin())] = fit.load_n(k);
   }
   for (size_t i = 0; i < loads.size(); ++i) step += (wanted[i] - loads[i].load_n) * loads[i].motion;
@@ -237,29 +247,27 @@ double NonlinearEstimator::Solver::Advance() {
   return longest;
 }
 
-// Gauss-Newton until the state rests. False: it did not.
+// Gauss-Newton until the state rests. The tangent is kept for as long as its steps shrink. False: it did not.
 bool NonlinearEstimator::Solver::Iterate(const SkinShape& shape, const SkinTangent& tangent,
                                          double pressure_mpa) {
   const FollowerPressure pressure(model.thickness_mm, pressure_mpa);
   const ElementLoad* all[] = {&pressure};
-  double before = 0;
+  double longest = 0, before = 0;  // of the last two steps
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     ++work.iterations;
-    const double unbalance = Unbalance(pressure);
-    double total = fit_options.min_force_n;
-    for (const Load& load : loads) total = std::max(total, load.load_n);
-    const double tolerance = kBalanced * total;
-    if (!has_factor || (iteration > 0 && unbalance > tolerance && unbalance > kSlow * before)) {
+    if (!std::isfinite(Unbalance(pressure))) return false;
+    if (!has_factor || (iteration > 1 && longest > kSlow * before)) {
       shell.Hessian(state, all, gradient, hessian);
       for (const Load& load : loads) AddForce(load.site, 0, -load.load_n, gradient);
       if (!Refactor()) return false;
     }
     SetData(shape, tangent, pressure_mpa);
-    if (!std::isfinite(unbalance) || !FindLoads(tangent)) return false;
-    before = unbalance;
-    const double longest = Advance();
+    if (!FindLoads(tangent)) return false;
+    before = longest;
+    longest = Advance();
     if (!std::isfinite(longest)) return false;
-    if (longest < kSettledMm) return true;
+    if (iteration > 0) shrinkage = std::max(0.5 * shrinkage, longest / before);
+    if (longest < kSettledMm || longest * shrinkage < 0.5 * kSettledMm) return true;
   }
   return false;
 }
@@ -268,12 +276,13 @@ void NonlinearEstimator::Solver::Report(NodalForces& forces) {
   fit.Report(
       data,
       [&](const auto& shares, int direction) -> const Eigen::VectorXd& {
-        force.setZero(shell.dof_count());
+        sum.setZero(predicted.size());
         for (Eigen::Index k = 0; k < shares.size(); ++k) {
-          AddForce(fit.sites_in()[static_cast<size_t>(k)], direction + 1, shares[k], force);
+          if (shares[k] == 0) continue;
+          const auto load = FindLoad(fit.sites_in()[static_cast<size_t>(k)]);
+          if (load != loads.end()) sum += shares[k] * Sideways(*load).col(direction);
         }
-        SolveFor(force, motion, column);
-        return column;
+        return sum;
       },
       forces);
 }

@@ -1,9 +1,7 @@
 #include "sensing/force/skin_tangent.h"
 
-#include <Eigen/CholmodSupport>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <map>
 #include <utility>
@@ -11,6 +9,7 @@
 #include "sensing/mechanics/equilibrium.h"
 #include "sensing/mechanics/linear_shell.h"
 #include "sensing/mechanics/pressed_skin.h"
+#include "sensing/mechanics/sparse_cholesky.h"
 
 namespace taclink {
 namespace {
@@ -21,33 +20,44 @@ double MarkerOffset(const LinkModel& model) {
   return model.thickness_mm / 2 - model.markers.center_depth_mm;
 }
 
-// Fills all columns from those of one path: the skin is one of revolution.
-// `respond`: displacements of the markers, stacked, to a unit force at a site.
-void FillBySymmetry(const LinkModel& model, const LoadSites& sites, SkinTangent& tangent,
-                    const std::function<Eigen::VectorXd(size_t site, const Vec3& force)>& respond) {
-  const int markers = model.markers.count(), paths = model.markers.paths;
-  for (auto* matrix : {&tangent.inward_mm_n, &tangent.around_mm_n, &tangent.along_mm_n}) {
-    matrix->resize(3 * markers, sites.count());
-  }
+// A force of 1 N at a site of the first path; the others' follow from them: the skin is one of revolution.
+struct UnitForce {
+  int site = 0;
+  int direction = 0;  // column of the site's frame
+};
+
+std::vector<UnitForce> UnitForces(const LoadSites& sites) {
+  std::vector<UnitForce> forces;
   for (int row = 0; row < sites.rows; ++row) {
     for (int first = 0; first < sites.columns_per_path; ++first) {
-      const int base = row * sites.columns + first;
       for (int direction = 0; direction < 3; ++direction) {
-        const Eigen::VectorXd answer =
-            respond(static_cast<size_t>(base), sites.frames[static_cast<size_t>(base)].col(direction));
-        auto& matrix = direction == 0   ? tangent.inward_mm_n
-                       : direction == 1 ? tangent.around_mm_n
-                                        : tangent.along_mm_n;
-        for (int path = 0; path < paths; ++path) {
-          const Mat3 turn =
-              Eigen::AngleAxisd(path * model.markers.path_pitch_rad(), Vec3::UnitZ()).toRotationMatrix();
-          const int column = base + path * sites.columns_per_path;
-          for (int m = 0; m < markers; ++m) {
-            const int to = model.MarkerIndex((model.PathOf(m) + path) % paths, model.RingOf(m));
-            matrix.col(column).segment<3>(3 * to) = (turn * answer.segment<3>(3 * m)).cast<float>();
-          }
-        }
+        forces.push_back({row * sites.columns + first, direction});
       }
+    }
+  }
+  return forces;
+}
+
+void SizeColumns(const LinkModel& model, const LoadSites& sites, SkinTangent& tangent) {
+  for (auto* matrix : {&tangent.inward_mm_n, &tangent.around_mm_n, &tangent.along_mm_n}) {
+    matrix->resize(3 * model.markers.count(), sites.count());
+  }
+}
+
+// `answer_mm`: of the markers to `force`, stacked. Fills the columns of the force's sites on all paths.
+void FillColumns(const LinkModel& model, const LoadSites& sites, const UnitForce& force,
+                 const Eigen::VectorXd& answer_mm, SkinTangent& tangent) {
+  const int markers = model.markers.count(), paths = model.markers.paths;
+  auto& matrix = force.direction == 0   ? tangent.inward_mm_n
+                 : force.direction == 1 ? tangent.around_mm_n
+                                        : tangent.along_mm_n;
+  for (int path = 0; path < paths; ++path) {
+    const Mat3 turn =
+        Eigen::AngleAxisd(path * model.markers.path_pitch_rad(), Vec3::UnitZ()).toRotationMatrix();
+    const int column = force.site + path * sites.columns_per_path;
+    for (int m = 0; m < markers; ++m) {
+      const int to = model.MarkerIndex((model.PathOf(m) + path) % paths, model.RingOf(m));
+      matrix.col(column).segment<3>(3 * to) = (turn * answer_mm.segment<3>(3 * m)).cast<float>();
     }
   }
 }
@@ -93,11 +103,15 @@ SkinTangent LinearTangent(const LinkModel& model, int refinement, const LoadSite
   SkinTangent tangent;
   tangent.per_pressure = stacked(shell.PerPressure());
   tangent.offset_mm = Eigen::VectorXd::Zero(tangent.per_pressure.size());
-  FillBySymmetry(model, sites, tangent, [&](size_t site, const Vec3& force) {
+  SizeColumns(model, sites, tangent);
+  for (const UnitForce& force : UnitForces(sites)) {
+    const auto site = static_cast<size_t>(force.site);
     std::vector<NodalLoad> loads;
-    for (const auto& [node, share] : sites.spreads[site]) loads.push_back({node, share * force});
-    return stacked(shell.Solve(loads));
-  });
+    for (const auto& [node, share] : sites.spreads[site]) {
+      loads.push_back({node, share * sites.frames[site].col(force.direction)});
+    }
+    FillColumns(model, sites, force, stacked(shell.Solve(loads)), tangent);
+  }
   return tangent;
 }
 
@@ -110,10 +124,8 @@ struct PressurisedTangents::Shell {
         solver(shell, {.tolerance_n =
                            1e-7 * link.material.youngs_modulus_mpa * link.thickness_mm * link.thickness_mm}),
         hessian(shell.Pattern()),
-        rest(shell.Rest()) {
-    factor.cholmod().print = 0;
-    factor.analyzePattern(hessian);
-  }
+        factor(hessian),
+        rest(shell.Rest()) {}
 
   struct Known {
     SkinTangent tangent;
@@ -131,7 +143,7 @@ struct PressurisedTangents::Shell {
   EquilibriumSolver solver;
   Eigen::SparseMatrix<double> hessian;
   Eigen::VectorXd gradient;
-  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor;
+  SparseCholesky factor;
   ShellState rest;
   std::map<int, Known> known;  // by pressure in steps of the grid
   const Known* last = nullptr;
@@ -152,28 +164,34 @@ bool PressurisedTangents::Shell::Inflate(double from_mpa, double to_mpa, ShellSt
 bool PressurisedTangents::Shell::Compute(const ShellState& state, SkinTangent& tangent) {
   const FollowerPressure pressure(model.thickness_mm, tangent.pressure_mpa);
   const FollowerPressure unit(model.thickness_mm, 1);
-  const ElementLoad* loads[] = {&pressure};
-  shell.Hessian(state, loads, gradient, hessian);
-  factor.factorize(hessian);
-  if (factor.info() != Eigen::Success) return false;
+  const ElementLoad* inflating[] = {&pressure};
+  shell.Hessian(state, inflating, gradient, hessian);
+  if (!factor.Factorise(hessian)) return false;
   MarkerDisplacements(model, mesh, state, tangent.offset_mm);
   // The gradient of the pressure's energy alone: that with it less that without.
   Eigen::VectorXd with, without;
   const ElementLoad* one[] = {&unit};
   shell.Gradient(state, one, with);
   shell.Gradient(state, {}, without);
-  const auto markers_by = [&](const Eigen::VectorXd& force) {
-    Eigen::VectorXd all;
-    MarkerMotions(model, mesh, shell, state, factor.solve(force), all);
-    return all;
-  };
-  tangent.per_pressure = markers_by(without - with);
-  FillBySymmetry(model, sites, tangent, [&](size_t site, const Vec3& force) {
-    Eigen::VectorXd load = Eigen::VectorXd::Zero(shell.dof_count());
-    for (const auto& [node, share] : sites.spreads[site])
-      load.segment<3>(shell.Dof(node, 0)) += share * force;
-    return markers_by(load);
-  });
+  MarkerMotions(model, mesh, shell, state, factor.Solve(without - with), tangent.per_pressure);
+  const std::vector<UnitForce> forces = UnitForces(sites);
+  Eigen::MatrixXd loads_n =
+      Eigen::MatrixXd::Zero(shell.dof_count(), static_cast<Eigen::Index>(forces.size()));
+  for (size_t k = 0; k < forces.size(); ++k) {
+    const auto site = static_cast<size_t>(forces[k].site);
+    for (const auto& [node, share] : sites.spreads[site]) {
+      loads_n.col(static_cast<Eigen::Index>(k)).segment<3>(shell.Dof(node, 0)) +=
+          share * sites.frames[site].col(forces[k].direction);
+    }
+  }
+  Eigen::MatrixXd motions;
+  factor.Solve(loads_n, motions);
+  SizeColumns(model, sites, tangent);
+  Eigen::VectorXd answer_mm;
+  for (size_t k = 0; k < forces.size(); ++k) {
+    MarkerMotions(model, mesh, shell, state, motions.col(static_cast<Eigen::Index>(k)), answer_mm);
+    FillColumns(model, sites, forces[k], answer_mm, tangent);
+  }
   return true;
 }
 

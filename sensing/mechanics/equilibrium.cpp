@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sensing/mechanics/sparse_cholesky.h"
+
 namespace taclink {
 
 const char* Name(EquilibriumStop stop) {
@@ -23,16 +25,18 @@ const char* Name(EquilibriumStop stop) {
 }
 
 struct EquilibriumSolver::Factor {
-  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> llt;
+  explicit Factor(const Eigen::SparseMatrix<double>& pattern) : llt(pattern) { ldlt.cholmod().print = 0; }
+
+  SparseCholesky llt;
   // Of a Hessian that isn't positive definite, as it stands.
   Eigen::CholmodSimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> ldlt;
 };
 
 EquilibriumSolver::EquilibriumSolver(const NonlinearShell& shell, const EquilibriumOptions& options)
-    : shell_(shell), options_(options), hessian_(shell.Pattern()), factor_(std::make_unique<Factor>()) {
-  factor_->llt.cholmod().print = 0;
-  factor_->ldlt.cholmod().print = 0;
-  factor_->llt.analyzePattern(hessian_);
+    : shell_(shell),
+      options_(options),
+      hessian_(shell.Pattern()),
+      factor_(std::make_unique<Factor>(hessian_)) {
   shell_.Hessian(shell_.Rest(), {}, gradient_, hessian_);
   rest_diagonal_ = hessian_.diagonal();
 }
@@ -43,11 +47,10 @@ EquilibriumSolver::~EquilibriumSolver() = default;
 // search there is no energy to go down, and a saddle is as good.
 bool EquilibriumSolver::FindStep(bool line_search, EquilibriumSummary& summary) {
   constexpr double kFirst = 1e-4, kMost = 1e2;
-  factor_->llt.factorize(hessian_);
-  summary.stable = factor_->llt.info() == Eigen::Success;
+  summary.stable = factor_->llt.Factorise(hessian_);
   if (summary.stable) {
     shift_ = 0;
-    step_ = factor_->llt.solve(-gradient_);
+    factor_->llt.Solve(-gradient_, step_);
     return true;
   }
   if (!line_search) {
@@ -63,9 +66,8 @@ bool EquilibriumSolver::FindStep(bool line_search, EquilibriumSummary& summary) 
   for (shift_ = std::max(kFirst, shift_ / 8); shift_ <= kMost; shift_ *= 4) {
     for (Eigen::Index i = 0; i < scale.size(); ++i) hessian_.coeffRef(i, i) += (shift_ - before) * scale[i];
     before = shift_;
-    factor_->llt.factorize(hessian_);
-    if (factor_->llt.info() != Eigen::Success) continue;
-    step_ = factor_->llt.solve(-gradient_);
+    if (!factor_->llt.Factorise(hessian_)) continue;
+    factor_->llt.Solve(-gradient_, step_);
     return true;
   }
   return false;
