@@ -1,5 +1,8 @@
 #include "client/messages.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace taclink::client {
 namespace {
 
@@ -122,13 +125,21 @@ Link From(const v1::Link& message) {
   return link;
 }
 
+std::optional<Covariance3> From(const google::protobuf::RepeatedField<double>& covariance) {
+  Covariance3 numbers{};
+  if (static_cast<size_t>(covariance.size()) != numbers.size()) return std::nullopt;
+  std::copy(covariance.begin(), covariance.end(), numbers.begin());
+  return numbers;
+}
+
 Contact From(const v1::Contact& message) {
   Contact contact;
   contact.id = message.id();
   contact.center_m = From(message.center_m());
   contact.normal = From(message.normal());
   contact.force_n = From(message.force_n());
-  if (message.has_force_sigma_n()) contact.force_sigma_n = From(message.force_sigma_n());
+  contact.force_covariance_n2 = From(message.force_covariance_n2());
+  contact.center_covariance_m2 = From(message.center_covariance_m2());
   contact.normal_force_n = message.normal_force_n();
   contact.area_m2 = message.area_m2();
   for (const uint32_t marker : message.markers()) contact.markers.push_back(static_cast<int>(marker));
@@ -145,6 +156,11 @@ FrameTimes From(const v1::FrameTimes& message) {
 }
 
 }  // namespace
+
+Vector3 Sigmas(const Covariance3& covariance) {
+  const auto root = [](double variance) { return std::sqrt(std::max(0.0, variance)); };
+  return {root(covariance[0]), root(covariance[3]), root(covariance[5])};
+}
 
 const char* Name(LinkStatus status) {
   switch (status) {

@@ -69,12 +69,31 @@ StageTimes StageTimesFrom(const v1::StageTimes& s) {
           .force = s.force_s() / kSecondsPerMs};
 }
 
+void FillCovariance(const Mat3& covariance, double scale, google::protobuf::RepeatedField<double>& out) {
+  for (const auto& [row, column] : kUpperTriangle) out.Add(covariance(row, column) * scale * scale);
+}
+
+std::optional<Mat3> CovarianceFrom(const google::protobuf::RepeatedField<double>& numbers, double scale) {
+  if (numbers.size() != static_cast<int>(kUpperTriangle.size())) return std::nullopt;
+  Mat3 covariance;
+  int next = 0;
+  for (const auto& [row, column] : kUpperTriangle) {
+    covariance(row, column) = covariance(column, row) = numbers[next++] * scale * scale;
+  }
+  return covariance;
+}
+
 void FillContact(const Contact& contact, v1::Contact& out) {
   out.set_id(contact.id);
   Fill(contact.center_mm, kMetresPerMm, *out.mutable_center_m());
   Fill(contact.normal, 1, *out.mutable_normal());
   Fill(contact.force_n, 1, *out.mutable_force_n());
-  if (contact.force_sigma_n) Fill(*contact.force_sigma_n, 1, *out.mutable_force_sigma_n());
+  if (contact.force_covariance_n2) {
+    FillCovariance(*contact.force_covariance_n2, 1, *out.mutable_force_covariance_n2());
+  }
+  if (contact.center_covariance_mm2) {
+    FillCovariance(*contact.center_covariance_mm2, kMetresPerMm, *out.mutable_center_covariance_m2());
+  }
   out.set_normal_force_n(contact.normal_force_n);
   out.set_area_m2(contact.area_mm2 * kSquareMetresPerMm2);
   for (const int marker : contact.markers) out.add_markers(static_cast<uint32_t>(marker));
@@ -86,7 +105,8 @@ Contact ContactFrom(const v1::Contact& message) {
   contact.center_mm = FromWire(message.center_m(), 1 / kMetresPerMm);
   contact.normal = FromWire(message.normal(), 1);
   contact.force_n = FromWire(message.force_n(), 1);
-  if (message.has_force_sigma_n()) contact.force_sigma_n = FromWire(message.force_sigma_n(), 1);
+  contact.force_covariance_n2 = CovarianceFrom(message.force_covariance_n2(), 1);
+  contact.center_covariance_mm2 = CovarianceFrom(message.center_covariance_m2(), 1 / kMetresPerMm);
   contact.normal_force_n = message.normal_force_n();
   contact.area_mm2 = message.area_m2() / kSquareMetresPerMm2;
   for (const uint32_t marker : message.markers()) contact.markers.push_back(static_cast<int>(marker));

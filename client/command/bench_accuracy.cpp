@@ -91,6 +91,8 @@ Json SceneJson(const SceneScores& scene) {
                           {"vector_error_n", c.vector_error_n},
                           {"direction_deg", c.direction_deg},
                           {"center_mm", c.center_mm},
+                          {"force_deviations", c.force_deviations},
+                          {"center_deviations", c.center_deviations},
                           {"missed", c.missed}});
     json["frames"].push_back(
         {{"phantom_n", frame.phantom_n}, {"stray_n", frame.stray_n}, {"contacts", contacts}});

@@ -9,12 +9,17 @@ constexpr double kMmPerMetre = 1e3;
 constexpr double kMm2PerSquareMetre = 1e6;
 constexpr double kKpaPerPascal = 1e-3;
 
+Json SigmasJson(const std::optional<client::Covariance3>& covariance, double scale) {
+  return covariance ? ToJson(client::Sigmas(*covariance), scale) : Json(nullptr);
+}
+
 Json ContactJson(const client::Contact& contact) {
   return {{"id", contact.id},
           {"center_mm", ToJson(contact.center_m, kMmPerMetre)},
           {"normal", contact.normal},
           {"force_n", contact.force_n},
-          {"force_sigma_n", contact.force_sigma_n ? Json(*contact.force_sigma_n) : Json(nullptr)},
+          {"force_sigma_n", SigmasJson(contact.force_covariance_n2, 1)},
+          {"center_sigma_mm", SigmasJson(contact.center_covariance_m2, kMmPerMetre)},
           {"normal_force_n", contact.normal_force_n},
           {"area_mm2", contact.area_m2 * kMm2PerSquareMetre}};
 }

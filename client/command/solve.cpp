@@ -34,11 +34,16 @@ std::optional<ForceModel> ForceModelNamed(const std::string& name) {
   return std::nullopt;
 }
 
+Json SigmasJson(const std::optional<Mat3>& covariance) {
+  return covariance ? ToJson(Sigmas(*covariance)) : Json(nullptr);
+}
+
 Json ContactJson(const Contact& contact) {
   return {{"center_mm", ToJson(contact.center_mm)},
           {"normal", ToJson(contact.normal)},
           {"force_n", ToJson(contact.force_n)},
-          {"force_sigma_n", contact.force_sigma_n ? ToJson(*contact.force_sigma_n) : Json(nullptr)},
+          {"force_sigma_n", SigmasJson(contact.force_covariance_n2)},
+          {"center_sigma_mm", SigmasJson(contact.center_covariance_mm2)},
           {"normal_force_n", contact.normal_force_n},
           {"area_mm2", contact.area_mm2}};
 }

@@ -16,6 +16,10 @@
 namespace taclink::client {
 
 using Vector3 = std::array<double, 3>;
+/// Symmetric: xx, xy, xz, yy, yz, zz.
+using Covariance3 = std::array<double, 6>;
+/// Standard deviations of the three components.
+Vector3 Sigmas(const Covariance3& covariance);
 
 enum class Detail {
   kContacts,  ///< status, times, contacts, total force
@@ -89,12 +93,13 @@ struct Arm {
 };
 
 struct Contact {
-  uint64_t id = 0;                       ///< lasts while the contact does
-  Vector3 center_m{};                    ///< on the deformed outer surface
-  Vector3 normal{};                      ///< unit, away from the axis
-  Vector3 force_n{};                     ///< what the world exerts on the skin
-  std::optional<Vector3> force_sigma_n;  ///< standard deviation of each component
-  double normal_force_n = 0;             ///< pressing in is positive
+  uint64_t id = 0;                                  ///< lasts while the contact does
+  Vector3 center_m{};                               ///< on the deformed outer surface
+  Vector3 normal{};                                 ///< unit, away from the axis
+  Vector3 force_n{};                                ///< what the world exerts on the skin
+  std::optional<Covariance3> force_covariance_n2;   ///< none: not known
+  std::optional<Covariance3> center_covariance_m2;  ///< likewise
+  double normal_force_n = 0;                        ///< pressing in is positive
   double area_m2 = 0;
   std::vector<int> markers;
 };

@@ -108,18 +108,37 @@ void ContactFinder::Describe(const SkinShape& shape, const NodalForces& forces, 
       DeformedNormal(shape, static_cast<int>(std::lround(path)), static_cast<int>(std::lround(ring)));
   contact.normal_force_n = -contact.force_n.dot(contact.normal);
 
-  Mat3 covariance = Mat3::Zero();
+  DescribeErrors(shape, forces, weight, contact);
+}
+
+// The centre is the mean of the markers' places, weighted by the sizes of their forces: to first order,
+// dc = sum_i (p_i - c) (e_i . df_i) / sum_i |f_i|, e_i along f_i.
+void ContactFinder::DescribeErrors(const SkinShape& shape, const NodalForces& forces, double weight,
+                                   Contact& contact) const {
+  Mat3 force = Mat3::Zero(), center = Mat3::Zero();
+  const auto is_outside = [&](int m) {
+    return std::find(contact.markers.begin(), contact.markers.end(), m) == contact.markers.end();
+  };
+  const auto center_by_force = [&](int m) -> Mat3 {
+    const Vec3& f = forces.forces_n[static_cast<size_t>(m)];
+    const Vec3 arm = OuterPoint(shape, model_.PathOf(m), model_.RingOf(m)) - contact.center_mm;
+    return arm * (f / std::max(f.norm(), 1e-12)).transpose() / weight;
+  };
   for (size_t i = 0; i < forces.loaded.size(); ++i) {
     const int a = forces.loaded[i];
-    if (std::find(region.begin(), region.end(), a) == region.end()) continue;
+    if (is_outside(a)) continue;
+    const Mat3 by_a = center_by_force(a);
     for (size_t j = 0; j < forces.loaded.size(); ++j) {
       const int b = forces.loaded[j];
-      if (std::find(region.begin(), region.end(), b) == region.end()) continue;
-      covariance += forces.loaded_covariance.block<3, 3>(3 * static_cast<Eigen::Index>(i),
-                                                         3 * static_cast<Eigen::Index>(j));
+      if (is_outside(b)) continue;
+      const Mat3 joint = forces.loaded_covariance.block<3, 3>(3 * static_cast<Eigen::Index>(i),
+                                                              3 * static_cast<Eigen::Index>(j));
+      force += joint;
+      center.noalias() += by_a * joint * center_by_force(b).transpose();
     }
   }
-  contact.force_sigma_n = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  contact.force_covariance_n2 = force;
+  contact.center_covariance_mm2 = center;
 }
 
 void ContactFinder::AssignIds(std::vector<Contact>& contacts) {

@@ -29,6 +29,8 @@ class ContactFinder {
   void Recycle(std::vector<Contact>& contacts);
   Contact Fresh();
   void Describe(const SkinShape& shape, const NodalForces& forces, Contact& contact) const;
+  void DescribeErrors(const SkinShape& shape, const NodalForces& forces, double weight,
+                      Contact& contact) const;
   void AssignIds(std::vector<Contact>& contacts);
   Vec3 DeformedNormal(const SkinShape& shape, int path, int ring) const;
   Vec3 OuterPoint(const SkinShape& shape, int path, int ring) const;

@@ -46,14 +46,15 @@ struct NodalForces {
 
 /// A connected region of the skin that something pushes on. Link frame.
 struct Contact {
-  uint64_t id = 0;                    ///< lasts while the contact does; unique within a link's run
-  Vec3 center_mm = Vec3::Zero();      ///< on the deformed outer surface
-  Vec3 normal = Vec3::Zero();         ///< unit, of the deformed skin, away from the axis
-  Vec3 force_n = Vec3::Zero();        ///< what the world exerts on the skin
-  std::optional<Vec3> force_sigma_n;  ///< standard deviation of each component; none: not known
-  double normal_force_n = 0;          ///< pressing in is positive
-  double area_mm2 = 0;                ///< of the loaded region, no finer than the marker grid
-  std::vector<int> markers;           ///< indices of the loaded markers
+  uint64_t id = 0;                            ///< lasts while the contact does; unique within a link's run
+  Vec3 center_mm = Vec3::Zero();              ///< on the deformed outer surface
+  Vec3 normal = Vec3::Zero();                 ///< unit, of the deformed skin, away from the axis
+  Vec3 force_n = Vec3::Zero();                ///< what the world exerts on the skin
+  std::optional<Mat3> force_covariance_n2;    ///< none: not known
+  std::optional<Mat3> center_covariance_mm2;  ///< likewise
+  double normal_force_n = 0;                  ///< pressing in is positive
+  double area_mm2 = 0;                        ///< of the loaded region, no finer than the marker grid
+  std::vector<int> markers;                   ///< indices of the loaded markers
 };
 
 }  // namespace taclink

@@ -20,6 +20,11 @@ constexpr double DegFromRad(double rad) {
   return rad * 180.0 / kPi;
 }
 
+/// Standard deviations of the components.
+inline Vec3 Sigmas(const Mat3& covariance) {
+  return covariance.diagonal().cwiseMax(0).cwiseSqrt();
+}
+
 /// Rigid transform named `target_from_source`: p_in_target = target_from_source * p_in_source.
 struct Rigid3 {
   Mat3 rotation = Mat3::Identity();

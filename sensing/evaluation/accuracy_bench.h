@@ -53,9 +53,6 @@ struct AccuracyOutcome {
   int frames = 0, not_converged = 0;
   double construction_s = 0;  ///< CPU time
   double memory_mb = 0;       ///< resident, that the estimator adds to a process
-
-  /// It answers as the force model that was asked for.
-  bool IsWhatWasAsked() const;
 };
 
 /// Markers of a stage as a camera pair would give them: noise and covariance as said. Exact markers are given

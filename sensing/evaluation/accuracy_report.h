@@ -14,6 +14,7 @@ struct AccuracySummary {
   int frames = 0;         ///< all
   int loaded_frames = 0;  ///< with a contact in truth
   int contacts = 0, missed = 0;
+  int force_told = 0, center_told = 0;  ///< contacts whose error is within two standard deviations as told
   double size_n = 0, size_percent = 0, size_percent_p95 = 0;  ///< mean, mean, percentile
   double vector_n = 0, vector_percent = 0;                    ///< means
   double direction_deg = 0;                                   ///< median; missed ones left out
@@ -26,8 +27,8 @@ using ChosenScene = std::function<bool(const SceneScores&)>;
 AccuracySummary Summarize(const AccuracyOutcome& outcome, const ChosenScene& chosen);
 AccuracySummary Summarize(const AccuracyOutcome& outcome);
 
-/// Everything, by noise; then by kind of scene and by pressure, with `detail_noise_mm`. Methods that answer
-/// as another force model than asked for are named in a table of their own and left out of the others.
+/// Everything, by noise; then by kind of scene and by pressure, with `detail_noise_mm`. A frame that another
+/// force model answered, which the costs tell, counts as the one that was asked for.
 std::vector<ReportTable> AccuracyTables(const std::vector<AccuracyOutcome>& outcomes, double detail_noise_mm);
 
 /// How many of the path's scenes there are.

@@ -26,8 +26,14 @@ std::pair<int, double> NearestTo(const std::vector<BodyContact>& contacts, const
 
 struct Sum {
   Vec3 force = Vec3::Zero(), center = Vec3::Zero();
+  Mat3 force_covariance = Mat3::Zero(), center_covariance = Mat3::Zero();  // the latter times weight^2
   double weight = 0;
 };
+
+double Deviations(double error, const Mat3& covariance) {
+  const double variance = covariance.trace();
+  return variance > 0 ? error / std::sqrt(variance) : 0;
+}
 
 ContactScore Compare(const BodyContact& real, const Sum& found) {
   ContactScore score;
@@ -38,6 +44,8 @@ ContactScore Compare(const BodyContact& real, const Sum& found) {
   score.direction_deg = 180;
   if (score.missed) return score;
   score.center_mm = (found.center / found.weight - real.center_mm).norm();
+  score.force_deviations = Deviations(score.vector_error_n, found.force_covariance);
+  score.center_deviations = Deviations(score.center_mm * found.weight, found.center_covariance);
   const double cosine = found.force.dot(real.force_n) / (found.force.norm() * score.true_n);
   if (std::isfinite(cosine)) score.direction_deg = DegFromRad(std::acos(std::clamp(cosine, -1.0, 1.0)));
   return score;
@@ -79,6 +87,8 @@ FrameScore ScoreContacts(const LinkModel& model, const TrueStage& truth, const N
     sum.force += contact.force_n;
     sum.center += size * contact.center_mm;
     sum.weight += size;
+    sum.force_covariance += contact.force_covariance_n2.value_or(Mat3::Zero());
+    sum.center_covariance += size * size * contact.center_covariance_mm2.value_or(Mat3::Zero());
   }
   for (const int marker : forces.loaded) {
     const auto m = static_cast<size_t>(marker);

@@ -21,6 +21,8 @@ struct ContactScore {
   double direction_deg = 0;   ///< between the two; 180 if missed
   double center_mm = 0;       ///< distance of the centres (found ones weighted by force); if missed: none
   bool missed = false;
+  /// Errors over what the covariances say, root of the traces; 0: not told.
+  double force_deviations = 0, center_deviations = 0;
 
   bool SizeWithin() const;    ///< 10 % or 0.03 N, whichever is larger; a missed one has its whole force wrong
   bool VectorWithin() const;  ///< the same for the vector error

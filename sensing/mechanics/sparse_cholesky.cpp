@@ -6,21 +6,43 @@
 #include <algorithm>
 #include <cassert>
 #include <cstring>
+#include <mutex>
+
+// OpenBLAS' own; its header is in no runtime package.
+extern "C" {
+void openblas_set_num_threads(int threads);
+int openblas_get_parallel();  // 0: the sequential build
+}
 
 namespace taclink {
 namespace {
+
+// The sequential build of OpenBLAS shares memory between the threads that call it, and then answers wrongly.
+std::mutex* SequentialBlas() {
+  static std::mutex sequential;
+  static const bool is_sequential = [] {
+    openblas_set_num_threads(1);
+    return openblas_get_parallel() == 0;
+  }();
+  return is_sequential ? &sequential : nullptr;
+}
 
 // CHOLMOD opens a parallel region for every supernode, whatever the environment's number of threads: on
 // matrices of this size its threads only wait, and take the cores from other links.
 class OneThread {
  public:
-  OneThread() : levels_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
+  OneThread() : levels_(omp_get_max_active_levels()) {
+    omp_set_max_active_levels(0);
+    if (std::mutex* sequential = SequentialBlas(); sequential != nullptr)
+      lock_ = std::unique_lock(*sequential);
+  }
   ~OneThread() { omp_set_max_active_levels(levels_); }
   OneThread(const OneThread&) = delete;
   OneThread& operator=(const OneThread&) = delete;
 
  private:
   int levels_;
+  std::unique_lock<std::mutex> lock_;
 };
 
 cholmod_sparse ViewOf(const Eigen::SparseMatrix<double>& matrix) {

@@ -24,6 +24,7 @@ client::Frame MakeFrame(double force_n) {
     contact.force_n = {-force_n, 0, 0};
     contact.normal = {1, 0, 0};
     contact.normal_force_n = force_n;
+    contact.force_covariance_n2 = {0.0625, 0, 0, 0.25, 0, 4};
     contact.area_m2 = 1e-4;
     frame.contacts = {contact};
     frame.total_force_n = contact.force_n;
@@ -41,7 +42,8 @@ TEST(FrameJson, UsesTheKeysAndUnitsOfSolve) {
   EXPECT_EQ(contact.at("id"), 3);
   EXPECT_NEAR(contact.at("center_mm").at(0).get<double>(), 36.5, 1e-9);
   EXPECT_EQ(contact.at("force_n"), Json::array({-0.25, 0.0, 0.0}));
-  EXPECT_TRUE(contact.at("force_sigma_n").is_null());
+  EXPECT_EQ(contact.at("force_sigma_n"), Json::array({0.25, 0.5, 2.0}));
+  EXPECT_TRUE(contact.at("center_sigma_mm").is_null());
   EXPECT_NEAR(contact.at("area_mm2").get<double>(), 100, 1e-9);
   EXPECT_EQ(json.at("total_force_n").at(0), -0.25);
   EXPECT_EQ(json.at("positions_mm").at(0), Json::array({500.0, 250.0, 125.0}));

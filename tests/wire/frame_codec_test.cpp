@@ -47,7 +47,8 @@ LinkState MakeState(int markers) {
   contact.center_mm = Vec3(36.5, 0, 90);
   contact.normal = Vec3(1, 0, 0);
   contact.force_n = Vec3(-0.2, 0.01, 0);
-  contact.force_sigma_n = Vec3(0.01, 0.02, 0.03);
+  contact.force_covariance_n2 = Mat3{{1, 2, 3}, {2, 4, 5}, {3, 5, 6}};
+  contact.center_covariance_mm2 = Mat3{{0.5, 0.1, 0}, {0.1, 0.25, 0}, {0, 0, 2}};
   contact.normal_force_n = 0.2;
   contact.area_mm2 = 150;
   contact.markers = {3, 4};
@@ -106,10 +107,13 @@ TEST(FrameCodec, FullComesBack) {
   ASSERT_EQ(back.contacts.size(), 2u);
   EXPECT_EQ(back.contacts[0].id, 42u);
   EXPECT_NEAR((back.contacts[0].center_mm - state.contacts[0].center_mm).norm(), 0, 1e-12);
-  EXPECT_EQ(back.contacts[0].force_sigma_n.value(), state.contacts[0].force_sigma_n.value());
+  EXPECT_EQ(back.contacts[0].force_covariance_n2.value(), state.contacts[0].force_covariance_n2.value());
+  EXPECT_NEAR(
+      (back.contacts[0].center_covariance_mm2.value() - *state.contacts[0].center_covariance_mm2).norm(), 0,
+      1e-12);
   EXPECT_NEAR(back.contacts[0].area_mm2, 150, 1e-9);
   EXPECT_EQ(back.contacts[0].markers, state.contacts[0].markers);
-  EXPECT_FALSE(back.contacts[1].force_sigma_n.has_value());
+  EXPECT_FALSE(back.contacts[1].force_covariance_n2.has_value());
   EXPECT_NEAR(back.stage_ms.register_, 3, 1e-12);
   EXPECT_EQ(back.baseline_age_s, 61.5);
 }

@@ -34,8 +34,8 @@ TEST_F(ContactFinderTest, CentreLiesOnTheDeformedOuterSkin) {
   EXPECT_NEAR(contacts[0].center_mm.z(), 90, 1);
   EXPECT_NEAR(contacts[0].force_n.y(), -0.2, 0.02);
   EXPECT_NEAR(contacts[0].normal_force_n, 0.2, 0.02);
-  ASSERT_TRUE(contacts[0].force_sigma_n.has_value());
-  EXPECT_LT(contacts[0].force_sigma_n->norm(), 0.05);
+  ASSERT_TRUE(contacts[0].force_covariance_n2.has_value());
+  EXPECT_LT(Sigmas(*contacts[0].force_covariance_n2).norm(), 0.05);
 }
 
 TEST_F(ContactFinderTest, RegionOverTheFirstPathIsOneContact) {

@@ -113,9 +113,9 @@ TEST_F(ForceModelsTest, ADragIsATangentialForceWithItsUncertainty) {
   const Estimate found = EstimateOf(*estimator, drag);
   ASSERT_EQ(found.contacts.size(), 1u);
   EXPECT_NEAR(found.contacts[0].force_n.z(), drag.contact.force_n.z(), 0.1 * drag.contact.force_n.norm());
-  ASSERT_TRUE(found.contacts[0].force_sigma_n.has_value());
-  EXPECT_GT(found.contacts[0].force_sigma_n->z(), 0);
-  EXPECT_LT(found.contacts[0].force_sigma_n->z(), 0.1);
+  ASSERT_TRUE(found.contacts[0].force_covariance_n2.has_value());
+  EXPECT_GT(Sigmas(*found.contacts[0].force_covariance_n2).z(), 0);
+  EXPECT_LT(Sigmas(*found.contacts[0].force_covariance_n2).z(), 0.1);
 }
 
 TEST_F(ForceModelsTest, AutomaticTakesTheCheapestThatIsGoodEnough) {
