@@ -1,6 +1,7 @@
 #include "client/command/calibrate_material.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <memory>
@@ -114,6 +115,7 @@ Result<MaterialChoice> FitLaws(const MaterialOptions& options, const LinkModel& 
   for (const MaterialLaw law : LawsOf(options.law)) {
     MaterialFitOptions how;
     how.progress = [&told, law](int solved) {
+      if (isatty(STDERR_FILENO) == 0) return;
       told = true;
       fmt::print(stderr, "\r{}: {} solutions of the skin ", Name(law), solved);
     };

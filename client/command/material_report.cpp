@@ -90,12 +90,9 @@ MaterialChoice ChooseLaw(std::vector<MaterialFit> fits, std::vector<MaterialChoi
 
 MaterialEvidence EvidenceOf(const MaterialFit& fit) {
   std::string source;
-  if (!fit.inflations.empty()) {
-    source = fmt::format("inflation at {} kPa", fit.inflations.front().pressure_mpa * kKpaPerMpa);
-    for (size_t i = 1; i < fit.inflations.size(); ++i)
-      source = fmt::format("{}, {}", source, fit.inflations[i].pressure_mpa * kKpaPerMpa);
-    source += fmt::format(", residuals {:.1f} %", 100 * fit.inflation->misfit);
-  }
+  for (const InflationFit& one : fit.inflations)
+    source += fmt::format("{}{:g}", source.empty() ? "inflation at " : ", ", one.pressure_mpa * kKpaPerMpa);
+  if (fit.inflation) source += fmt::format(" kPa, residuals {:.1f} %", 100 * fit.inflation->misfit);
   if (!fit.probes.empty()) {
     source += fmt::format("{}{} probe forces, residuals {:.1f} %", source.empty() ? "" : "; ",
                           fit.probes.size(), 100 * fit.probe->misfit);
