@@ -93,7 +93,7 @@ MaterialEvidence EvidenceOf(const MaterialFit& fit) {
   for (const InflationFit& one : fit.inflations)
     source += fmt::format("{}{:g}", source.empty() ? "inflation at " : ", ", one.pressure_mpa * kKpaPerMpa);
   if (fit.inflation) source += fmt::format(" kPa, residuals {:.1f} %", 100 * fit.inflation->misfit);
-  if (!fit.probes.empty()) {
+  if (fit.probe) {
     source += fmt::format("{}{} probe forces, residuals {:.1f} %", source.empty() ? "" : "; ",
                           fit.probes.size(), 100 * fit.probe->misfit);
   }

@@ -23,7 +23,7 @@ constexpr double kLeastVariance = 0.05;  // about the stated deviation nothing i
 // Rows of the result times an error are independent, with standard deviation 1.
 Mat3 Whitening(const Mat3& information, int& dims) {
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(information);
-  const Vec3 values = eigen.eigenvalues();
+  const Vec3& values = eigen.eigenvalues();
   const double least = 1e-9 * values.maxCoeff();
   Vec3 roots;
   dims = 0;

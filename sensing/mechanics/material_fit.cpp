@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "sensing/mechanics/material_evidence.h"
 
@@ -61,13 +62,13 @@ class Fitter {
   std::span<const InflationRecord> inflations_;
   std::span<const ProbeRecord> probes_;
   MaterialFitOptions options_;
-  std::optional<Kind> inflation_, probe_;
+  std::unique_ptr<Kind> inflation_, probe_;  // none: no such records
   double tension_ = 0;
 };
 
 Result<double> Fitter::MinimumOf(const std::function<double(const Observations&)>& cost,
                                  const EvidenceAt& evidence, double start) {
-  std::optional<Error> undefined;
+  Error undefined;  // the last reason why the cost has no value
   const auto at = [&](double log_modulus) {
     const double modulus = std::exp(log_modulus);
     if (modulus < 0.9 * kLeastModulusMpa || modulus > 1.1 * kMostModulusMpa) {
@@ -79,10 +80,10 @@ Result<double> Fitter::MinimumOf(const std::function<double(const Observations&)
     return seen ? cost(*seen) : kInfinity;
   };
   const Minimum minimum = Minimise(at, start);
-  if (std::isinf(minimum.value)) return *undefined;
+  if (std::isinf(minimum.value)) return undefined;
   if (minimum.at_edge) {
     return Refused("the records want a softer skin than this law has an equilibrium for; " +
-                   undefined->message);
+                   undefined.message);
   }
   return minimum.at;
 }
@@ -130,7 +131,8 @@ Result<void> Fitter::FitInflation() {
     return Refused(
         "inflation: the markers don't move outwards under pressure; check the rest shape and signs");
   }
-  inflation_.emplace().evidence = InflationEvidence(model_, response_, inflations_);
+  inflation_ = std::make_unique<Kind>();
+  inflation_->evidence = InflationEvidence(model_, response_, inflations_);
   if (auto fitted = FitAlone(*inflation_, std::log(*start)); !fitted) return fitted;
   const double modulus = std::exp(inflation_->log_modulus);
   const Observations seen = *inflation_->evidence(modulus);
@@ -157,7 +159,8 @@ Result<void> Fitter::FitInflation() {
 Result<void> Fitter::FitProbe() {
   const auto start = LinearModulus(response_, probes_, options_);
   if (!start) return start.error();
-  probe_.emplace().evidence = ProbeEvidence(response_, probes_, options_);
+  probe_ = std::make_unique<Kind>();
+  probe_->evidence = ProbeEvidence(response_, probes_, options_);
   const double known = inflation_ ? std::exp(inflation_->log_modulus) : model_.material.youngs_modulus_mpa;
   if (auto fitted = FitAlone(*probe_, std::log(*start > 0 ? *start : known)); !fitted) return fitted;
   const EvidenceSums sums = Sum(*probe_->evidence(std::exp(probe_->log_modulus)), probe_->outliers);
@@ -166,13 +169,13 @@ Result<void> Fitter::FitProbe() {
 }
 
 Result<double> Fitter::Together() {
-  if (!inflation_ || !probe_) return (inflation_ ? inflation_ : probe_)->log_modulus;
+  if (!inflation_ || !probe_) return (inflation_ ? *inflation_ : *probe_).log_modulus;
   const double apart = inflation_->log_modulus - probe_->log_modulus;
   const double expected = inflation_->sigma * inflation_->sigma + probe_->sigma * probe_->sigma;
   tension_ = apart / std::sqrt(expected);
   const double between = std::max(0.0, (apart * apart - expected) / 2);
   double weighted = 0, weights = 0;
-  for (Kind* kind : {&*inflation_, &*probe_}) {
+  for (Kind* kind : {inflation_.get(), probe_.get()}) {
     const double squared = kind->sigma * kind->sigma + between;
     const auto seen = kind->evidence(std::exp(kind->log_modulus));
     kind->variance = squared * Sum(*seen, kind->outliers).curvature;
@@ -255,13 +258,13 @@ Result<MaterialFit> Fitter::Summary(double log_modulus) {
   fit.material.youngs_modulus_mpa = modulus;
   fit.tension = tension_;
   double information = 0, misfit2 = 0;
-  for (Kind* kind : {inflation_ ? &*inflation_ : nullptr, probe_ ? &*probe_ : nullptr}) {
+  for (Kind* kind : {inflation_.get(), probe_.get()}) {
     if (!kind) continue;
     const Observations common = *kind->evidence(modulus);
     const EvidenceSums sums = Sum(common, kind->outliers);
     const EvidenceSums alone = Sum(*kind->evidence(std::exp(kind->log_modulus)), kind->outliers);
-    const bool is_inflation = inflation_ && kind == &*inflation_;
-    KindFit told = Told(*kind, alone, sums);
+    const bool is_inflation = kind == inflation_.get();
+    const KindFit told = Told(*kind, alone, sums);
     misfit2 += told.misfit * told.misfit;
     (is_inflation ? fit.inflation : fit.probe) = told;
     information += inflation_ && probe_ ? sums.curvature / kind->variance : 1 / (kind->sigma * kind->sigma);

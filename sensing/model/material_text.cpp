@@ -76,7 +76,7 @@ size_t EndOfBlock(const std::string& text, size_t at, size_t column) {
 
 Result<std::string> LinkModelText(const std::string& name_or_path) {
   if (const auto text = ShippedModelText(name_or_path); !text.empty()) return std::string(text);
-  std::ifstream file(name_or_path);
+  const std::ifstream file(name_or_path);
   std::ostringstream text;
   text << file.rdbuf();
   if (!file) return Error{ErrorCode::kNotFound, name_or_path + ": cannot be read; check the path"};
