@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "sensing/mechanics/material_evidence.h"
 
@@ -55,35 +56,39 @@ Result<void> CheckProbe(const LinkModel& model, const ProbeRecord& record) {
   return {};
 }
 
-// Size of the largest patch of neighbouring markers that stay further in than the skin grows, and one of it.
+// Size of the largest patch of neighbouring markers that stay further in than the skin grows, and the one of
+// them that is furthest in.
 std::pair<int, int> TouchedPatch(const LinkModel& model, const InflationRecord& record,
                                  const SkinResponse::Growth& growth, const std::vector<int>& outliers) {
-  std::vector<bool> inward(static_cast<size_t>(model.markers.count()), false);
+  std::vector<double> inward_mm(static_cast<size_t>(model.markers.count()), 0);
   for (const int marker : outliers) {
+    const auto i = static_cast<size_t>(marker);
     const double angle = model.PathAngle(model.PathOf(marker));
     const Vec2& grown = growth.mm[static_cast<size_t>(model.RingOf(marker))];
     const Vec3 out(std::cos(angle), std::sin(angle), 0);
-    const Vec3 residual = record.markers[static_cast<size_t>(marker)].displacement_mm - grown.x() * out -
-                          grown.y() * Vec3::UnitZ();
-    inward[static_cast<size_t>(marker)] = residual.dot(out) < -0.5 * residual.norm();
+    const Vec3 residual = record.markers[i].displacement_mm - grown.x() * out - grown.y() * Vec3::UnitZ();
+    if (residual.dot(out) < -0.5 * residual.norm()) inward_mm[i] = -residual.dot(out);
   }
   std::pair<int, int> largest{0, -1};
   for (const int first : outliers) {
     std::vector<int> open = {first};
-    int size = 0;
+    int size = 0, furthest = first;
+    double furthest_mm = 0;
     while (!open.empty()) {
       const int marker = open.back();
       open.pop_back();
-      if (!inward[static_cast<size_t>(marker)]) continue;
-      inward[static_cast<size_t>(marker)] = false;
+      const double mm = std::exchange(inward_mm[static_cast<size_t>(marker)], 0);
+      if (mm == 0) continue;
       ++size;
+      if (mm > furthest_mm) furthest = marker;
+      furthest_mm = std::max(furthest_mm, mm);
       const int path = model.PathOf(marker), ring = model.RingOf(marker), paths = model.markers.paths;
       open.push_back(model.MarkerIndex((path + 1) % paths, ring));
       open.push_back(model.MarkerIndex((path + paths - 1) % paths, ring));
       if (ring > 0) open.push_back(model.MarkerIndex(path, ring - 1));
       if (ring + 1 < model.markers.rings()) open.push_back(model.MarkerIndex(path, ring + 1));
     }
-    largest = std::max(largest, {size, first});
+    if (size > largest.first) largest = {size, furthest};
   }
   return largest;
 }
