@@ -23,13 +23,17 @@ function(taclink_library name)
   target_link_libraries(${name} PUBLIC taclink_flags ${arg_LINKS})
 endfunction()
 
-# taclink_test(NAME SOURCES ... LINKS ... [LABELS ...]): one GoogleTest program, its cases known to ctest.
+# taclink_test(NAME SOURCES ... LINKS ... [LABELS ...] [TIMEOUT seconds]): one GoogleTest program, its cases known to
+# ctest.
 function(taclink_test name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 300)
+  endif()
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE taclink_flags ${arg_LINKS} GTest::gtest_main GTest::gmock)
   target_compile_definitions(${name} PRIVATE TACLINK_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 300 LABELS "${arg_LABELS}")
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
 endfunction()
 
 # taclink_embed(TARGET FUNCTION NAME FILES ...): text files become `std::span<const EmbeddedFile> FUNCTION()`.

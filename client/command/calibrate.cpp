@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/command/calibrate_link.h"
+#include "client/command/calibrate_material.h"
 #include "client/command/calibrate_picture.h"
 #include "client/command/commands.h"
 #include "client/command/json.h"
@@ -203,9 +204,10 @@ Result<void> Calibrate(const CalibrateOptions& options) {
 
 void AddCalibrate(CLI::App& app, Selected& selected) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App* command = app.add_subcommand(
-      "calibrate",
-      "Camera parameters from pictures of the untouched skin, or of a server's link as it is now");
+  CLI::App* command = app.add_subcommand("calibrate",
+                                         "Camera parameters from pictures of the untouched skin, or of a "
+                                         "server's link as it is now; `material`: "
+                                         "the skin's");
   command->add_option("--model", options->model, "Link model: a shipped name or a YAML file");
   command
       ->add_option(
@@ -238,7 +240,9 @@ void AddCalibrate(CLI::App& app, Selected& selected) {
       ->check(Within(0.001, 5))
       ->capture_default_str();
   command->add_flag("--json", options->json, "One JSON object, with every marker's residuals");
-  command->callback([options, &selected] {
+  AddCalibrateMaterial(*command, selected);
+  command->callback([options, command, &selected] {
+    if (!command->get_subcommands().empty()) return;
     if (options->rest.size() % kCameraCount != 0)
       throw CLI::ValidationError("--rest", "needs a TOP and a BOTTOM picture each time");
     selected = [options] { return Calibrate(*options); };

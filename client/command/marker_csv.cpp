@@ -1,41 +1,18 @@
 #include "client/command/marker_csv.h"
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <vector>
 
+#include "client/command/csv.h"
+
 namespace taclink::command {
 namespace {
 
-constexpr const char* kBlanks = " \t\r\"";
 constexpr const char* kHeader = "path,ring,ux,uy,uz";
-
-std::vector<std::string> Fields(const std::string& line) {
-  std::vector<std::string> fields(1);
-  for (const char c : line) {
-    if (c == ',') {
-      fields.emplace_back();
-    } else {
-      fields.back() += c;
-    }
-  }
-  for (auto& field : fields) {
-    field.erase(0, field.find_first_not_of(kBlanks));
-    field.erase(field.find_last_not_of(kBlanks) + 1);
-  }
-  return fields;
-}
-
-template <typename T>
-bool ParseWhole(const std::string& text, T& value) {
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
-  return error == std::errc() && stop == end;
-}
 
 struct Row {
   int marker = 0;
@@ -45,7 +22,7 @@ struct Row {
 
 // The message lacks file and line; the caller adds them.
 Result<Row> ParseRow(const std::string& line, const LinkModel& model) {
-  const auto fields = Fields(line);
+  const auto fields = CsvFields(line);
   const auto bad = [](const std::string& what) { return Error{ErrorCode::kInvalidArgument, what}; };
   if (fields.size() != 5) return bad("expected 5 columns (" + std::string(kHeader) + ")");
   int path = 0, ring = 0;
@@ -97,11 +74,11 @@ Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
   const Vec3 variances = sigma_mm * sigma_mm * Vec3(1, 1, 9);
   while (std::getline(in, line)) {
     ++number;
-    if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
+    if (IsEmptyCsvLine(line)) continue;
     if (!header_read) {
       header_read = true;
       std::string header;
-      for (const auto& field : Fields(line)) header += (header.empty() ? "" : ",") + field;
+      for (const auto& field : CsvFields(line)) header += (header.empty() ? "" : ",") + field;
       if (header != kHeader) return fail("the header must be '" + std::string(kHeader) + "'");
       continue;
     }

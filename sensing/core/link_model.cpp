@@ -108,4 +108,8 @@ std::vector<Vec3> LinkModel::RestMarkers() const {
   return points;
 }
 
+const char* Name(MaterialLaw law) {
+  return law == MaterialLaw::kNeoHookean ? "neo_hookean" : "saint_venant_kirchhoff";
+}
+
 }  // namespace taclink

@@ -51,6 +51,14 @@ struct Material {
   MaterialLaw law = MaterialLaw::kSaintVenantKirchhoff;
 };
 
+const char* Name(MaterialLaw law);  ///< as in model files
+
+/// How well a model's Young's modulus is known.
+struct MaterialEvidence {
+  double sigma_mpa = 0;  ///< standard deviation
+  std::string source;    ///< what it was measured from, for people
+};
+
 /// White domes on the inner wall, on `paths` x `rings`. Path l (from 1) lies at the angle
 /// first_path_angle + (l - 1) 2 pi / paths from +X towards +Y, ring j (from 1) at rings_z_mm[j - 1].
 struct MarkerGrid {
@@ -82,6 +90,7 @@ struct LinkModel {
       0;  ///< how deep below the outer surface `profile` runs: 0 outer, t/2 middle, t inner
 
   Material material;
+  std::optional<MaterialEvidence> material_evidence;  ///< none: nobody measured it
   MarkerGrid markers;
   double tube_outer_radius_mm = 0;  ///< the skin can't move further in; 0: no tube
   StereoRig nominal_rig;            ///< as designed; calibration starts here

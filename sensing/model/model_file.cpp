@@ -14,7 +14,7 @@ std::span<const EmbeddedFile> EmbeddedModels();
 
 namespace {
 
-constexpr int kFormatVersion = 1;
+constexpr int kFormatVersion = 2;  // since 2: skin.material.evidence
 constexpr size_t kMaxMarkers = 1024;
 // Thickness over radius: a shell is neither a foil nor a block.
 constexpr double kMinThicknessRatio = 1e-4, kMaxThicknessRatio = 0.25;
@@ -56,21 +56,30 @@ RadiusProfile ReadProfile(YamlMap map, double length_mm) {
   return profile;
 }
 
-void ReadSkin(YamlMap map, LinkModel& model) {
+void ReadMaterial(YamlMap map, int version, LinkModel& model) {
+  Material& material = model.material;
+  material.youngs_modulus_mpa = map.Number("youngs_modulus_mpa", {.min = 1e-4, .max = 1e5});
+  material.poisson_ratio = map.Number("poisson_ratio", {.min = 0, .max = 0.5});
+  constexpr auto kSvk = MaterialLaw::kSaintVenantKirchhoff, kRubber = MaterialLaw::kNeoHookean;
+  material.law = map.Choice("law", {Name(kSvk), Name(kRubber)}, 0) == 0 ? kSvk : kRubber;
+  if (material.law == kRubber && material.poisson_ratio != 0.5) {
+    map.Fail("poisson_ratio", "must be 0.5: the neo_hookean law is incompressible");
+  }
+  if (version >= 2 && map.Has("evidence")) {
+    YamlMap evidence = map.Map("evidence");
+    model.material_evidence = {evidence.Number("standard_deviation_mpa", kPositive), evidence.Text("from")};
+    evidence.Done();
+  }
+  map.Done();
+}
+
+void ReadSkin(YamlMap map, int version, LinkModel& model) {
   model.length_mm = map.Number("length_mm", kPositive);
   model.thickness_mm = map.Number("thickness_mm", kPositive);
   const size_t surface = map.Choice("surface", {"outer", "middle", "inner"}, 0);
   model.profile_depth_mm = model.thickness_mm * 0.5 * static_cast<double>(surface);
   model.profile = ReadProfile(map.Map("profile"), model.length_mm);
-  YamlMap material = map.Map("material");
-  model.material.youngs_modulus_mpa = material.Number("youngs_modulus_mpa", {.min = 1e-4, .max = 1e5});
-  model.material.poisson_ratio = material.Number("poisson_ratio", {.min = 0, .max = 0.5});
-  const size_t law = material.Choice("law", {"saint_venant_kirchhoff", "neo_hookean"}, 0);
-  model.material.law = law == 0 ? MaterialLaw::kSaintVenantKirchhoff : MaterialLaw::kNeoHookean;
-  if (law == 1 && model.material.poisson_ratio != 0.5) {
-    material.Fail("poisson_ratio", "must be 0.5: the neo_hookean law is incompressible");
-  }
-  material.Done();
+  ReadMaterial(map.Map("material"), version, model);
   map.Done();
 }
 
@@ -125,10 +134,10 @@ void CheckGeometry(YamlMap& root, const LinkModel& model) {
 Result<LinkModel> ReadLinkModel(YamlFile file) {
   YamlMap& root = file.root();
   LinkModel model;
-  root.Integer("taclink_model", {.min = kFormatVersion, .max = kFormatVersion});
+  const int version = root.Integer("taclink_model", {.min = 1, .max = kFormatVersion});
   model.name = root.Text("name");
   model.description = root.Text("description", "");
-  ReadSkin(root.Map("skin"), model);
+  ReadSkin(root.Map("skin"), version, model);
   if (auto good = file.Finish(); !good) return good.error();
   ReadMarkers(root.Map("markers"), model);
   YamlMap tube = root.Map("tube");

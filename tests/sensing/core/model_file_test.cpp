@@ -65,6 +65,62 @@ TEST(ModelFile, BadInputIsNamedWithFileAndLine) {
   EXPECT_THAT(message(""), HasSubstr("mapping"));
 }
 
+constexpr Material kRubber = {
+    .youngs_modulus_mpa = 0.1234, .poisson_ratio = 0.5, .law = MaterialLaw::kNeoHookean};
+
+// The new material stands where the old one did, and nothing else has changed.
+void ExpectEdited(const std::string& text, const std::string& old_material) {
+  const auto edited = WithMaterial("m.yaml", text, kRubber, {0.0021, "a \"test\" {of: braces}"});
+  ASSERT_TRUE(edited.ok()) << edited.error().message;
+  const auto model = ParseLinkModel("m.yaml", *edited);
+  ASSERT_TRUE(model.ok()) << model.error().message;
+  EXPECT_EQ(model->material.youngs_modulus_mpa, 0.1234);
+  EXPECT_EQ(model->material.law, MaterialLaw::kNeoHookean);
+  ASSERT_TRUE(model->material_evidence.has_value());
+  EXPECT_EQ(model->material_evidence->sigma_mpa, 0.0021);
+  EXPECT_EQ(model->material_evidence->source, "a \"test\" {of: braces}");
+  std::string before = Replaced(text, old_material, "MATERIAL"), after = *edited;
+  if (before.find("taclink_model: 1") != std::string::npos)
+    before = Replaced(before, "taclink_model: 1", "taclink_model: 2");
+  const size_t begin = after.find("{youngs_modulus_mpa: 0.1234");
+  ASSERT_NE(begin, std::string::npos) << after;
+  after.replace(begin, after.find("}}", begin) + 2 - begin, "MATERIAL");
+  EXPECT_EQ(before, after);
+  // Again, now that there is evidence.
+  const auto again = WithMaterial("m.yaml", *edited, kRubber, {0.0021, "a \"test\" {of: braces}"});
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_EQ(*again, *edited);
+}
+
+TEST(ModelFile, MaterialIsReplacedAndCommentsStay) {
+  ExpectEdited(Cylinder(), "{youngs_modulus_mpa: 0.1, poisson_ratio: 0.5}");
+  const std::string block = "youngs_modulus_mpa: 0.1  # Ecoflex\n    poisson_ratio: 0.5";
+  ExpectEdited(Replaced(Cylinder(), "{youngs_modulus_mpa: 0.1, poisson_ratio: 0.5}", "\n    " + block),
+               block);
+  const auto bad = WithMaterial("m.yaml", "{}", kRubber, {0.1, ""});
+  ASSERT_FALSE(bad.ok());
+  EXPECT_THAT(bad.error().message, HasSubstr("m.yaml"));
+}
+
+TEST(ModelFile, MaterialThatCannotBeEditedIsSaid) {
+  const auto edited = WithMaterial("m.yaml", Replaced(Cylinder(), "material: {", "material: &m {"), kRubber,
+                                   {0.0021, "test"});
+  ASSERT_FALSE(edited.ok());
+  EXPECT_EQ(edited.error().code, ErrorCode::kUnsupported);
+  EXPECT_THAT(edited.error().message, HasSubstr("by hand material: {youngs_modulus_mpa: 0.1234"));
+}
+
+TEST(ModelFile, EvidenceBelongsToVersion2) {
+  const std::string with = Replaced(Cylinder(), "poisson_ratio: 0.5}",
+                                    "poisson_ratio: 0.5, evidence: {standard_deviation_mpa: 0.01, from: x}}");
+  const auto old = ParseLinkModel("m.yaml", with);
+  ASSERT_FALSE(old.ok());
+  EXPECT_THAT(old.error().message, HasSubstr("'skin.material.evidence' is not a known key"));
+  const auto model = ParseLinkModel("m.yaml", Replaced(with, "taclink_model: 1", "taclink_model: 2"));
+  ASSERT_TRUE(model.ok()) << model.error().message;
+  EXPECT_EQ(model->material_evidence->sigma_mpa, 0.01);
+}
+
 TEST(ModelFile, UnknownNameListsTheShippedOnes) {
   const auto model = LoadLinkModel("no-such-model");
   ASSERT_FALSE(model.ok());

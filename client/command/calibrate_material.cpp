@@ -1,0 +1,222 @@
+#include "client/command/calibrate_material.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/command/bench_files.h"
+#include "client/command/csv.h"
+#include "client/command/marker_csv.h"
+#include "client/command/material_report.h"
+#include "client/command/probe_csv.h"
+#include "sensing/camera/calibration.h"
+#include "sensing/capture/image_io.h"
+#include "sensing/model/model_file.h"
+#include "sensing/pipeline/link_pipeline.h"
+
+namespace taclink::command {
+namespace {
+
+constexpr double kMpaPerKpa = 1e-3;
+constexpr size_t kInflationWords = 2, kPictureWords = 3;
+
+struct MaterialOptions {
+  std::string model;
+  std::vector<std::string> inflations;  // pressure and file by turns
+  std::vector<std::string> pictures;    // pressure, top and bottom by turns
+  std::vector<std::string> rest;
+  std::string calibration;
+  std::string probe;
+  double probe_diameter_mm = 5.5;
+  double sigma_mm = 0.05;
+  std::string law = "both";
+  std::string out;
+  bool json = false;
+};
+
+Result<double> PressureMpa(const std::string& text, const std::string& of) {
+  double kpa = 0;
+  if (ParseWhole(text, kpa)) return kpa * kMpaPerKpa;
+  return Error{ErrorCode::kInvalidArgument,
+               of + ": '" + text + "' is no pressure in kPa; it stands before the files"};
+}
+
+Result<void> AddMarkerFiles(const MaterialOptions& options, const LinkModel& model,
+                            std::vector<InflationRecord>& records) {
+  for (size_t i = 0; i < options.inflations.size(); i += kInflationWords) {
+    const std::string& file = options.inflations[i + 1];
+    const auto pressure = PressureMpa(options.inflations[i], "--inflation");
+    if (!pressure) return pressure.error();
+    auto shape = ReadMarkerCsv(file, model, options.sigma_mm);
+    if (!shape) return shape.error();
+    records.push_back({file, *pressure, std::move(shape->measured)});
+  }
+  return {};
+}
+
+Result<void> ReadPair(const std::string& top, const std::string& bottom, StereoFrame& frame) {
+  if (auto read = ReadRawImage(top, frame.images[Index(CameraId::kTop)]); !read) return read.error();
+  return ReadRawImage(bottom, frame.images[Index(CameraId::kBottom)]);
+}
+
+Result<void> AddPictures(const MaterialOptions& options, const LinkModel& model,
+                         std::vector<InflationRecord>& records) {
+  if (options.pictures.empty()) return {};
+  PipelineOptions how;
+  how.rest_frames = 1;
+  how.always_acquire = true;  // the pictures are far apart
+  if (!options.calibration.empty()) {
+    auto rig = LoadCalibration(options.calibration, model);
+    if (!rig) return rig.error();
+    how.rig = *rig;
+  }
+  LinkPipeline pipeline(model, how);
+  StereoFrame frame;
+  LinkState state;
+  frame.pressure_mpa = 0;
+  if (auto read = ReadPair(options.rest[0], options.rest[1], frame); !read) return read;
+  pipeline.Process(frame, state);
+  if (!pipeline.calibration()) {
+    return Error{ErrorCode::kInvalidArgument, "the rest pictures can't be used: " + state.status_reason};
+  }
+  for (size_t i = 0; i < options.pictures.size(); i += kPictureWords) {
+    const std::string& top = options.pictures[i + 1];
+    const auto pressure = PressureMpa(options.pictures[i], "--pictures");
+    if (!pressure) return pressure.error();
+    if (auto read = ReadPair(top, options.pictures[i + 2], frame); !read) return read;
+    frame.pressure_mpa = *pressure;
+    ++frame.sequence;
+    pipeline.Process(frame, state);
+    if (!state.measured())
+      return Error{ErrorCode::kInvalidArgument, top + ": can't be solved: " + state.status_reason};
+    records.push_back({top, *pressure, state.shape.measured});
+  }
+  return {};
+}
+
+std::vector<MaterialLaw> LawsOf(const std::string& name) {
+  std::vector<MaterialLaw> laws;
+  for (const MaterialLaw law : {MaterialLaw::kSaintVenantKirchhoff, MaterialLaw::kNeoHookean}) {
+    if (name == "both" || name == Name(law)) laws.push_back(law);
+  }
+  return laws;
+}
+
+Result<MaterialChoice> FitLaws(const MaterialOptions& options, const LinkModel& model,
+                               const std::vector<InflationRecord>& inflations,
+                               const std::vector<ProbeRecord>& probes) {
+  std::vector<MaterialFit> fits;
+  std::vector<MaterialChoice::Refusal> refusals;
+  bool told = false;
+  for (const MaterialLaw law : LawsOf(options.law)) {
+    MaterialFitOptions how;
+    how.progress = [&told, law](int solved) {
+      if (isatty(STDERR_FILENO) == 0) return;
+      told = true;
+      fmt::print(stderr, "\r{}: {} solutions of the skin ", Name(law), solved);
+    };
+    auto fit = FitMaterial(model, law, inflations, probes, how);
+    if (told) fmt::print(stderr, "\n");
+    if (fit) {
+      fits.push_back(*std::move(fit));
+    } else {
+      refusals.push_back({law, fit.error()});
+    }
+  }
+  if (fits.empty()) return refusals.front().why;
+  return ChooseLaw(std::move(fits), std::move(refusals), model.material.law);
+}
+
+Result<void> CalibrateMaterial(const MaterialOptions& options) {
+  const auto model = LoadLinkModel(options.model);
+  if (!model) return model.error();
+  std::vector<InflationRecord> inflations;
+  if (auto read = AddMarkerFiles(options, *model, inflations); !read) return read;
+  if (auto read = AddPictures(options, *model, inflations); !read) return read;
+  std::vector<ProbeRecord> probes;
+  if (!options.probe.empty()) {
+    auto read = ReadProbeCsv(options.probe, *model, options.probe_diameter_mm);
+    if (!read) return read.error();
+    probes = *std::move(read);
+  }
+  const auto choice = FitLaws(options, *model, inflations, probes);
+  if (!choice) return choice.error();
+  if (!options.out.empty()) {
+    const auto text = LinkModelText(options.model);
+    if (!text) return text.error();
+    const auto written =
+        WithMaterial(options.model, *text, choice->fit().material, EvidenceOf(choice->fit()));
+    if (!written) return written.error();
+    if (auto saved = WriteText(options.out, *written); !saved) return saved;
+  }
+  if (options.json) {
+    PrintMaterialJson(*model, *choice);
+  } else {
+    PrintMaterialText(*model, *choice);
+    if (!options.out.empty()) fmt::print("\nwritten: {}\n", options.out);
+  }
+  return {};
+}
+
+void CheckWords(const MaterialOptions& options) {
+  if (options.inflations.empty() && options.pictures.empty() && options.probe.empty())
+    throw CLI::RequiredError("--inflation, --pictures or --probe");
+  if (options.inflations.size() % kInflationWords != 0)
+    throw CLI::ValidationError("--inflation", "needs a pressure in kPa and a FILE each time");
+  if (options.pictures.size() % kPictureWords != 0)
+    throw CLI::ValidationError("--pictures", "needs a pressure in kPa, a TOP and a BOTTOM picture each time");
+}
+
+}  // namespace
+
+void AddCalibrateMaterial(CLI::App& calibrate, Selected& selected) {
+  auto options = std::make_shared<MaterialOptions>();
+  CLI::App* command = calibrate.add_subcommand(
+      "material",
+      "Young's modulus and law of a skin from inflation at known pressures and from probe forces");
+  command->add_option("--model", options->model, "Link model: a shipped name or a YAML file")->required();
+  command
+      ->add_option("--inflation", options->inflations,
+                   "KPA FILE: gauge pressure and the untouched skin's markers at it (CSV with columns "
+                   "path,ring,ux,uy,uz); again for more pressures")
+      ->expected(static_cast<int>(kInflationWords), 2000);
+  auto* pictures = command
+                       ->add_option("--pictures", options->pictures,
+                                    "KPA TOP BOTTOM: gauge pressure and the untouched skin's pictures at it; "
+                                    "again for more pressures")
+                       ->expected(static_cast<int>(kPictureWords), 3000);
+  auto* rest = command
+                   ->add_option("--rest", options->rest,
+                                "TOP and BOTTOM picture of the untouched skin without pressure")
+                   ->expected(2)
+                   ->needs(pictures);
+  pictures->needs(rest);
+  command->add_option("--calibration", options->calibration, "Camera parameters; without, found from --rest")
+      ->needs(rest);
+  command->add_option("--probe", options->probe,
+                      "CSV of forces on a flat disc pressed against markers: columns ring (or j), depth_mm "
+                      "(from the uninflated radius), pressure_kpa, force_n");
+  command->add_option("--probe-diameter-mm", options->probe_diameter_mm, "Of the disc")
+      ->check(Within(0.1, 1e3))
+      ->capture_default_str();
+  command
+      ->add_option("--sigma-mm", options->sigma_mm,
+                   "With --inflation: the markers' standard deviation in x and y; z: 3 times")
+      ->check(Within(1e-4, 10))
+      ->capture_default_str();
+  command->add_option("--law", options->law, "The law to fit; both are compared")
+      ->check(CLI::IsMember({"both", "saint_venant_kirchhoff", "neo_hookean"}))
+      ->capture_default_str();
+  command->add_option("-o,--out", options->out, "Model file to write: --model's with the new material");
+  command->add_flag("--json", options->json, "One JSON object, with every record's residuals");
+  command->callback([options, &selected] {
+    CheckWords(*options);
+    selected = [options] { return CalibrateMaterial(*options); };
+  });
+}
+
+}  // namespace taclink::command

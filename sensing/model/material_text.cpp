@@ -1,0 +1,113 @@
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+
+#include "sensing/model/model_file.h"
+
+namespace taclink {
+namespace {
+
+constexpr const char* kVersion = "2";
+
+std::string Quoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += static_cast<unsigned char>(c) < ' ' ? ' ' : c;
+  }
+  return quoted + "\"";
+}
+
+std::string MaterialText(const Material& material, const MaterialEvidence& evidence) {
+  char numbers[160];
+  std::snprintf(numbers, sizeof numbers, "youngs_modulus_mpa: %.6g, poisson_ratio: %.6g, law: %s",
+                material.youngs_modulus_mpa, material.poisson_ratio, Name(material.law));
+  char sigma[64];
+  std::snprintf(sigma, sizeof sigma, "standard_deviation_mpa: %.3g", evidence.sigma_mpa);
+  return std::string("{") + numbers + ", evidence: {" + sigma + ", from: " + Quoted(evidence.source) + "}}";
+}
+
+// Where a node begins; yaml-cpp counts lines and columns from 0.
+size_t Begin(const std::string& text, const YAML::Node& node) {
+  size_t at = 0;
+  for (int line = 0; line < node.Mark().line; ++line) at = text.find('\n', at) + 1;
+  return at + static_cast<size_t>(node.Mark().column);
+}
+
+// One past the closing brace of the flow mapping at `at`.
+size_t EndOfFlow(const std::string& text, size_t at) {
+  int depth = 0;
+  char quote = 0;
+  for (; at < text.size(); ++at) {
+    const char c = text[at];
+    if (quote != 0) {
+      quote = c == quote ? char{0} : quote;
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '{') {
+      ++depth;
+    } else if (c == '}' && --depth == 0) {
+      return at + 1;
+    }
+  }
+  return at;
+}
+
+// One past the last line of the block mapping whose first key is at `at`; empty lines and comments after it
+// are not its own.
+size_t EndOfBlock(const std::string& text, size_t at, size_t column) {
+  size_t end = at;
+  for (size_t line = at - column; line < text.size();) {
+    const size_t next = std::min(text.find('\n', line), text.size());
+    const size_t first = text.find_first_not_of(" \t\r", line);
+    if (first != std::string::npos && first < next && text[first] != '#') {
+      if (first - line < column) break;
+      end = next;
+    }
+    line = next + 1;
+  }
+  return end;
+}
+
+}  // namespace
+
+Result<std::string> LinkModelText(const std::string& name_or_path) {
+  if (const auto text = ShippedModelText(name_or_path); !text.empty()) return std::string(text);
+  const std::ifstream file(name_or_path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file) return Error{ErrorCode::kNotFound, name_or_path + ": cannot be read; check the path"};
+  return text.str();
+}
+
+Result<std::string> WithMaterial(const std::string& name, const std::string& content,
+                                 const Material& material, const MaterialEvidence& evidence) {
+  const auto before = ParseLinkModel(name, content);
+  if (!before) return before.error();
+  const YAML::Node root = YAML::Load(content);
+  const YAML::Node version = root["taclink_model"], node = root["skin"]["material"];
+  const size_t begin = Begin(content, node), version_begin = Begin(content, version);
+  const bool flow = begin < content.size() && content[begin] == '{';
+  const size_t end =
+      flow ? EndOfFlow(content, begin) : EndOfBlock(content, begin, static_cast<size_t>(node.Mark().column));
+  const size_t version_size = version.Scalar().size();
+  std::string text = content;
+  const auto put = [&text](size_t at, size_t size, const std::string& with) { text.replace(at, size, with); };
+  // The later one first: it moves what follows.
+  if (version_begin > begin) put(version_begin, version_size, kVersion);
+  put(begin, end - begin, MaterialText(material, evidence));
+  if (version_begin < begin) put(version_begin, version_size, kVersion);
+  const auto after = ParseLinkModel(name, text);
+  if (!after || after->material.law != material.law || !after->material_evidence ||
+      after->markers.count() != before->markers.count()) {
+    return Error{ErrorCode::kUnsupported,
+                 name + ": its material is written in a way that can't be edited; put in by hand material: " +
+                     MaterialText(material, evidence) + " and taclink_model: " + kVersion};
+  }
+  return text;
+}
+
+}  // namespace taclink
