@@ -17,6 +17,7 @@ using ::testing::HasSubstr;
 // missed the rest finds it later.
 constexpr const char* kScene = R"(taclink_scene: 1
 name: steady
+skin: linear  # as the force model
 model: cylinder
 frame_rate_hz: 20
 duration_s: 20
