@@ -8,9 +8,9 @@
 namespace taclink {
 namespace {
 
-constexpr double kTolerance = 1e-6;        // of E t^2, of each entry of the residual
-constexpr double kForceTolerance = 2e-4;   // of a disc's force
-constexpr double kLeastForceShare = 1e-5;  // of E t^2: what a disc's force need not be nearer to
+constexpr double kTolerance = 5e-8;        // of E t^2, of each entry of the residual
+constexpr double kForceTolerance = 5e-5;   // of a disc's force
+constexpr double kLeastForceShare = 2e-6;  // of E t^2: what a disc's force need not be nearer to
 constexpr double kWorthKeeping = 0.5;      // a kept matrix must shrink the misfit by this each time
 constexpr int kMostIterations = 80, kMostFactorizations = 14;
 constexpr double kMostStepMm = 4, kMostTurn = 0.5, kMostDepthStepMm = 2;
@@ -150,11 +150,14 @@ Eigen::VectorXd DiscSkin::DepthGradient(size_t disc, const SkinDisc& place, doub
 }
 
 // What the searched discs' depths do to the skin, with the matrix at hand: a disc's force is the energy's
-// derivative by its depth, hence one matrix serves both.
+// derivative by its depth, hence one matrix serves both. A disc is about as stiff as the skin under it; their
+// difference counts, so that both must be of the state that the matrix is of.
 void DiscSkin::LearnDepths(const SkinLoad& load, const SkinBalance& balance) {
   const auto n = static_cast<Eigen::Index>(searched_.size());
+  learnt_with_ = factorizations_;
   by_depth_.resize(shell_.dof_count(), n);
   stiffness_.setZero(n, n);
+  answer_.resize(shell_.dof_count(), n);
   if (n == 0) return;
   for (Eigen::Index k = 0; k < n; ++k) {
     const size_t i = searched_[static_cast<size_t>(k)];
@@ -261,7 +264,8 @@ BalanceSummary DiscSkin::Balance(const SkinLoad& load, SkinBalance& balance) {
     }
     if (summary.iterations >= kMostIterations || factorizations_ - before >= kMostFactorizations)
       return ended(BalanceStop::kMaxIterations);
-    const bool slow = misfit > kWorthKeeping * last;  // also at first: last is 0
+    // Also at first: last is 0.
+    const bool slow = misfit > kWorthKeeping * last || searched != searched_;
     if (last > 0 && misfit > last && !fresh) {
       balance = last_good;
       misfit = Misfit(load, balance);
@@ -269,8 +273,6 @@ BalanceSummary DiscSkin::Balance(const SkinLoad& load, SkinBalance& balance) {
     if (slow) {
       if (!Factorize(balance.state)) return ended(BalanceStop::kUnstable);
       moved_mm = 0;
-    }
-    if (slow || searched != searched_) {
       LearnDepths(load, balance);
       taken_.clear();
     }
@@ -299,7 +301,7 @@ SkinRates DiscSkin::RatesAt(const SkinLoad& before, const SkinLoad& after, doubl
   const Eigen::VectorXd gradient = gradient_, excess = excess_;
   Misfit(after, balance);
   const Eigen::VectorXd forces = (gradient - gradient_) / span, disc_forces = (excess - excess_) / span;
-  LearnDepths(after, balance);
+  if (learnt_with_ != factorizations_ || answer_.cols() != disc_forces.size()) LearnDepths(after, balance);
   Solve(forces, disc_forces);
   SkinRates rates;
   for (size_t node = 0; node < balance.state.mids_mm.size(); ++node) {

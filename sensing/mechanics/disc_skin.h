@@ -107,6 +107,7 @@ class DiscSkin {
   std::vector<const ElementLoad*> loads_;
   std::unique_ptr<Factor> factor_;
   int factorizations_ = 0;
+  int learnt_with_ = -1;  // which of them
   // Of the current iteration.
   std::vector<size_t> searched_;       // discs whose depth is unknown
   Eigen::VectorXd gradient_, excess_;  // of their forces over what is asked

@@ -29,8 +29,8 @@ NonlinearSkin::NonlinearSkin(const LinkModel& model, const Scene& scene, std::ve
       nodes_{mesh_.mid_mm, mesh_.normals} {
   char text[128];
   const double megabytes = 1e-6 * solved.keys * 2 * 6 * sizeof(float) * mesh_.node_count();
-  std::snprintf(text, sizeof text, "%d states of %d nodes, %.1f MB, %d factorizations", solved.keys,
-                mesh_.node_count(), megabytes, solved.factorizations);
+  std::snprintf(text, sizeof text, "%d equilibria of %d nodes, %.1f MB, solved with %d factorizations",
+                solved.keys, mesh_.node_count(), megabytes, solved.factorizations);
   preparation_ = text;
 }
 

@@ -115,10 +115,22 @@ SkinLoad SceneLoads::At(const ScenePart& part, double time_s, double on_at_s) co
       disc.force_n = level * *contact.force_n;
       continue;
     }
-    const double free = level < 1 ? FreeDepth(i, spot, load.pressure_mpa) : 0;
-    disc.depth_mm = std::min(disc.depth_mm, (1 - level) * free + level * *contact.depth_mm);
+    disc.depth_mm = std::min(disc.depth_mm, AskedDepth(i, spot, level, load.pressure_mpa));
   }
   return load;
+}
+
+double SceneLoads::AskedDepth(size_t contact, const SkinSpot& spot, double level, double pressure_mpa) const {
+  const double free = level < 1 ? FreeDepth(contact, spot, pressure_mpa) : 0;
+  return (1 - level) * free + level * *scene_.contacts[contact].depth_mm;
+}
+
+bool SceneLoads::StopsShort(size_t contact, const SkinLoad& load, double time_s) const {
+  const SkinDisc& disc = load.discs[contact];
+  if (!disc.on || disc.force_n) return false;
+  const ContactPlan& plan = plans_[contact];
+  const double level = plan.ramp_s == 0 ? 1 : plan.Level(time_s);
+  return AskedDepth(contact, {disc.angle_rad, disc.z_mm}, level, load.pressure_mpa) > disc.depth_mm;
 }
 
 }  // namespace taclink

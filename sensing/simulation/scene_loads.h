@@ -31,6 +31,9 @@ class SceneLoads {
   SkinLoad At(const ScenePart& part, double time_s, double on_at_s) const;
   SkinLoad At(const ScenePart& part, double time_s) const { return At(part, time_s, time_s); }
 
+  /// The tube stops a contact before the depth that the scene asks for.
+  bool StopsShort(size_t contact, const SkinLoad& load, double time_s) const;
+
   /// Pressures at which to give the skin without contacts, for where contacts of a given depth begin; none if
   /// there are none of those, or no pressure.
   std::vector<double> FreePressures() const;
@@ -42,6 +45,7 @@ class SceneLoads {
  private:
   void FindParts();
   double PressureMpa(const ScenePart& part, double time_s) const;
+  double AskedDepth(size_t contact, const SkinSpot& spot, double level, double pressure_mpa) const;
   double FreeDepth(size_t contact, const SkinSpot& spot, double pressure_mpa) const;
 
   LinkModel model_;

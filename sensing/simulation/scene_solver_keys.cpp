@@ -39,7 +39,8 @@ SkinKey SceneSolver::MakeKey(const ScenePart& part, const Around& around, double
           static_cast<float>(depth);
     }
     if (!on) rates[i].setZero();
-    key.contacts.push_back({now[i], rates[i], on, balance.limited[i]});
+    key.contacts.push_back(
+        {now[i], rates[i], on, balance.limited[i] || loads_.StopsShort(i, around.now, time_s)});
   }
   return key;
 }
