@@ -42,7 +42,7 @@ struct LinkConfig {
   SourceConfig source;
   std::optional<std::string> calibration;                       ///< path; none: from the first rest picture
   std::optional<double> pressure_kpa;                           ///< gauge, constant; none: the source's, or 0
-  std::optional<ForceModel> force_model = ForceModel::kLinear;  ///< none: the cheapest that is good enough
+  std::optional<ForceModel> force_model;  ///< none: the cheapest that is good enough, frame by frame
   std::array<double, 3> position_mm{};  ///< of the link frame's origin in the base frame
   /// Roll, pitch, yaw about the base frame's fixed x, y, z, applied in this order (as in URDF).
   std::array<double, 3> rotation_deg{};

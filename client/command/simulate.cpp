@@ -83,6 +83,8 @@ Result<void> Simulate(const SimulateOptions& options) {
   }
   truth_file.flush();
   if (!truth_file) return Error{ErrorCode::kUnavailable, options.out + ": the disk is full"};
+  if (const std::string prepared = (*skin)->Preparation(); !prepared.empty())
+    std::printf("skin: %s\n", prepared.c_str());
   std::printf("%d picture pairs, rest_top.png, rest_bottom.png and truth.jsonl in %s\n", frames,
               options.out.c_str());
   return {};

@@ -22,7 +22,7 @@ struct SolveOptions {
   std::string calibration;
   double pressure_kpa = 0;
   double sigma_mm = 0.05;
-  std::string force_model = "linear";
+  std::string force_model = "auto";
   bool json = false;
 };
 

@@ -38,6 +38,7 @@ class Generator {
     Scene& scene = result_.scene;
     scene.name = result_.name;
     scene.model = model.name;
+    scene.skin = SkinKind::kLinear;  // hundreds of scenes share its responses
     scene.frame_rate_hz = kRateHz;
     scene.loop = false;
     scene.seed = bits >> 12;

@@ -9,8 +9,8 @@
 #include <thread>
 
 #include "sensing/mechanics/linear_shell.h"
+#include "sensing/simulation/linear_skin.h"
 #include "sensing/simulation/renderer.h"
-#include "sensing/simulation/simulated_skin.h"
 
 namespace taclink {
 namespace {
@@ -38,7 +38,7 @@ using MethodPool = std::map<std::string, std::vector<std::unique_ptr<VisionMetho
 Result<SceneOutcome> Play(const Link& link, const EvaluationScene& scene, const VisionBenchOptions& options,
                           MethodPool& pool) {
   const LinkModel& model = *link.model;
-  auto skin = SimulatedSkin::Make(model, scene.scene, link.shell);
+  auto skin = LinearSkin::Make(model, scene.scene, link.shell);
   if (!skin) return skin.error();
   const StereoRig rig = MountedRig(model.nominal_rig, scene.scene.camera);
   const Renderer renderer(model, rig, scene.scene.camera, scene.scene.seed);

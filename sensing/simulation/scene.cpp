@@ -108,6 +108,9 @@ Result<Scene> ReadScene(YamlFile file) {
   scene.name = root.Text("name");
   scene.description = root.Text("description", "");
   scene.model = root.Text("model", "cylinder");
+  scene.skin =
+      root.Choice("skin", {"linear", "nonlinear"}, 1) == 0 ? SkinKind::kLinear : SkinKind::kNonlinear;
+  scene.refinement = root.Integer("refinement", scene.refinement, {.min = 1, .max = 4});
   scene.frame_rate_hz = root.Number("frame_rate_hz", 30.0, {.min = 0.1, .max = 1000});
   scene.duration_s = root.Number("duration_s", {.min = 0.01, .max = 1e6});
   scene.loop = root.Bool("loop", true);

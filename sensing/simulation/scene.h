@@ -20,14 +20,16 @@ struct SkinPlace {
   double z_mm = 0;
 };
 
-/// Something that pushes along the skin's inward normal with an even load over a round patch.
+/// Something that pushes along the skin's inward normal with a round patch.
 struct SceneContact {
   SkinPlace at;
   std::optional<SkinPlace> move_to;  ///< slides there from begin to end at an even speed
   double patch_diameter_mm = 5.5;
   // Exactly one of the two is set.
   std::optional<double> force_n;
-  std::optional<double> depth_mm;  ///< of the centre, along the normal from the undeformed surface
+  /// Of the centre, along the normal from the undeformed surface. Ramps begin and end where the skin would
+  /// be.
+  std::optional<double> depth_mm;
   double begin_s = 0;
   double end_s = 0;
   double ramp_s = 0;  ///< smooth rise after begin and fall before end
@@ -61,11 +63,19 @@ struct CameraEffects {
   std::array<MountError, kCameraCount> mount = {};
 };
 
+/// How a simulated skin answers.
+enum class SkinKind : uint8_t {
+  kLinear,     ///< small displacements, which superpose; a contact is an even load over its patch
+  kNonlinear,  ///< displacements of any size, pressure that follows; a contact is a flat rigid disc
+};
+
 /// What happens to a simulated link, over time.
 struct Scene {
   std::string name;
   std::string description;
   std::string model;  ///< a shipped link model's name or a file's path
+  SkinKind skin = SkinKind::kNonlinear;
+  int refinement = 2;  ///< of a nonlinear skin: elements per interval of the marker grid
   double frame_rate_hz = 30;
   double duration_s = 0;
   bool loop = true;

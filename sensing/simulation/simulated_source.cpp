@@ -2,26 +2,35 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <string>
 #include <utility>
 
 namespace taclink {
 
 Result<std::unique_ptr<SimulatedSource>> SimulatedSource::Make(const LinkModel& model, const Scene& scene,
                                                                Clock& clock) {
+  const int64_t start_ns = clock.MonotonicNs();
   auto skin = SimulatedSkin::Make(model, scene);
   if (!skin) return skin.error();
-  return std::unique_ptr<SimulatedSource>(new SimulatedSource(model, scene, clock, std::move(*skin)));
+  const double took_s = 1e-9 * static_cast<double>(clock.MonotonicNs() - start_ns);
+  return std::unique_ptr<SimulatedSource>(new SimulatedSource(model, scene, clock, std::move(*skin), took_s));
 }
 
 SimulatedSource::SimulatedSource(const LinkModel& model, Scene scene, Clock& clock,
-                                 std::unique_ptr<SimulatedSkin> skin)
+                                 std::unique_ptr<SimulatedSkin> skin, double took_s)
     : scene_(std::move(scene)),
       clock_(clock),
       skin_(std::move(skin)),
       renderer_(model, MountedRig(model.nominal_rig, scene_.camera), scene_.camera, scene_.seed) {
   const CameraModel& camera = model.nominal_rig[CameraId::kTop];
-  info_ = {"simulated scene '" + scene_.name + "' on model '" + model.name + "'", camera.width_px,
-           camera.height_px, scene_.frame_rate_hz};
+  name_ = "simulated scene '" + scene_.name + "' on model '" + model.name + "'";
+  info_ = {name_, camera.width_px, camera.height_px, scene_.frame_rate_hz};
+  if (const std::string prepared = skin_->Preparation(); !prepared.empty()) {
+    char took[32];
+    std::snprintf(took, sizeof took, " in %.1f s", took_s);
+    info_.description += " (" + prepared + took + ")";
+  }
   truth_.contacts.reserve(kMaxSceneContacts);
 }
 
@@ -42,7 +51,7 @@ int64_t SimulatedSource::ExposureNs(uint64_t frame) const {
 }
 
 Result<void> SimulatedSource::Next(StereoFrame& frame, std::chrono::milliseconds timeout) {
-  if (!started_) return Error{ErrorCode::kUnavailable, info_.description + ": not started"};
+  if (!started_) return Error{ErrorCode::kUnavailable, name_ + ": not started"};
   const int64_t now = clock_.MonotonicNs();
   const int64_t deadline = now + std::chrono::nanoseconds(timeout).count();
   uint64_t due = next_frame_;
@@ -51,11 +60,11 @@ Result<void> SimulatedSource::Next(StereoFrame& frame, std::chrono::milliseconds
     due += std::max<uint64_t>(1, behind > 2 ? static_cast<uint64_t>(behind) - 1 : 1);
   }
   if (!scene_.loop && static_cast<double>(due) > scene_.duration_s * scene_.frame_rate_hz)
-    return Error{ErrorCode::kEndOfData, info_.description + ": the scene is over"};
+    return Error{ErrorCode::kEndOfData, name_ + ": the scene is over"};
   const int64_t exposure = ExposureNs(due);
   if (exposure > deadline) {
     clock_.SleepUntilMonotonicNs(deadline);
-    return Error{ErrorCode::kTimeout, info_.description + ": no frame yet"};
+    return Error{ErrorCode::kTimeout, name_ + ": no frame yet"};
   }
   if (exposure > now) clock_.SleepUntilMonotonicNs(exposure);
   Take(due, frame);

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <opencv2/core.hpp>
+#include <string>
 
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
@@ -30,7 +31,8 @@ class SimulatedSource final : public FrameSource {
   const SkinTruth& truth() const { return truth_; }
 
  private:
-  SimulatedSource(const LinkModel& model, Scene scene, Clock& clock, std::unique_ptr<SimulatedSkin> skin);
+  SimulatedSource(const LinkModel& model, Scene scene, Clock& clock, std::unique_ptr<SimulatedSkin> skin,
+                  double took_s);
   int64_t ExposureNs(uint64_t frame) const;
   void Take(uint64_t frame_number, StereoFrame& frame);
 
@@ -39,6 +41,7 @@ class SimulatedSource final : public FrameSource {
   Clock& clock_;
   std::unique_ptr<SimulatedSkin> skin_;
   Renderer renderer_;
+  std::string name_;  // for messages
   SourceInfo info_;
   // Changed by Start and Next.
   bool started_ = false;

@@ -1,6 +1,8 @@
 #include "server/assembly/arm_builder.h"
 
+#include <future>
 #include <utility>
+#include <vector>
 
 #include "sensing/model/model_file.h"
 #include "server/assembly/encoder.h"
@@ -30,8 +32,13 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
 Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock) {
   std::vector<LinkParts> links;
   std::vector<std::string> names;
-  for (const LinkConfig& link : config.links) {
-    auto parts = BuildLink(link, clock);
+  // Simulated links solve their scenes first.
+  std::vector<std::future<Result<LinkParts>>> built;
+  for (const LinkConfig& link : config.links)
+    built.push_back(std::async(std::launch::async, [&link, &clock] { return BuildLink(link, clock); }));
+  for (size_t i = 0; i < built.size(); ++i) {
+    const LinkConfig& link = config.links[i];
+    auto parts = built[i].get();
     if (!parts) return Error{parts.error().code, "link '" + link.name + "': " + parts.error().message};
     links.push_back(std::move(*parts));
     names.push_back(link.name);

@@ -22,6 +22,7 @@ Scene PushScene(const LinkModel& model, int marker) {
   Scene scene;
   scene.name = "push";
   scene.model = model.name;
+  scene.skin = SkinKind::kLinear;  // as the force model
   scene.frame_rate_hz = kRateHz;
   scene.duration_s = 3;
   scene.seed = static_cast<uint64_t>(marker) + 1;

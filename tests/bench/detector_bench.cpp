@@ -15,6 +15,7 @@ void DetectOne(benchmark::State& state, const CameraEffects& effects) {
   cv::setNumThreads(1);
   const LinkModel model = LoadLinkModel("cylinder").value();
   Scene scene = LoadScene("press").value();
+  scene.skin = SkinKind::kLinear;
   scene.contacts.front().force_n.reset();
   scene.contacts.front().depth_mm = 12;
   const auto skin = SimulatedSkin::Make(model, scene).value();

@@ -23,11 +23,17 @@ namespace {
 
 constexpr double kRestS = 0, kTouchedS = 3;
 
+Scene LinearPress() {
+  Scene scene = LoadScene("press").value();
+  scene.skin = SkinKind::kLinear;
+  return scene;
+}
+
 // One link with its pictures at rest and touched.
 struct Bench {
   explicit Bench(const std::string& model_name)
       : model(LoadLinkModel(model_name).value()),
-        scene(LoadScene("press").value()),
+        scene(LinearPress()),
         skin(SimulatedSkin::Make(model, scene).value()),
         renderer(model, model.nominal_rig, scene.camera, 1) {
     cv::setNumThreads(1);

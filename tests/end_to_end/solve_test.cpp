@@ -8,12 +8,12 @@
 namespace taclink::testing {
 namespace {
 
-// One push of 0.2 N, pictures with 0.3 px of noise on every marker.
+// One push of 0.1 N, pictures with 0.3 px of noise on every marker.
 std::string PushScene(const std::string& model, int path, int ring, int seed) {
   return "taclink_scene: 1\nname: push\nmodel: " + model +
          "\nframe_rate_hz: 10\nduration_s: 3\nseed: " + std::to_string(seed) +
          "\ncontacts:\n  - {at: {path: " + std::to_string(path) + ", ring: " + std::to_string(ring) +
-         "}, force_n: 0.2, begin_s: 1, end_s: 2.9, ramp_s: 0.2}\ncamera: {marker_jitter_px: 0.3}\n";
+         "}, force_n: 0.1, begin_s: 1, end_s: 2.9, ramp_s: 0.2}\ncamera: {marker_jitter_px: 0.3}\n";
 }
 
 struct Case {

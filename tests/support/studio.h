@@ -36,6 +36,7 @@ class Studio {
                                       "\nduration_s: 2\ncontacts:\n" + contacts)
                   .value();
     }
+    scene.skin = SkinKind::kLinear;
     scene.duration_s = 2;
     scene.pressure = {{0, pressure_kpa}};
     SkinTruth truth;

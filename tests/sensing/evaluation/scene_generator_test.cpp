@@ -7,7 +7,7 @@
 
 #include "sensing/mechanics/linear_shell.h"
 #include "sensing/model/model_file.h"
-#include "sensing/simulation/simulated_skin.h"
+#include "sensing/simulation/linear_skin.h"
 
 namespace taclink {
 namespace {
@@ -78,7 +78,7 @@ TEST_F(SceneGeneratorTest, ScenesAreWithinTheirLimitsAndBeginAtRest) {
       deepest = std::max(deepest, *contact.depth_mm);
     }
     const auto& [model, shell] = links[scene.model];
-    auto skin = SimulatedSkin::Make(*model, scene.scene, shell);
+    auto skin = LinearSkin::Make(*model, scene.scene, shell);
     ASSERT_TRUE(skin.ok()) << skin.error().message;
     SkinTruth truth;
     for (int frame = 0; frame < kRestFrames; ++frame) {

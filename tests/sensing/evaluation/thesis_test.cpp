@@ -65,6 +65,7 @@ TEST_P(ThesisTest, SelfCalibrationFindsACoaxialCamera) {
 // behind it slip along the path, by the method itself.)
 TEST_P(ThesisTest, WorksOnIdealPictures) {
   Scene scene;
+  scene.skin = SkinKind::kLinear;
   scene.duration_s = 4;
   scene.loop = false;
   scene.camera = {.sensor_noise_levels = 0, .mount = {}};

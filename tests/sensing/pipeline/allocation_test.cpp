@@ -18,6 +18,7 @@ class AllocationTest : public testing::TestWithParam<std::string> {};
 
 TEST_P(AllocationTest, TrackedFramesAllocateNothing) {
   Scene scene;
+  scene.skin = SkinKind::kLinear;
   scene.model = GetParam();
   scene.duration_s = 10;
   scene.pressure = {{0, 0}};

@@ -13,6 +13,7 @@ constexpr double kFrameS = 1 / 30.0;
 
 Scene SceneOf(const std::string& model) {
   Scene scene;
+  scene.skin = SkinKind::kLinear;
   scene.name = "test";
   scene.model = model;
   scene.duration_s = 60;

@@ -22,6 +22,7 @@ inline std::vector<Vec3> TrueMarkers(const LinkModel& model, const std::vector<P
   Scene scene;
   scene.name = "test";
   scene.model = model.name;
+  scene.skin = SkinKind::kLinear;
   scene.duration_s = 2;
   scene.pressure = {{0, pressure_mpa * 1e3}};
   for (const Push& push : pushes) {

@@ -27,8 +27,25 @@ TEST(Scene, ShippedOnesBeginUntouchedAndFitBothEnds) {
     for (int i = 0; i <= 10; ++i) EXPECT_EQ(scene->PressureKpa(0.1 * i), 0);
     EXPECT_EQ(scene->PressureKpa(scene->duration_s), 0);
     for (const SceneContact& contact : scene->contacts) EXPECT_GE(contact.begin_s, 1);
-    EXPECT_TRUE(SimulatedSkin::Make(Model(scene->model), *scene).ok());
+    EXPECT_EQ(scene->skin, SkinKind::kNonlinear);
+    Scene coarse = *scene;
+    coarse.refinement = 1;
+    const auto skin = SimulatedSkin::Make(Model(scene->model), coarse);
+    EXPECT_TRUE(skin.ok()) << skin.error().message;
   }
+}
+
+TEST(Scene, SaysHowTheSkinAnswers) {
+  const auto scene = [](const std::string& more) {
+    return ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\n" + more).value();
+  };
+  EXPECT_EQ(scene("").skin, SkinKind::kNonlinear);
+  EXPECT_EQ(scene("").refinement, 2);
+  EXPECT_EQ(scene("skin: nonlinear\nrefinement: 3\n").refinement, 3);
+  EXPECT_EQ(scene("skin: linear\n").skin, SkinKind::kLinear);
+  const auto bad = ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\nskin: stiff\n");
+  ASSERT_FALSE(bad.ok());
+  EXPECT_THAT(bad.error().message, testing::HasSubstr("s.yaml:4"));
 }
 
 TEST(Scene, ReadsEveryField) {

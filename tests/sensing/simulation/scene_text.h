@@ -10,9 +10,10 @@
 
 namespace taclink {
 
-/// A short scene with `more` lines of YAML.
+/// A short scene of a linear skin with `more` lines of YAML.
 inline Scene SceneWith(const std::string& more) {
-  const auto scene = ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\n" + more);
+  const auto scene =
+      ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\n" + more + "skin: linear\n");
   EXPECT_TRUE(scene.ok()) << scene.error().message;
   return *scene;
 }

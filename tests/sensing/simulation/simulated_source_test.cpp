@@ -94,7 +94,9 @@ TEST_F(SimulatedSourceTest, EndsWhereTheSceneDoes) {
 }
 
 TEST_F(SimulatedSourceTest, ReusesTheFramesBuffers) {
-  const auto source = MakeSimulatedSource(Model("cylinder"), LoadScene("stroke").value(), clock_);
+  Scene scene = LoadScene("stroke").value();
+  scene.skin = SkinKind::kLinear;
+  const auto source = MakeSimulatedSource(Model("cylinder"), scene, clock_);
   ASSERT_TRUE(source.ok());
   ASSERT_TRUE((*source)->Start().ok());
   ASSERT_TRUE((*source)->Next(frame_, milliseconds(50)).ok());
