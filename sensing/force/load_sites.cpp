@@ -15,7 +15,8 @@ namespace {
 
 std::vector<LoadSites::Spread> SpreadAt(const ShellMesh& mesh, int column, int row, LoadSpread kind) {
   constexpr double kCenter = 0.5;
-  if (mesh.refinement == 1 || kind == LoadSpread::kPoint) return {{mesh.Node(column, row), 1}};
+  const bool at_end = std::min(row, mesh.rows - 1 - row) <= mesh.refinement;
+  if (mesh.refinement == 1 || kind == LoadSpread::kPoint || at_end) return {{mesh.Node(column, row), 1}};
   std::vector<LoadSites::Spread> spread = {{mesh.Node(column, row), kCenter}};
   for (const int node : {mesh.Node(column - 1, row), mesh.Node(column + 1, row), mesh.Node(column, row - 1),
                          mesh.Node(column, row + 1)}) {

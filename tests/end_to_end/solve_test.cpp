@@ -59,7 +59,7 @@ class SolveTest : public ScratchFolder, public ::testing::WithParamInterface<Cas
     const json& contact = solved.at("contacts")[0];
     const json& expected = truth.at("contacts").at(0);
     const Vec3 force = ToVec3(contact.at("force_n")), true_force = ToVec3(expected.at("force_n"));
-    EXPECT_NEAR(true_force.norm(), 0.2, 0.002);
+    EXPECT_NEAR(true_force.norm(), 0.1, 0.002);
     EXPECT_LT((force - true_force).norm(), force_tolerance * true_force.norm());
     EXPECT_LT((ToVec3(contact.at("center_mm")) - ToVec3(expected.at("center_mm"))).norm(),
               center_tolerance_mm);
@@ -98,7 +98,7 @@ TEST_P(SolveTest, MarkersGiveThePushBack) {
   ExpectThePush(solved, truth, 0.15, 5);
   EXPECT_EQ(solved.at("markers").at("seen").get<int>() + solved.at("markers").at("inferred").get<int>(),
             model.markers.count());
-  EXPECT_EQ(solved.at("force_model"), "linear");
+  EXPECT_EQ(solved.at("force_model"), "nonlinear") << "auto: a dent of some millimetres";
 }
 
 TEST_P(SolveTest, UntouchedSkinHasNoContact) {

@@ -226,7 +226,7 @@ TEST(AccuracyBench, ResultsDoNotDependOnJobs) {
   }
 }
 
-TEST(AccuracyReport, LeavesOutWhatAnswersAsAnotherModel) {
+TEST(AccuracyReport, TellsWhoAnswered) {
   PathTruth path;
   path.path.kind = PressKind::kBar;
   TrueStage stage;
@@ -240,15 +240,15 @@ TEST(AccuracyReport, LeavesOutWhatAnswersAsAnotherModel) {
   outcome.answered = {{"linear", 3}};
   outcome.cpu_ms = {0.5F};
   AccuracyOutcome other = outcome;
-  other.method.model = ForceModel::kLiteral;
+  other.method.model = ForceModel::kNonlinear;
+  other.answered = {{"nonlinear", 2}, {"pressurised", 1}};
   const auto tables = AccuracyTables({outcome, other}, 0.05);
-  const std::string first = Markdown(tables.front()), last = Markdown(tables.back());
+  const std::string first = Markdown(tables.front()), costs = Markdown(tables.at(1));
   EXPECT_THAT(first, testing::HasSubstr("| linear | can | 2 | 0.250 | 25.0 | 25.0 | 50.0 |"));
-  EXPECT_THAT(first, testing::Not(testing::HasSubstr("literal")));
-  EXPECT_THAT(last, testing::HasSubstr("| literal | can | 2 | linear 3 |"));
+  EXPECT_THAT(costs, testing::HasSubstr("nonlinear 2, pressurised 1 |"));
   const std::string svg = AccuracyPlot({outcome, other}, 0.05);
   EXPECT_THAT(svg, testing::HasSubstr(">linear 2<"));
-  EXPECT_THAT(svg, testing::Not(testing::HasSubstr("literal")));
+  EXPECT_THAT(svg, testing::HasSubstr(">nonlinear 2<"));
 }
 
 TEST(AccuracyReport, FailedScenesAreListed) {
