@@ -37,7 +37,6 @@ class MarkerData {
   void Set(const SkinShape& shape, const Eigen::VectorXd& predicted_mm,
            const Eigen::VectorXd& model_sigma_mm);
 
-  double Deviations(int marker) const;  ///< of the residual, in standard deviations
   /// information * column, marker by marker.
   void Weigh(const Eigen::Ref<const Eigen::VectorXd>& column, Eigen::Ref<Eigen::VectorXd> weighed) const;
 
@@ -100,6 +99,7 @@ class LoadFit {
   Eigen::VectorXd load_, trial_, rhs_, norms_;  // in the order of sites_in_
   Eigen::MatrixXd columns_, weighed_, gram_, factor_;
   Eigen::VectorXd target_, residual_, weighed_residual_;
+  bool weighed_is_current_ = false;
   Eigen::VectorXf search_;
   Eigen::VectorXd site_norms_;  // of this frame; negative: not known yet
   std::vector<char> near_;      // by site

@@ -16,11 +16,13 @@ namespace taclink {
 namespace {
 
 constexpr int kDefaultRefinement = 1;
-constexpr int kMostIterations = 12;       // in one frame; a jump into a deep dent takes them
+// In one frame, which bounds its time; the next frame goes on from there.
+constexpr int kMostIterations = 6, kMostTangents = 1;
 constexpr int kNewLoadsPerIteration = 3;  // the linearisation is only good near the state
 constexpr double kMaxStepMm = 4;
-constexpr double kSettledMm = 0.02;  // of a step: a fifth of the markers' noise
-constexpr double kSlow = 0.5;        // of the steps' decrease: time for a new tangent
+constexpr double kSettledMm = 0.02;       // of a step: a fifth of the markers' noise
+constexpr double kNearlySettledMm = 0.5;  // where a frame's iterations end
+constexpr double kSlow = 0.5;             // of the steps' decrease: time for a new tangent
 
 }  // namespace
 
@@ -36,6 +38,7 @@ struct NonlinearEstimator::Solver {
         fit(sites, link.markers.count(), fit_options),
         hessian(shell.Pattern()),
         factor(hessian),
+        rest_factor(hessian),
         predicted(3 * link.markers.count()),
         model_sigma(link.markers.count()) {
     tangents.At(0);
@@ -51,6 +54,7 @@ struct NonlinearEstimator::Solver {
   };
 
   void Rest();
+  bool BeginTouch(const SkinTangent& tangent);
   bool Refactor();
   void SolveColumns(Load& load);
   Eigen::VectorXd Solve(const Eigen::VectorXd& by_force);
@@ -76,7 +80,9 @@ struct NonlinearEstimator::Solver {
   LoadFit fit;
   Eigen::SparseMatrix<double> hessian;
   SparseCholesky factor;
-  bool has_factor = false;
+  SparseCholesky rest_factor;  // of the skin that nothing touches, at rest_pressure_mpa
+  double rest_pressure_mpa = -1e9;
+  SparseCholesky* in_use = nullptr;
   double shrinkage = kSlow;  // of one step to the next, seen with this tangent
   // Springs that hold the loaded nodes in the factorised matrix, and what undoes them in a solution.
   std::vector<int> held;         // first degrees of freedom of those nodes
@@ -94,7 +100,24 @@ struct NonlinearEstimator::Solver {
 void NonlinearEstimator::Solver::Rest() {
   state = shell.Rest();
   loads.clear();
-  has_factor = false;
+  held.clear();
+  in_use = nullptr;
+}
+
+// At the inflated skin, whose factor is kept: a touch begins without a new one.
+bool NonlinearEstimator::Solver::BeginTouch(const SkinTangent& tangent) {
+  Rest();
+  state = tangents.Inflated();
+  shrinkage = kSlow;
+  in_use = &rest_factor;
+  if (tangent.pressure_mpa == rest_pressure_mpa) return true;
+  ++work.factorisations;
+  const FollowerPressure pressure(model.thickness_mm, tangent.pressure_mpa);
+  const ElementLoad* all[] = {&pressure};
+  shell.Hessian(state, all, gradient, hessian);
+  const bool definite = rest_factor.Factorise(hessian);
+  rest_pressure_mpa = definite ? tangent.pressure_mpa : -1e9;
+  return definite;
 }
 
 // The tangent at the state. A skin that is pushed deep is unstable under given forces, though not under a
@@ -119,13 +142,13 @@ bool NonlinearEstimator::Solver::Refactor() {
     for (int i = 0; i < hessian.cols(); ++i) hessian.coeffRef(i, i) *= 1 + shift;
     definite = factor.Factorise(hessian);
   }
-  has_factor = true;
+  in_use = &factor;
   shrinkage = kSlow;
   if (held.empty()) return true;
   const auto n = static_cast<Eigen::Index>(3 * held.size());
   unit_forces.setZero(shell.dof_count(), n);
   for (Eigen::Index k = 0; k < n; ++k) unit_forces(held[static_cast<size_t>(k / 3)] + k % 3, k) = 1;
-  factor.Solve(unit_forces, held_motions);
+  in_use->Solve(unit_forces, held_motions);
   // Where the skin would be unstable, it is taken as soft instead: the step is then too short, not wrong.
   constexpr double kSoftest = 0.03;  // of the springs
   held_undo.resize(n, n);
@@ -141,7 +164,7 @@ bool NonlinearEstimator::Solver::Refactor() {
 }
 
 Eigen::VectorXd NonlinearEstimator::Solver::Solve(const Eigen::VectorXd& by_force) {
-  Eigen::VectorXd solution = factor.Solve(by_force);
+  Eigen::VectorXd solution = in_use->Solve(by_force);
   if (held.empty()) return solution;
   Eigen::VectorXd at_held(held_undo.rows());
   for (Eigen::Index k = 0; k < at_held.size(); ++k)
@@ -253,10 +276,13 @@ bool NonlinearEstimator::Solver::Iterate(const SkinShape& shape, const SkinTange
   const FollowerPressure pressure(model.thickness_mm, pressure_mpa);
   const ElementLoad* all[] = {&pressure};
   double longest = 0, before = 0;  // of the last two steps
+  int made = 0;                    // tangents
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     ++work.iterations;
     if (!std::isfinite(Unbalance(pressure))) return false;
-    if (!has_factor || (iteration > 1 && longest > kSlow * before)) {
+    const bool slow = iteration > 1 && longest > kSlow * before;
+    if (in_use == nullptr || (slow && made < kMostTangents)) {
+      ++made;
       shell.Hessian(state, all, gradient, hessian);
       for (const Load& load : loads) AddForce(load.site, 0, -load.load_n, gradient);
       if (!Refactor()) return false;
@@ -269,7 +295,7 @@ bool NonlinearEstimator::Solver::Iterate(const SkinShape& shape, const SkinTange
     if (iteration > 0) shrinkage = std::max(0.5 * shrinkage, longest / before);
     if (longest < kSettledMm || longest * shrinkage < 0.5 * kSettledMm) return true;
   }
-  return false;
+  return longest < kNearlySettledMm;
 }
 
 void NonlinearEstimator::Solver::Report(NodalForces& forces) {
@@ -320,8 +346,10 @@ void NonlinearEstimator::Estimate(const SkinShape& shape, double pressure_mpa, N
     s.data.Set(shape, s.predicted, s.model_sigma);
     s.fit.Begin(s.data);
     if (s.fit.MostSignificant(s.data, *tangent) < 0) return;
-    s.state = s.tangents.Inflated();
-    s.has_factor = false;
+    if (!s.BeginTouch(*tangent)) {
+      forces.converged = false;
+      return;
+    }
   }
   if (!s.Iterate(shape, *tangent, pressure_mpa)) {
     // No equilibrium found: the next frame starts anew, and this one says what the cheaper model knows.
