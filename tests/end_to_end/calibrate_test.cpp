@@ -22,11 +22,10 @@ class CalibrateTest : public ScratchFolder {
     built.replace(built.find(place), place.size(),
                   "position_mm: [1.2, -1, -25.5]\n    rotation_deg: [1, -1.5, 1]");
     built_ = LoadLinkModel(Write("built.yaml", built)).value();
-    const std::string scene =
-        Write("scene.yaml",
-              "taclink_scene: 1\nname: push\nmodel: cylinder\nframe_rate_hz: 10\n"
-              "duration_s: 3\ncontacts:\n  - {at: {path: 7, ring: 5}, force_n: 0.1, "
-              "begin_s: 0.5, end_s: 2.9, ramp_s: 0.2}\n");
+    const std::string scene = Write("scene.yaml",
+                                    "taclink_scene: 1\nname: push\nmodel: cylinder\nframe_rate_hz: 10\n"
+                                    "duration_s: 3\ncontacts:\n  - {at: {path: 7, ring: 5}, force_n: 0.1, "
+                                    "begin_s: 0.5, end_s: 2.9, ramp_s: 0.2}\n");
     const Finished run =
         Taclink({"simulate", "--scene", scene, "--model", Path("built.yaml"), "--out", Path("out")});
     ASSERT_EQ(run.exit_code, 0) << run.err;
