@@ -46,8 +46,10 @@ double RelativeError(ForceEstimator& estimator, const SkinShape& shape, double p
 
 AutoEstimator::AutoEstimator(const LinkModel& model, const ForceOptions& options)
     : model_(model), options_(options) {
-  linear_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kLinear, options);
-  pressurised_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, options);
+  ForceOptions cheap = options;
+  if (cheap.refinement == 0) cheap.refinement = 1;  // else a new pressure takes several frames' time
+  linear_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kLinear, cheap);
+  pressurised_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, cheap);
   nonlinear_ = std::make_unique<NonlinearEstimator>(model, options);
   for (const double share : kLearnedPressures) {
     PressedSkin skin(model, {.refinement = 1});

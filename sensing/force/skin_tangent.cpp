@@ -130,10 +130,11 @@ struct PressurisedTangents::Shell {
   struct Known {
     SkinTangent tangent;
     ShellState state;
+    Eigen::VectorXd by_pressure;  // motion of the shell, mm or rad / MPa
   };
 
   bool Inflate(double from_mpa, double to_mpa, ShellState& state);
-  bool Compute(const ShellState& state, SkinTangent& tangent);
+  bool Compute(Known& known);
   const Known* Learn(int step);
 
   LinkModel model;
@@ -161,7 +162,9 @@ bool PressurisedTangents::Shell::Inflate(double from_mpa, double to_mpa, ShellSt
   return true;
 }
 
-bool PressurisedTangents::Shell::Compute(const ShellState& state, SkinTangent& tangent) {
+bool PressurisedTangents::Shell::Compute(Known& fresh) {
+  const ShellState& state = fresh.state;
+  SkinTangent& tangent = fresh.tangent;
   const FollowerPressure pressure(model.thickness_mm, tangent.pressure_mpa);
   const FollowerPressure unit(model.thickness_mm, 1);
   const ElementLoad* inflating[] = {&pressure};
@@ -173,7 +176,8 @@ bool PressurisedTangents::Shell::Compute(const ShellState& state, SkinTangent& t
   const ElementLoad* one[] = {&unit};
   shell.Gradient(state, one, with);
   shell.Gradient(state, {}, without);
-  MarkerMotions(model, mesh, shell, state, factor.Solve(without - with), tangent.per_pressure);
+  factor.Solve(without - with, fresh.by_pressure);
+  MarkerMotions(model, mesh, shell, state, fresh.by_pressure, tangent.per_pressure);
   const std::vector<UnitForce> forces = UnitForces(sites);
   Eigen::MatrixXd loads_n =
       Eigen::MatrixXd::Zero(shell.dof_count(), static_cast<Eigen::Index>(forces.size()));
@@ -202,18 +206,23 @@ PressurisedTangents::~PressurisedTangents() = default;
 // From the nearest pressure that is known. Null: no equilibrium.
 const PressurisedTangents::Shell::Known* PressurisedTangents::Shell::Learn(int step) {
   constexpr size_t kMostKept = 16;
-  Known fresh{{}, rest};
+  Known fresh{{}, rest, {}};
   double from_mpa = 0;
   if (!known.empty()) {
     const auto distance = [&](const auto& entry) { return std::abs(entry.first - step); };
     const auto nearest = std::min_element(
         known.begin(), known.end(), [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
-    fresh.state = nearest->second.state;
-    from_mpa = nearest->second.tangent.pressure_mpa;
+    const Known& near = nearest->second;
+    fresh.state = near.state;
+    from_mpa = near.tangent.pressure_mpa;
+    const double change = step * kGridMpa - from_mpa;
+    if (std::abs(change) <= kPressureStep * PressureScale(model)) {
+      shell.Step(change * near.by_pressure, fresh.state);  // where it will be, nearly
+    }
   }
   fresh.tangent.pressure_mpa = step * kGridMpa;
   if (!Inflate(from_mpa, fresh.tangent.pressure_mpa, fresh.state)) return nullptr;
-  if (!Compute(fresh.state, fresh.tangent)) return nullptr;
+  if (!Compute(fresh)) return nullptr;
   if (known.size() >= kMostKept) {
     known.erase(step > known.begin()->first ? known.begin() : std::prev(known.end()));
   }
