@@ -51,7 +51,7 @@ struct EndLoads {
 
 void Note(Path& path, const PressSummary& summary, const char* where) {
   path.stable = summary.stable;
-  if (!summary.ok()) path.refused = std::string(where) + ": " + summary.Text();
+  if (!summary.ok() || summary.snaps > 0) path.refused = std::string(where) + ": " + summary.Text();
 }
 
 double StoredOf(const PressedSkin& skin) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 namespace taclink {
@@ -30,10 +31,23 @@ RigidContactOptions ContactOptions(const LinkModel& model, const PressedSkinOpti
           .sticks = sticks};
 }
 
+double LongestMotion(const ShellState& from, const ShellState& to) {
+  double longest = 0;
+  for (size_t i = 0; i < from.mids_mm.size(); ++i) {
+    longest = std::max(longest, (to.mids_mm[i] - from.mids_mm[i]).norm());
+  }
+  return longest;
+}
+
 }  // namespace
 
 std::string PressSummary::Text() const {
-  if (ok()) return "converged in " + std::to_string(steps) + " steps";
+  if (ok()) {
+    std::string text = "converged in " + std::to_string(steps) + " steps";
+    char snap[64];
+    std::snprintf(snap, sizeof snap, ", snapped %d times, by up to %.2g mm", snaps, snapped_mm);
+    return snaps > 0 ? text + snap : text;
+  }
   return "stopped at " + std::to_string(static_cast<int>(100 * reached)) + " % of the way: " + Name(stop);
 }
 
@@ -86,10 +100,13 @@ ShellState PressedSkin::Extrapolated(const Point& before, const Point& last, dou
   return guess;
 }
 
-// `advance` sets the loads for a share of the way. Steps grow where they are easy and halve where they fail.
+// `advance` sets the loads for a share of the way, on all of which a node moves by `usual_mm` or so. Steps
+// grow where they are easy and halve where they fail, or where the skin moves far over states that are not
+// stable.
 template <typename Advance>
-PressSummary PressedSkin::Follow(double longest, double least, Advance advance) {
+PressSummary PressedSkin::Follow(double longest, double least, double usual_mm, Advance advance) {
   constexpr int kEasy = 6, kMostSettlings = 4;
+  constexpr double kFar = 1.5, kLittle = 0.01;  // times usual, and of the thickness
   PressSummary summary;
   Point last{0, state_};
   std::optional<Point> before;
@@ -101,18 +118,22 @@ PressSummary PressedSkin::Follow(double longest, double least, Advance advance) 
     std::vector<RigidContact::Grip> grips;
     for (const RigidContact& body : bodies_) grips.push_back(body.GripNow());
     EquilibriumSummary settled;
-    int iterations = 0;
+    int iterations = 0, shifted = 0;
     for (int settling = 0; settling < kMostSettlings; ++settling) {
       settled = Settle(guess);
       iterations += settled.iterations;
-      summary.shifted += settled.shifted;
+      shifted += settled.shifted;
       if (!settled.ok()) break;
       bool let_go = false;
       for (RigidContact& body : bodies_) let_go = body.Hold(guess) || let_go;
       if (!let_go) break;
     }
     summary.iterations += iterations;
-    if (!settled.ok()) {
+    summary.shifted += shifted;
+    const double moved_mm = settled.ok() ? LongestMotion(last.state, guess) : 0;
+    const bool snapped =
+        shifted > 0 && moved_mm > kFar * usual_mm * (at - last.at) + kLittle * model_.thickness_mm;
+    if (!settled.ok() || (snapped && step / 2 >= least)) {
       for (size_t i = 0; i < bodies_.size(); ++i) bodies_[i].Restore(grips[i]);
       step /= 2;
       if (step >= least) continue;
@@ -125,7 +146,11 @@ PressSummary PressedSkin::Follow(double longest, double least, Advance advance) 
     ++summary.steps;
     summary.residual_n = settled.residual_n;
     summary.stable = settled.stable;
-    before = std::move(last);
+    if (snapped) {
+      ++summary.snaps;
+      summary.snapped_mm = std::max(summary.snapped_mm, moved_mm);
+    }
+    before = snapped ? std::nullopt : std::optional(std::move(last));
     last = {at, std::move(guess)};
     if (iterations <= kEasy) step = std::min(longest, 1.5 * step);
   }
@@ -143,9 +168,13 @@ PressSummary PressedSkin::Inflate(double pressure_mpa) {
   const double from = pressure_mpa_, change = pressure_mpa - from;
   if (change == 0) return {};
   const double step = options_.pressure_step * PressureScale(model_);
+  const double radius =
+      model_.PointAtDepth(0, model_.length_mm / 2, model_.thickness_mm / 2).head<2>().norm();
   if (std::abs(change) > kMostSteps * step) return Refused(EquilibriumStop::kMaxIterations);
   const double longest = std::min(1.0, step / std::abs(change));
-  return Follow(longest, longest / 256, [&](double at) {
+  // A linear skin's growth: the radius times the pressure over its scale.
+  const double usual_mm = radius * std::abs(change) / PressureScale(model_);
+  return Follow(longest, longest / 256, usual_mm, [&](double at) {
     pressure_mpa_ = from + at * change;
     pressure_ = FollowerPressure(model_.thickness_mm, pressure_mpa_);
   });
@@ -162,7 +191,7 @@ PressSummary PressedSkin::Move(std::span<const Vec3> by_mm) {
   std::vector<RigidBody> from;
   from.reserve(bodies_.size());
   for (const RigidContact& body : bodies_) from.push_back(body.body());
-  return Follow(std::min(1.0, options_.step_mm / distance), options_.least_step_mm / distance,
+  return Follow(std::min(1.0, options_.step_mm / distance), options_.least_step_mm / distance, distance,
                 [&](double at) {
                   for (size_t i = 0; i < by_mm.size(); ++i) bodies_[i].SetBody(Moved(from[i], at * by_mm[i]));
                 });

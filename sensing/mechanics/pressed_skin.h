@@ -39,8 +39,12 @@ struct PressSummary {
   int shifted = 0;
   double residual_n = 0;
   bool stable = true;
+  /// Times that the skin left its equilibria for others far away: it buckled, or a dent snapped through.
+  /// Which one it finds may depend on the steps.
+  int snaps = 0;
+  double snapped_mm = 0;  ///< longest motion of a node in one of them
   bool ok() const { return stop == EquilibriumStop::kConverged && reached == 1; }
-  /// In words: "converged in 12 steps", "stopped at 40 % of the way: no descent".
+  /// In words: "converged in 12 steps, snapped once by 3.1 mm", "stopped at 40 % of the way: no descent".
   std::string Text() const;
 };
 
@@ -74,7 +78,7 @@ class PressedSkin {
     ShellState state;
   };
   template <typename Advance>
-  PressSummary Follow(double longest, double least, Advance advance);
+  PressSummary Follow(double longest, double least, double usual_mm, Advance advance);
   EquilibriumSummary Settle(ShellState& state);
   static ShellState Extrapolated(const Point& before, const Point& last, double at);
 
