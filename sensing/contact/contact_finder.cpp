@@ -7,6 +7,9 @@
 namespace taclink {
 namespace {
 
+// What the grid of loads makes of a centre, beyond the noise: standard deviation, of the markers' spacing. So
+// that 95 % of the centres of `taclink bench accuracy` are within two standard deviations.
+constexpr double kGridError = 0.1;
 constexpr size_t kAtOnce = 16;  // contacts for which there is memory from the start
 
 }  // namespace
@@ -136,6 +139,12 @@ void ContactFinder::DescribeErrors(const SkinShape& shape, const NodalForces& fo
       force += joint;
       center.noalias() += by_a * joint * center_by_force(b).transpose();
     }
+  }
+  const int path = model_.PathOf(contact.markers.front()), ring = model_.RingOf(contact.markers.front());
+  const int next = std::min(ring + 1, model_.markers.rings() - 1);
+  for (const Vec3& pitch : {Vec3(OuterPoint(shape, path + 1, ring) - OuterPoint(shape, path, ring)),
+                            Vec3(OuterPoint(shape, path, next) - OuterPoint(shape, path, next - 1))}) {
+    center += kGridError * kGridError * pitch * pitch.transpose();
   }
   contact.force_covariance_n2 = force;
   contact.center_covariance_mm2 = center;

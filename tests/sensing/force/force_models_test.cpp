@@ -95,7 +95,12 @@ TEST_F(ForceModelsTest, NonlinearAgreesWithTheForwardSolver) {
     EXPECT_EQ(found.forces.model, ForceModel::kNonlinear);
     const double truth = Pressed().contact.force_n.norm();
     EXPECT_NEAR(found.contacts[0].force_n.norm() / truth, 1, 0.05);
-    EXPECT_LT((found.contacts[0].center_mm - Pressed().contact.center_mm).norm(), 3);
+    const double off = (found.contacts[0].center_mm - Pressed().contact.center_mm).norm();
+    EXPECT_LT(off, 3);
+    ASSERT_TRUE(found.contacts[0].center_covariance_mm2.has_value());
+    const double told = std::sqrt(found.contacts[0].center_covariance_mm2->trace());
+    EXPECT_GT(told, off / 3);
+    EXPECT_LT(told, 5);
   }
 }
 
