@@ -90,6 +90,7 @@ LinkConfig Reader::ReadLink(YamlMap link) const {
     const size_t model = link.Choice("force_model", {kForceModelNames.begin(), kForceModelNames.end()});
     config.force_model = model == 0 ? std::nullopt : std::optional<ForceModel>(kForceModels[model - 1]);
   }
+  config.force_refinement = link.Integer("force_refinement", config.force_refinement, {.min = 0, .max = 3});
   if (YamlMap pose = link.Map("pose"); link.Has("pose")) {
     const auto position = pose.Numbers("position_mm", 3, {.min = -kLongestArmMm, .max = kLongestArmMm});
     std::copy_n(position.begin(), 3, config.position_mm.begin());

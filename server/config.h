@@ -43,7 +43,9 @@ struct LinkConfig {
   std::optional<std::string> calibration;  ///< path; none: from the first rest picture
   std::optional<double> pressure_kpa;      ///< gauge, constant; none: the source's, or 0
   std::optional<ForceModel> force_model;   ///< none: the cheapest that is good enough, frame by frame
-  std::array<double, 3> position_mm{};     ///< of the link frame's origin in the base frame
+  int force_refinement =
+      0;  ///< elements per interval of the marker grid, 1 to 3; 0: what the model does best with
+  std::array<double, 3> position_mm{};  ///< of the link frame's origin in the base frame
   /// Roll, pitch, yaw about the base frame's fixed x, y, z, applied in this order (as in URDF).
   std::array<double, 3> rotation_deg{};
 

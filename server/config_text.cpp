@@ -61,6 +61,7 @@ std::string ConfigText(const Config& config) {
     if (link.calibration) out << "      calibration: " << Quoted(*link.calibration) << "\n";
     if (link.pressure_kpa) out << "      pressure_kpa: " << *link.pressure_kpa << "\n";
     out << "      force_model: " << (link.force_model ? Name(*link.force_model) : "auto") << "\n";
+    out << "      force_refinement: " << link.force_refinement << "\n";
     out << "      pose: {position_mm: " << List(link.position_mm)
         << ", rotation_deg: " << List(link.rotation_deg) << "}\n";
   }

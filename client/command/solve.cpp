@@ -23,6 +23,7 @@ struct SolveOptions {
   double pressure_kpa = 0;
   double sigma_mm = 0.05;
   std::string force_model = "auto";
+  int force_refinement = 0;
   bool json = false;
 };
 
@@ -85,7 +86,8 @@ Result<LinkState> SolveMarkers(const SolveOptions& options, const LinkModel& mod
   LinkState state;
   state.shape = std::move(*shape);
   InferUnseen(model, {.mpa = options.pressure_kpa * 1e-3}, state.shape);
-  const auto estimator = MakeForceEstimator(model, {.model = ForceModelNamed(options.force_model)});
+  const auto estimator = MakeForceEstimator(
+      model, {.model = ForceModelNamed(options.force_model), .refinement = options.force_refinement});
   ContactFinder finder(model);
   const int64_t start = SystemClock().MonotonicNs();
   estimator->Estimate(state.shape, options.pressure_kpa * 1e-3, state.forces);
@@ -105,6 +107,7 @@ Result<void> ReadPair(const std::vector<std::string>& paths, StereoFrame& frame)
 Result<LinkState> SolvePictures(const SolveOptions& options, const LinkModel& model) {
   PipelineOptions pipeline_options;
   pipeline_options.force.model = ForceModelNamed(options.force_model);
+  pipeline_options.force.refinement = options.force_refinement;
   pipeline_options.rest_frames = 1;
   if (!options.calibration.empty()) {
     auto rig = LoadCalibration(options.calibration, model);
@@ -172,6 +175,10 @@ void AddSolve(CLI::App& app, Selected& selected) {
       ->check(Within(1e-4, 10));
   command->add_option("--force-model", options->force_model, "auto: the cheapest that is good enough")
       ->check(CLI::IsMember({"auto", "literal", "linear", "pressurised", "nonlinear"}));
+  command
+      ->add_option("--force-refinement", options->force_refinement,
+                   "Elements per interval of the marker grid; 0: what the model does best with")
+      ->check(CLI::Range(0, 3));
   command->add_flag("--json", options->json, "One JSON object");
   command->callback([options, markers, images, &selected] {
     if (markers->count() == 0 && images->count() == 0) {

@@ -84,6 +84,7 @@ class PipelineProcessor final : public LinkProcessor {
 Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model) {
   PipelineOptions options;
   options.force.model = link.force_model;
+  options.force.refinement = link.force_refinement;
   if (link.pressure_kpa) options.pressure_mpa = *link.pressure_kpa * kMpaPerKpa;
   if (link.calibration && IsMissing(*link.calibration)) {
     spdlog::warn(

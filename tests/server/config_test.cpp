@@ -30,6 +30,7 @@ arm:
     - name: lower
       model: barrel
       force_model: nonlinear
+      force_refinement: 2
       source: files
       folder: pictures
       loop: false
@@ -68,6 +69,8 @@ TEST(Config, ReadsEverything) {
   EXPECT_FALSE(files.loop);
   EXPECT_EQ(config->links[1].model, "barrel");
   EXPECT_EQ(config->links[1].force_model, ForceModel::kNonlinear);
+  EXPECT_EQ(config->links[1].force_refinement, 2);
+  EXPECT_EQ(config->links[2].force_refinement, 0);
   EXPECT_FALSE(config->links[2].force_model.has_value()) << "auto";
   EXPECT_EQ(std::get<SimulatedSourceConfig>(config->links[2].source).scene, "press");
   const Vec3 p_in_base = upper.BaseFromLink() * Vec3(10, 0, 0);
@@ -101,6 +104,8 @@ TEST(Config, MistakesAreNamedWithFileAndLine) {
               HasSubstr("v4l2, files, simulated"));
   EXPECT_THAT(Complaint(Replaced(kGood, "force_model: auto", "force_model: best")),
               HasSubstr("auto, literal, linear, pressurised, nonlinear"));
+  EXPECT_THAT(Complaint(Replaced(kGood, "force_refinement: 2", "force_refinement: 9")),
+              HasSubstr("force_refinement"));
   EXPECT_THAT(Complaint(Replaced(kGood, "format: mjpeg", "format: h264")), HasSubstr("yuyv, mjpeg"));
   EXPECT_THAT(Complaint(Replaced(kGood, "name: lower", "name: upper")), HasSubstr("used by another link"));
   EXPECT_THAT(Complaint(Replaced(kGood, "name: lower", "name: 'a b'")), HasSubstr("letters"));
