@@ -12,11 +12,9 @@
 #include "client/command/csv.h"
 #include "client/command/marker_csv.h"
 #include "client/command/material_report.h"
+#include "client/command/picture_solver.h"
 #include "client/command/probe_csv.h"
-#include "sensing/camera/calibration.h"
-#include "sensing/capture/image_io.h"
 #include "sensing/model/model_file.h"
-#include "sensing/pipeline/link_pipeline.h"
 
 namespace taclink::command {
 namespace {
@@ -58,42 +56,22 @@ Result<void> AddMarkerFiles(const MaterialOptions& options, const LinkModel& mod
   return {};
 }
 
-Result<void> ReadPair(const std::string& top, const std::string& bottom, StereoFrame& frame) {
-  if (auto read = ReadRawImage(top, frame.images[Index(CameraId::kTop)]); !read) return read.error();
-  return ReadRawImage(bottom, frame.images[Index(CameraId::kBottom)]);
-}
-
 Result<void> AddPictures(const MaterialOptions& options, const LinkModel& model,
                          std::vector<InflationRecord>& records) {
   if (options.pictures.empty()) return {};
   PipelineOptions how;
-  how.rest_frames = 1;
   how.always_acquire = true;  // the pictures are far apart
-  if (!options.calibration.empty()) {
-    auto rig = LoadCalibration(options.calibration, model);
-    if (!rig) return rig.error();
-    how.rig = *rig;
-  }
-  LinkPipeline pipeline(model, how);
-  StereoFrame frame;
-  LinkState state;
-  frame.pressure_mpa = 0;
-  if (auto read = ReadPair(options.rest[0], options.rest[1], frame); !read) return read;
-  pipeline.Process(frame, state);
-  if (!pipeline.calibration()) {
-    return Error{ErrorCode::kInvalidArgument, "the rest pictures can't be used: " + state.status_reason};
-  }
+  const auto solver = PictureSolver::Make(model, how, options.calibration, options.rest);
+  if (!solver) return solver.error();
   for (size_t i = 0; i < options.pictures.size(); i += kPictureWords) {
     const std::string& top = options.pictures[i + 1];
     const auto pressure = PressureMpa(options.pictures[i], "--pictures");
     if (!pressure) return pressure.error();
-    if (auto read = ReadPair(top, options.pictures[i + 2], frame); !read) return read;
-    frame.pressure_mpa = *pressure;
-    ++frame.sequence;
-    pipeline.Process(frame, state);
-    if (!state.measured())
-      return Error{ErrorCode::kInvalidArgument, top + ": can't be solved: " + state.status_reason};
-    records.push_back({top, *pressure, state.shape.measured});
+    const auto state = (*solver)->Solve({top, options.pictures[i + 2]}, *pressure);
+    if (!state) return state.error();
+    if (!state->measured())
+      return Error{ErrorCode::kInvalidArgument, top + ": can't be solved: " + state->status_reason};
+    records.push_back({top, *pressure, state->shape.measured});
   }
   return {};
 }

@@ -6,10 +6,8 @@
 #include "client/command/commands.h"
 #include "client/command/json.h"
 #include "client/command/marker_csv.h"
-#include "sensing/camera/calibration.h"
-#include "sensing/capture/image_io.h"
+#include "client/command/picture_solver.h"
 #include "sensing/model/model_file.h"
-#include "sensing/pipeline/link_pipeline.h"
 #include "sensing/shape/inference.h"
 
 namespace taclink::command {
@@ -97,39 +95,15 @@ Result<LinkState> SolveMarkers(const SolveOptions& options, const LinkModel& mod
   return state;
 }
 
-Result<void> ReadPair(const std::vector<std::string>& paths, StereoFrame& frame) {
-  for (size_t i = 0; i < kCameraCount; ++i) {
-    if (auto read = ReadRawImage(paths[i], frame.images[i]); !read) return read.error();
-  }
-  return {};
-}
-
 Result<LinkState> SolvePictures(const SolveOptions& options, const LinkModel& model) {
   PipelineOptions pipeline_options;
   pipeline_options.force.model = ForceModelNamed(options.force_model);
   pipeline_options.force.refinement = options.force_refinement;
-  pipeline_options.rest_frames = 1;
-  if (!options.calibration.empty()) {
-    auto rig = LoadCalibration(options.calibration, model);
-    if (!rig) return rig.error();
-    pipeline_options.rig = *rig;
-  }
-  LinkPipeline pipeline(model, pipeline_options);
-  StereoFrame frame;
-  LinkState state;
-  // Rest pictures are taken without pressure.
-  if (auto read = ReadPair(options.rest, frame); !read) return read.error();
-  frame.pressure_mpa = 0;
-  pipeline.Process(frame, state);
-  if (!pipeline.calibration()) {
-    return Error{ErrorCode::kInvalidArgument, "the rest pictures can't be used: " + state.status_reason};
-  }
-  if (auto read = ReadPair(options.images, frame); !read) return read.error();
-  frame.pressure_mpa = options.pressure_kpa * 1e-3;
-  frame.sequence = 1;
-  pipeline.Process(frame, state);
-  if (!state.measured()) {
-    return Error{ErrorCode::kInvalidArgument, "the pictures can't be solved: " + state.status_reason};
+  const auto solver = PictureSolver::Make(model, pipeline_options, options.calibration, options.rest);
+  if (!solver) return solver.error();
+  auto state = (*solver)->Solve(options.images, options.pressure_kpa * 1e-3);
+  if (state && !state->measured()) {
+    return Error{ErrorCode::kInvalidArgument, "the pictures can't be solved: " + state->status_reason};
   }
   return state;
 }

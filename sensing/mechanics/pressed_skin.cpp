@@ -45,7 +45,8 @@ std::string PressSummary::Text() const {
   if (ok()) {
     std::string text = "converged in " + std::to_string(steps) + " steps";
     char snap[64];
-    std::snprintf(snap, sizeof snap, ", snapped %d times, by up to %.2g mm", snaps, snapped_mm);
+    std::snprintf(snap, sizeof snap, ", snapped %d time%s, by up to %.2g mm", snaps, snaps == 1 ? "" : "s",
+                  snapped_mm);
     return snaps > 0 ? text + snap : text;
   }
   return "stopped at " + std::to_string(static_cast<int>(100 * reached)) + " % of the way: " + Name(stop);

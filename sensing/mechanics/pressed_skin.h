@@ -44,7 +44,8 @@ struct PressSummary {
   int snaps = 0;
   double snapped_mm = 0;  ///< longest motion of a node in one of them
   bool ok() const { return stop == EquilibriumStop::kConverged && reached == 1; }
-  /// In words: "converged in 12 steps, snapped once by 3.1 mm", "stopped at 40 % of the way: no descent".
+  /// In words: "converged in 12 steps, snapped 1 time, by up to 3.1 mm", "stopped at 40 % of the way: no
+  /// descent".
   std::string Text() const;
 };
 

@@ -7,6 +7,7 @@
 #include <cassert>
 #include <cstring>
 #include <mutex>
+#include <new>
 
 // OpenBLAS' own; its header is in no runtime package.
 extern "C" {
@@ -96,7 +97,10 @@ struct SparseCholesky::State {
 
   void Solve(cholmod_dense rhs, double* x) {
     const OneThread one_thread;
-    cholmod_solve2(CHOLMOD_A, factor, &rhs, nullptr, &solution, nullptr, &scratch_y, &scratch_e, &common);
+    if (cholmod_solve2(CHOLMOD_A, factor, &rhs, nullptr, &solution, nullptr, &scratch_y, &scratch_e,
+                       &common) == 0) {
+      throw std::bad_alloc();
+    }
     std::memcpy(x, solution->x, sizeof(double) * rhs.nrow * rhs.ncol);
   }
 
@@ -109,6 +113,7 @@ SparseCholesky::SparseCholesky(const Eigen::SparseMatrix<double>& pattern)
     : state_(std::make_unique<State>()) {
   cholmod_sparse view = ViewOf(pattern);
   state_->factor = cholmod_analyze(&view, &state_->common);
+  if (state_->factor == nullptr) throw std::bad_alloc();
 }
 SparseCholesky::~SparseCholesky() = default;
 

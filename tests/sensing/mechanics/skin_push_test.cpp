@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "sensing/mechanics/pressed_skin.h"
 #include "sensing/model/model_file.h"
 
 namespace taclink {
@@ -40,6 +41,17 @@ TEST_F(SkinPushTest, FinerMeshPushesMoreNodesAndStaysClose) {
   ASSERT_TRUE(fine.ok());
   EXPECT_GE(fine->nodes_in_contact, 2);
   EXPECT_NEAR(fine->force_n / ForceN(0, 5), 1, 0.15);
+}
+
+TEST_F(SkinPushTest, ASkinThatBucklesUnderSuctionSaysSo) {
+  PressedSkin sucked(model_, {.refinement = 1}), inflated(model_, {.refinement = 1});
+  const PressSummary buckled = sucked.Inflate(-0.25e-3), grown = inflated.Inflate(1e-3);
+  ASSERT_TRUE(buckled.ok() && grown.ok());
+  EXPECT_GE(buckled.snaps, 1);
+  EXPECT_GT(buckled.snapped_mm, 5);
+  EXPECT_THAT(buckled.Text(), testing::HasSubstr("snapped"));
+  EXPECT_EQ(grown.snaps, 0);
+  EXPECT_THAT(grown.Text(), testing::Not(testing::HasSubstr("snapped")));
 }
 
 TEST_F(SkinPushTest, DiscThatDoesNotTouchFeelsNothing) {

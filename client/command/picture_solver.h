@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sensing/core/link_model.h"
+#include "sensing/core/result.h"
+#include "sensing/pipeline/link_pipeline.h"
+
+namespace taclink::command {
+
+/// Pictures of files, one pair after the other, beginning with a rest pair without pressure.
+class PictureSolver {
+ public:
+  /// `calibration`: file; empty: the rest pair calibrates. `rest`, as all pairs: top, bottom.
+  /// Errors: kNotFound, kInvalidArgument (unreadable, of no use; why).
+  static Result<std::unique_ptr<PictureSolver>> Make(const LinkModel& model, PipelineOptions options,
+                                                     const std::string& calibration,
+                                                     const std::vector<std::string>& rest);
+
+  /// Whether it was measured is in the state.
+  Result<LinkState> Solve(const std::vector<std::string>& pair, double pressure_mpa);
+
+ private:
+  PictureSolver(const LinkModel& model, const PipelineOptions& options) : pipeline_(model, options) {}
+
+  LinkPipeline pipeline_;
+  StereoFrame frame_;
+  LinkState state_;
+};
+
+}  // namespace taclink::command
