@@ -48,15 +48,17 @@ AutoEstimator::AutoEstimator(const LinkModel& model, const ForceOptions& options
     : model_(model), options_(options) {
   ForceOptions cheap = options;
   if (cheap.refinement == 0) cheap.refinement = 1;  // else a new pressure takes several frames' time
+  const LoadSites sites = MakeLoadSites(model, MakeShellMesh(model, 1));
+  const auto coarse = std::make_shared<PressurisedTangents>(model, 1, sites);
   linear_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kLinear, cheap);
-  pressurised_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, cheap);
-  nonlinear_ = std::make_unique<NonlinearEstimator>(model, options);
+  pressurised_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, cheap,
+                                                       cheap.refinement == 1 ? coarse : nullptr);
+  nonlinear_ = std::make_unique<NonlinearEstimator>(model, options, coarse);
   for (const double share : kLearnedPressures) {
     PressedSkin skin(model, {.refinement = 1});
     if (!skin.Inflate(share * PressureScale(model)).ok()) break;
     learned_.push_back(Learn(skin, share * PressureScale(model)));
   }
-  const LoadSites sites = MakeLoadSites(model, MakeShellMesh(model, 1));
   inflation_per_mpa_ = LinearTangent(model, 1, sites).per_pressure;
 }
 

@@ -1,6 +1,7 @@
 #include "sensing/force/compliance_estimator.h"
 
 #include <cmath>
+#include <utility>
 
 namespace taclink {
 namespace {
@@ -14,7 +15,8 @@ int RefinementOf(const ForceOptions& options) {
 }  // namespace
 
 ComplianceEstimator::ComplianceEstimator(const LinkModel& model, ForceModel force_model,
-                                         const ForceOptions& options)
+                                         const ForceOptions& options,
+                                         std::shared_ptr<PressurisedTangents> tangents)
     : force_model_(force_model),
       model_error_(0.05),
       pressure_error_(force_model == ForceModel::kLinear ? 0.03 : 0.01),
@@ -28,7 +30,8 @@ ComplianceEstimator::ComplianceEstimator(const LinkModel& model, ForceModel forc
   if (force_model == ForceModel::kLinear) {
     linear_ = LinearTangent(model, RefinementOf(options), sites_);
   } else {
-    pressurised_ = std::make_unique<PressurisedTangents>(model, RefinementOf(options), sites_);
+    pressurised_ = tangents ? std::move(tangents)
+                            : std::make_shared<PressurisedTangents>(model, RefinementOf(options), sites_);
     pressurised_->At(0);
   }
   last_.reserve(static_cast<size_t>(fit_options_.max_loads));

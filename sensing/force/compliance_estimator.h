@@ -7,6 +7,7 @@
 #include "sensing/force/force_estimator.h"
 #include "sensing/force/load_fit.h"
 #include "sensing/force/load_sites.h"
+#include "sensing/force/pressurised_tangents.h"
 #include "sensing/force/skin_tangent.h"
 
 namespace taclink {
@@ -16,8 +17,10 @@ namespace taclink {
 /// with a stiffness would amplify camera noise, axial stiffness is 15 times the radial one (6.4).
 class ComplianceEstimator final : public ForceEstimator {
  public:
-  /// `model`: kLinear or kPressurised.
-  ComplianceEstimator(const LinkModel& model, ForceModel force_model, const ForceOptions& options);
+  /// `model`: kLinear or kPressurised. `tangents`: to share with others of the same link, refinement and
+  /// point loads; none: its own.
+  ComplianceEstimator(const LinkModel& model, ForceModel force_model, const ForceOptions& options,
+                      std::shared_ptr<PressurisedTangents> tangents = {});
 
   void Estimate(const SkinShape& shape, double pressure_mpa, NodalForces& forces) override;
   void Restart() override { last_.clear(); }
@@ -34,7 +37,7 @@ class ComplianceEstimator final : public ForceEstimator {
   LoadSites sites_;
   SkinTangent linear_;
 
-  std::unique_ptr<PressurisedTangents> pressurised_;
+  std::shared_ptr<PressurisedTangents> pressurised_;
   MarkerData data_;
   LoadFit fit_;
   Eigen::VectorXd predicted_mm_, model_sigma_mm_, column_;

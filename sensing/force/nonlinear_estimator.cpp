@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "sensing/force/compliance_estimator.h"
@@ -27,13 +28,15 @@ constexpr double kSlow = 0.5;             // of the steps' decrease: time for a 
 }  // namespace
 
 struct NonlinearEstimator::Solver {
-  Solver(const LinkModel& link, const ForceOptions& options, int refinement)
+  Solver(const LinkModel& link, const ForceOptions& options, int refinement,
+         std::shared_ptr<PressurisedTangents> coarse)
       : model(link),
         mesh(MakeShellMesh(link, refinement)),
         shell(SkinSurface(mesh), link.material),
         sites(MakeLoadSites(link, mesh, LoadSpread::kPatch)),
         fit_options(FitOptions(options, sites.count())),
-        tangents(link, refinement, sites),
+        tangents(mesh.refinement == 1 ? std::move(coarse)
+                                      : std::make_shared<PressurisedTangents>(link, refinement, sites)),
         data(link.markers.count(), options.noise_floor_mm),
         fit(sites, link.markers.count(), fit_options),
         hessian(shell.Pattern()),
@@ -41,7 +44,7 @@ struct NonlinearEstimator::Solver {
         rest_factor(hessian),
         predicted(3 * link.markers.count()),
         model_sigma(link.markers.count()) {
-    tangents.At(0);
+    tangents->At(0);
     Rest();
   }
 
@@ -54,7 +57,7 @@ struct NonlinearEstimator::Solver {
   };
 
   void Rest();
-  bool BeginTouch(const SkinTangent& tangent);
+  bool BeginTouch(double pressure_mpa);
   bool Refactor();
   void SolveColumns(Load& load);
   Eigen::VectorXd Solve(const Eigen::VectorXd& by_force);
@@ -75,13 +78,14 @@ struct NonlinearEstimator::Solver {
   NonlinearShell shell;
   LoadSites sites;
   LoadFitOptions fit_options;
-  PressurisedTangents tangents;
+  std::shared_ptr<PressurisedTangents> tangents;
   MarkerData data;
   LoadFit fit;
   Eigen::SparseMatrix<double> hessian;
   SparseCholesky factor;
-  SparseCholesky rest_factor;  // of the skin that nothing touches, at rest_pressure_mpa
-  double rest_pressure_mpa = -1e9;
+  SparseCholesky rest_factor;  // of the skin that nothing touches, at the pressure of rest_coordinate
+  static constexpr double kNever = -1e9;
+  double rest_coordinate = kNever;
   SparseCholesky* in_use = nullptr;
   double shrinkage = kSlow;  // of one step to the next, seen with this tangent
   // Springs that hold the loaded nodes in the factorised matrix, and what undoes them in a solution.
@@ -105,18 +109,20 @@ void NonlinearEstimator::Solver::Rest() {
 }
 
 // At the inflated skin, whose factor is kept: a touch begins without a new one.
-bool NonlinearEstimator::Solver::BeginTouch(const SkinTangent& tangent) {
+bool NonlinearEstimator::Solver::BeginTouch(double pressure_mpa) {
   Rest();
-  state = tangents.Inflated();
+  state = tangents->Inflated();
   shrinkage = kSlow;
   in_use = &rest_factor;
-  if (tangent.pressure_mpa == rest_pressure_mpa) return true;
+  constexpr double kAlike = 0.2;  // a tangent at a like pressure does
+  const double at = tangents->Coordinate(pressure_mpa);
+  if (std::abs(at - rest_coordinate) < kAlike) return true;
   ++work.factorisations;
-  const FollowerPressure pressure(model.thickness_mm, tangent.pressure_mpa);
+  const FollowerPressure pressure(model.thickness_mm, pressure_mpa);
   const ElementLoad* all[] = {&pressure};
   shell.Hessian(state, all, gradient, hessian);
   const bool definite = rest_factor.Factorise(hessian);
-  rest_pressure_mpa = definite ? tangent.pressure_mpa : -1e9;
+  rest_coordinate = definite ? at : kNever;
   return definite;
 }
 
@@ -313,12 +319,16 @@ void NonlinearEstimator::Solver::Report(NodalForces& forces) {
       forces);
 }
 
-NonlinearEstimator::NonlinearEstimator(const LinkModel& model, const ForceOptions& options)
-    : solver_(std::make_unique<Solver>(model, options,
-                                       options.refinement > 0 ? options.refinement : kDefaultRefinement)) {
+NonlinearEstimator::NonlinearEstimator(const LinkModel& model, const ForceOptions& options,
+                                       std::shared_ptr<PressurisedTangents> coarse) {
+  if (!coarse) {
+    coarse = std::make_shared<PressurisedTangents>(model, 1, MakeLoadSites(model, MakeShellMesh(model, 1)));
+  }
+  const int refinement = options.refinement > 0 ? options.refinement : kDefaultRefinement;
+  solver_ = std::make_unique<Solver>(model, options, refinement, coarse);
   ForceOptions cheaper = options;
   cheaper.refinement = 1;
-  fallback_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, cheaper);
+  fallback_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, cheaper, coarse);
 }
 NonlinearEstimator::~NonlinearEstimator() = default;
 
@@ -334,7 +344,7 @@ void NonlinearEstimator::Estimate(const SkinShape& shape, double pressure_mpa, N
   Solver& s = *solver_;
   ++s.work.frames;
   ClearForces(s.model.markers.count(), ForceModel::kNonlinear, forces);
-  const SkinTangent* tangent = s.tangents.At(pressure_mpa);
+  const SkinTangent* tangent = s.tangents->At(pressure_mpa);
   if (tangent == nullptr) {
     forces.converged = false;
     return;
@@ -346,7 +356,7 @@ void NonlinearEstimator::Estimate(const SkinShape& shape, double pressure_mpa, N
     s.data.Set(shape, s.predicted, s.model_sigma);
     s.fit.Begin(s.data);
     if (s.fit.MostSignificant(s.data, *tangent) < 0) return;
-    if (!s.BeginTouch(*tangent)) {
+    if (!s.BeginTouch(pressure_mpa)) {
       forces.converged = false;
       return;
     }

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "sensing/force/force_estimator.h"
+#include "sensing/force/pressurised_tangents.h"
 
 namespace taclink {
 
@@ -12,7 +13,9 @@ namespace taclink {
 /// to equilibrium.
 class NonlinearEstimator final : public ForceEstimator {
  public:
-  NonlinearEstimator(const LinkModel& model, const ForceOptions& options);
+  /// `coarse`: tangents at refinement 1 to share with others of the same link; none: its own.
+  NonlinearEstimator(const LinkModel& model, const ForceOptions& options,
+                     std::shared_ptr<PressurisedTangents> coarse = {});
   ~NonlinearEstimator() override;
 
   void Estimate(const SkinShape& shape, double pressure_mpa, NodalForces& forces) override;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <memory>
 #include <vector>
 
 #include "sensing/core/link_model.h"
@@ -24,23 +23,20 @@ struct SkinTangent {
 /// About the rest shape; the pressure's part is linear in the pressure.
 SkinTangent LinearTangent(const LinkModel& model, int refinement, const LoadSites& sites);
 
-/// About the inflated shape, by the nonlinear shell. Keeps what it has computed, by pressure; one thread.
-class PressurisedTangents {
- public:
-  PressurisedTangents(const LinkModel& model, int refinement, const LoadSites& sites);
-  ~PressurisedTangents();
-
-  /// That of the nearest pressure on a grid of 0.05 kPa; computed when it is first asked for. Null: the skin
-  /// has no equilibrium at this pressure.
-  const SkinTangent* At(double pressure_mpa);
-
-  /// The skin's state at the pressure last asked for, that of the last tangent returned.
-  const ShellState& Inflated() const;
-
- private:
-  struct Shell;
-  std::unique_ptr<Shell> shell_;
+/// A force of 1 N at a site of the first path; the others' answers follow from it: the skin is one of
+/// revolution.
+struct UnitForce {
+  int site = 0;
+  int direction = 0;  ///< column of the site's frame
 };
+std::vector<UnitForce> UnitForces(const LoadSites& sites);
+
+/// For all markers and sites; not set.
+void SizeColumns(const LinkModel& model, const LoadSites& sites, SkinTangent& tangent);
+
+/// The columns of a force's sites on all paths. `answer_mm`: of the markers to it, stacked.
+void FillColumns(const LinkModel& model, const LoadSites& sites, const UnitForce& force,
+                 const Eigen::VectorXd& answer_mm, SkinTangent& tangent);
 
 /// The markers' motion by a small step of the shell (by its degrees of freedom), to first order, mm.
 void MarkerMotions(const LinkModel& model, const ShellMesh& mesh, const NonlinearShell& shell,

@@ -8,7 +8,7 @@
 
 #include "sensing/force/force_estimator.h"
 #include "sensing/force/nonlinear_estimator.h"
-#include "sensing/force/skin_tangent.h"
+#include "sensing/force/pressurised_tangents.h"
 #include "sensing/mechanics/pressed_skin.h"
 #include "sensing/model/model_file.h"
 
