@@ -46,20 +46,18 @@ double RelativeError(ForceEstimator& estimator, const SkinShape& shape, double p
 
 AutoEstimator::AutoEstimator(const LinkModel& model, const ForceOptions& options)
     : model_(model), options_(options) {
-  ForceOptions cheap = options;
-  if (cheap.refinement == 0) cheap.refinement = 1;  // else a new pressure takes several frames' time
-  const LoadSites sites = MakeLoadSites(model, MakeShellMesh(model, 1));
-  const auto coarse = std::make_shared<PressurisedTangents>(model, 1, sites);
-  linear_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kLinear, cheap);
-  pressurised_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, cheap,
-                                                       cheap.refinement == 1 ? coarse : nullptr);
-  nonlinear_ = std::make_unique<NonlinearEstimator>(model, options, coarse);
+  if (options_.refinement == 0) options_.refinement = 1;  // else a new pressure takes several frames' time
+  const LoadSites sites = MakeLoadSites(model, MakeShellMesh(model, options_.refinement));
+  const auto tangents = std::make_shared<PressurisedTangents>(model, options_.refinement, sites);
+  linear_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kLinear, options_);
+  pressurised_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, options_, tangents);
+  nonlinear_ = std::make_unique<NonlinearEstimator>(model, options_, tangents);
   for (const double share : kLearnedPressures) {
     PressedSkin skin(model, {.refinement = 1});
     if (!skin.Inflate(share * PressureScale(model)).ok()) break;
     learned_.push_back(Learn(skin, share * PressureScale(model)));
   }
-  inflation_per_mpa_ = LinearTangent(model, 1, sites).per_pressure;
+  inflation_per_mpa_ = tangents->At(0)->per_pressure;
 }
 
 // Pushes a marker in the middle with a stamp, deeper and deeper.

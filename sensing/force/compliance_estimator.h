@@ -17,8 +17,8 @@ namespace taclink {
 /// with a stiffness would amplify camera noise, axial stiffness is 15 times the radial one (6.4).
 class ComplianceEstimator final : public ForceEstimator {
  public:
-  /// `model`: kLinear or kPressurised. `tangents`: to share with others of the same link, refinement and
-  /// point loads; none: its own.
+  /// `model`: kLinear or kPressurised. `tangents`: to share with others of the same link and refinement;
+  /// none: its own.
   ComplianceEstimator(const LinkModel& model, ForceModel force_model, const ForceOptions& options,
                       std::shared_ptr<PressurisedTangents> tangents = {});
 

@@ -28,15 +28,13 @@ constexpr double kSlow = 0.5;             // of the steps' decrease: time for a 
 }  // namespace
 
 struct NonlinearEstimator::Solver {
-  Solver(const LinkModel& link, const ForceOptions& options, int refinement,
-         std::shared_ptr<PressurisedTangents> coarse)
+  Solver(const LinkModel& link, const ForceOptions& options, std::shared_ptr<PressurisedTangents> shared)
       : model(link),
-        mesh(MakeShellMesh(link, refinement)),
+        mesh(MakeShellMesh(link, options.refinement)),
         shell(SkinSurface(mesh), link.material),
         sites(MakeLoadSites(link, mesh, LoadSpread::kPatch)),
         fit_options(FitOptions(options, sites.count())),
-        tangents(mesh.refinement == 1 ? std::move(coarse)
-                                      : std::make_shared<PressurisedTangents>(link, refinement, sites)),
+        tangents(std::move(shared)),
         data(link.markers.count(), options.noise_floor_mm),
         fit(sites, link.markers.count(), fit_options),
         hessian(shell.Pattern()),
@@ -78,7 +76,7 @@ struct NonlinearEstimator::Solver {
   NonlinearShell shell;
   LoadSites sites;
   LoadFitOptions fit_options;
-  std::shared_ptr<PressurisedTangents> tangents;
+  std::shared_ptr<PressurisedTangents> tangents;  // of point loads: good enough to find candidates
   MarkerData data;
   LoadFit fit;
   Eigen::SparseMatrix<double> hessian;
@@ -320,15 +318,15 @@ void NonlinearEstimator::Solver::Report(NodalForces& forces) {
 }
 
 NonlinearEstimator::NonlinearEstimator(const LinkModel& model, const ForceOptions& options,
-                                       std::shared_ptr<PressurisedTangents> coarse) {
-  if (!coarse) {
-    coarse = std::make_shared<PressurisedTangents>(model, 1, MakeLoadSites(model, MakeShellMesh(model, 1)));
+                                       std::shared_ptr<PressurisedTangents> tangents) {
+  ForceOptions mine = options;
+  if (mine.refinement == 0) mine.refinement = kDefaultRefinement;
+  if (!tangents) {
+    const LoadSites sites = MakeLoadSites(model, MakeShellMesh(model, mine.refinement));
+    tangents = std::make_shared<PressurisedTangents>(model, mine.refinement, sites);
   }
-  const int refinement = options.refinement > 0 ? options.refinement : kDefaultRefinement;
-  solver_ = std::make_unique<Solver>(model, options, refinement, coarse);
-  ForceOptions cheaper = options;
-  cheaper.refinement = 1;
-  fallback_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, cheaper, coarse);
+  solver_ = std::make_unique<Solver>(model, mine, tangents);
+  fallback_ = std::make_unique<ComplianceEstimator>(model, ForceModel::kPressurised, mine, tangents);
 }
 NonlinearEstimator::~NonlinearEstimator() = default;
 

@@ -13,9 +13,9 @@ namespace taclink {
 /// to equilibrium.
 class NonlinearEstimator final : public ForceEstimator {
  public:
-  /// `coarse`: tangents at refinement 1 to share with others of the same link; none: its own.
+  /// `tangents`: to share with others of the same link and refinement; none: its own.
   NonlinearEstimator(const LinkModel& model, const ForceOptions& options,
-                     std::shared_ptr<PressurisedTangents> coarse = {});
+                     std::shared_ptr<PressurisedTangents> tangents = {});
   ~NonlinearEstimator() override;
 
   void Estimate(const SkinShape& shape, double pressure_mpa, NodalForces& forces) override;
