@@ -84,17 +84,15 @@ void ComplianceEstimator::Estimate(const SkinShape& shape, double pressure_mpa, 
     if (std::isfinite(fit_.load_n(k))) last_.push_back({fit_.sites_in()[k], fit_.load_n(k)});
   }
   fit_.RemoveBias();
-  fit_.Report(
-      data_,
-      [&](const auto& shares, int direction) -> const Eigen::VectorXd& {
-        const auto& columns = direction == 0 ? tangent->around_mm_n : tangent->along_mm_n;
-        column_.setZero();
-        for (Eigen::Index k = 0; k < shares.size(); ++k) {
-          column_ += shares[k] * columns.col(fit_.sites_in()[static_cast<size_t>(k)]).template cast<double>();
-        }
-        return column_;
-      },
-      forces);
+  fit_.AddTangential(data_, [&](const auto& shares, int direction) -> const Eigen::VectorXd& {
+    const auto& columns = direction == 0 ? tangent->around_mm_n : tangent->along_mm_n;
+    column_.setZero();
+    for (Eigen::Index k = 0; k < shares.size(); ++k) {
+      column_ += shares[k] * columns.col(fit_.sites_in()[static_cast<size_t>(k)]).template cast<double>();
+    }
+    return column_;
+  });
+  fit_.Write(data_, forces);
 }
 
 }  // namespace taclink

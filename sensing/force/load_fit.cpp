@@ -222,6 +222,18 @@ bool LoadFit::StepToOptimum(double significance) {
   return false;
 }
 
+void LoadFit::AddToData(const Eigen::VectorXd& by_mm) {
+  target_ += by_mm;
+  const auto n = static_cast<Eigen::Index>(sites_in_.size());
+  rhs_.head(n).noalias() += weighed_.leftCols(n).transpose() * by_mm;
+  UpdateResidual();
+}
+
+Vec2 LoadFit::tangential_n(size_t k) const {
+  const auto n = static_cast<Eigen::Index>(sites_in_.size());
+  return load_n(k) / totals_[group_[k]] * solution_.segment<2>(n + 2 * group_[k]);
+}
+
 void LoadFit::Optimise(double significance) {
   while (!StepToOptimum(significance)) {
   }

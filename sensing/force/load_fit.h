@@ -52,11 +52,16 @@ class LoadFit {
   double load_n(size_t k) const { return load_[static_cast<Eigen::Index>(k)]; }
   const Eigen::VectorXd& residual_mm() const { return residual_; }
 
-  /// Adds tangential forces of the contacts, and writes all into `forces` with covariance.
-  /// `tangential(shares, direction)`: column of a force of 1 N around (0) or along (1) the axis that the
-  /// sites that are in share so.
+  /// Makes the data larger by what loads that are not let in made of them, stacked markers.
+  void AddToData(const Eigen::VectorXd& by_mm);
+  /// Adds tangential forces of the contacts. `tangential(shares, direction)`: column of a force of 1 N around
+  /// (0) or along (1) the axis that the sites that are in share so.
   template <typename Tangential>
-  void Report(const MarkerData& data, Tangential tangential, NodalForces& forces);
+  void AddTangential(const MarkerData& data, Tangential tangential);
+  /// Of the k-th load: around and along the axis, its share of its contact's. After AddTangential.
+  Vec2 tangential_n(size_t k) const;
+  /// Writes all into `forces` with covariance. After AddTangential.
+  void Write(const MarkerData& data, NodalForces& forces);
 
  private:
   double NormOf(const MarkerData& data, const SkinTangent& tangent, int site);
@@ -69,7 +74,6 @@ class LoadFit {
   void SolveSystem(Eigen::Index size, bool with_covariance);
   /// Returns the load that would pull most, -1: none.
   Eigen::Index FitTangential(const MarkerData& data);
-  void Write(const MarkerData& data, NodalForces& forces);
 
   const LoadSites& sites_;
   LoadFitOptions options_;
@@ -94,7 +98,7 @@ class LoadFit {
 };
 
 template <typename Tangential>
-void LoadFit::Report(const MarkerData& data, Tangential tangential, NodalForces& forces) {
+void LoadFit::AddTangential(const MarkerData& data, Tangential tangential) {
   // Loads that only made up for a tangential force would pull now, and leave.
   for (Eigen::Index pulling = 0; pulling >= 0;) {
     FindGroups();
@@ -113,7 +117,6 @@ void LoadFit::Report(const MarkerData& data, Tangential tangential, NodalForces&
     pulling = FitTangential(data);
     if (pulling >= 0) Remove(static_cast<size_t>(pulling));
   }
-  Write(data, forces);
 }
 
 }  // namespace taclink

@@ -48,10 +48,11 @@ struct NonlinearEstimator::Solver {
 
   struct Load {
     int site = 0;
-    double load_n = 0;
-    Eigen::VectorXd motion;    // of the shell, per N, by degree of freedom
-    Eigen::VectorXd column;    // of the markers, per N
-    Eigen::MatrixXd sideways;  // the same, around and along; empty: not solved for yet
+    double load_n = 0;                          // inwards
+    Vec2 sideways_n = Vec2::Zero();             // around and along the axis
+    Eigen::VectorXd motion;                     // of the shell, per N, by degree of freedom
+    Eigen::VectorXd column;                     // of the markers, per N
+    Eigen::MatrixXd sideways_motion, sideways;  // the same, around and along; empty: not solved for yet
   };
 
   void Rest();
@@ -59,17 +60,18 @@ struct NonlinearEstimator::Solver {
   bool Refactor();
   void SolveColumns(Load& load);
   Eigen::VectorXd Solve(const Eigen::VectorXd& by_force);
-  const Eigen::MatrixXd& Sideways(Load& load);
+  void SolveSideways(Load& load);
   std::vector<Load>::iterator FindLoad(int site) {
     return std::find_if(loads.begin(), loads.end(), [&](const Load& load) { return load.site == site; });
   }
   void AddForce(int site, int direction, double load_n, Eigen::VectorXd& force) const;
+  void SubtractLoads();
   double Unbalance(const ElementLoad& pressure);
   void SetData(const SkinShape& shape, const SkinTangent& tangent, double pressure_mpa);
   bool FindLoads(const SkinTangent& tangent);
+  void AddTangential();
   double Advance();
   bool Iterate(const SkinShape& shape, const SkinTangent& tangent, double pressure_mpa);
-  void Report(NodalForces& forces);
 
   LinkModel model;
   ShellMesh mesh;
@@ -193,23 +195,34 @@ void NonlinearEstimator::Solver::SolveColumns(Load& load) {
   load.sideways.resize(load.column.size(), 0);
 }
 
-const Eigen::MatrixXd& NonlinearEstimator::Solver::Sideways(Load& load) {
-  if (load.sideways.cols() > 0) return load.sideways;
+void NonlinearEstimator::Solver::SolveSideways(Load& load) {
+  if (load.sideways.cols() > 0) return;
   load.sideways.resize(load.column.size(), 2);
+  load.sideways_motion.resize(shell.dof_count(), 2);
   for (int direction = 0; direction < 2; ++direction) {
     force.setZero(shell.dof_count());
     AddForce(load.site, direction + 1, 1, force);
-    MarkerMotions(model, mesh, shell, state, Solve(force), column);
+    load.sideways_motion.col(direction) = Solve(force);
+    MarkerMotions(model, mesh, shell, state, load.sideways_motion.col(direction), column);
     load.sideways.col(direction) = column;
   }
-  return load.sideways;
+}
+
+// Of all loads, from the gradient.
+void NonlinearEstimator::Solver::SubtractLoads() {
+  for (const Load& load : loads) {
+    AddForce(load.site, 0, -load.load_n, gradient);
+    for (int i = 0; i < 2; ++i) {
+      if (load.sideways_n[i] != 0) AddForce(load.site, i + 1, -load.sideways_n[i], gradient);
+    }
+  }
 }
 
 // Residual of the shell under pressure and loads, into `gradient`; its largest entry.
 double NonlinearEstimator::Solver::Unbalance(const ElementLoad& pressure) {
   const ElementLoad* all[] = {&pressure};
   shell.Gradient(state, all, gradient);
-  for (const Load& load : loads) AddForce(load.site, 0, -load.load_n, gradient);
+  SubtractLoads();
   return gradient.cwiseAbs().maxCoeff();
 }
 
@@ -250,18 +263,48 @@ bool NonlinearEstimator::Solver::FindLoads(const SkinTangent& tangent) {
     fit.Optimise(fit_options.significance);
   }
   fit.RemoveBias();
+  AddTangential();
   return true;
+}
+
+// What acts sideways was held while sites were sought; now it is sought itself.
+void NonlinearEstimator::Solver::AddTangential() {
+  sum.setZero(predicted.size());
+  for (Load& load : loads) {
+    if (load.sideways_n.isZero()) continue;
+    SolveSideways(load);
+    sum += load.sideways * load.sideways_n;
+  }
+  fit.AddToData(sum);
+  fit.AddTangential(data, [&](const auto& shares, int direction) -> const Eigen::VectorXd& {
+    sum.setZero(predicted.size());
+    for (Eigen::Index k = 0; k < shares.size(); ++k) {
+      if (shares[k] == 0) continue;
+      const auto load = FindLoad(fit.sites_in()[static_cast<size_t>(k)]);
+      SolveSideways(*load);
+      sum += shares[k] * load->sideways.col(direction);
+    }
+    return sum;
+  });
 }
 
 // Takes the state to the loads of the fit. Returns the longest motion of a node.
 double NonlinearEstimator::Solver::Advance() {
   step = settle;
-  std::vector<double> wanted(loads.size(), 0.0);
+  struct Force {
+    double inward = 0;
+    Vec2 sideways = Vec2::Zero();
+  };
+  std::vector<Force> wanted(loads.size());
   for (size_t k = 0; k < fit.sites_in().size(); ++k) {
     const auto at = FindLoad(fit.sites_in()[k]);
-    wanted[static_cast<size_t>(at - loads.begin())] = fit.load_n(k);
+    wanted[static_cast<size_t>(at - loads.begin())] = {fit.load_n(k), fit.tangential_n(k)};
   }
-  for (size_t i = 0; i < loads.size(); ++i) step += (wanted[i] - loads[i].load_n) * loads[i].motion;
+  for (size_t i = 0; i < loads.size(); ++i) {
+    step += (wanted[i].inward - loads[i].load_n) * loads[i].motion;
+    const Vec2 more = wanted[i].sideways - loads[i].sideways_n;
+    if (!more.isZero()) step += loads[i].sideways_motion * more;
+  }
   double longest = 0;
   for (int node = 0; node < shell.node_count(); ++node) {
     const int dof = shell.Dof(node, 0);
@@ -269,7 +312,10 @@ double NonlinearEstimator::Solver::Advance() {
   }
   const double share = std::min(1.0, kMaxStepMm / std::max(longest, 1e-12));
   shell.Step(share * step, state);
-  for (size_t i = 0; i < loads.size(); ++i) loads[i].load_n += share * (wanted[i] - loads[i].load_n);
+  for (size_t i = 0; i < loads.size(); ++i) {
+    loads[i].load_n += share * (wanted[i].inward - loads[i].load_n);
+    loads[i].sideways_n += share * (wanted[i].sideways - loads[i].sideways_n);
+  }
   std::erase_if(loads, [](const Load& load) { return load.load_n <= 0; });
   return longest;
 }
@@ -288,7 +334,7 @@ bool NonlinearEstimator::Solver::Iterate(const SkinShape& shape, const SkinTange
     if (in_use == nullptr || (slow && made < kMostTangents)) {
       ++made;
       shell.Hessian(state, all, gradient, hessian);
-      for (const Load& load : loads) AddForce(load.site, 0, -load.load_n, gradient);
+      SubtractLoads();
       if (!Refactor()) return false;
     }
     SetData(shape, tangent, pressure_mpa);
@@ -300,21 +346,6 @@ bool NonlinearEstimator::Solver::Iterate(const SkinShape& shape, const SkinTange
     if (longest < kSettledMm || longest * shrinkage < 0.5 * kSettledMm) return true;
   }
   return longest < kNearlySettledMm;
-}
-
-void NonlinearEstimator::Solver::Report(NodalForces& forces) {
-  fit.Report(
-      data,
-      [&](const auto& shares, int direction) -> const Eigen::VectorXd& {
-        sum.setZero(predicted.size());
-        for (Eigen::Index k = 0; k < shares.size(); ++k) {
-          if (shares[k] == 0) continue;
-          const auto load = FindLoad(fit.sites_in()[static_cast<size_t>(k)]);
-          if (load != loads.end()) sum += shares[k] * Sideways(*load).col(direction);
-        }
-        return sum;
-      },
-      forces);
 }
 
 NonlinearEstimator::NonlinearEstimator(const LinkModel& model, const ForceOptions& options,
@@ -367,7 +398,7 @@ void NonlinearEstimator::Estimate(const SkinShape& shape, double pressure_mpa, N
     forces.converged = false;
     return;
   }
-  s.Report(forces);
+  s.fit.Write(s.data, forces);
 }
 
 }  // namespace taclink
