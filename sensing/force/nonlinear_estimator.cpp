@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -48,11 +49,12 @@ struct NonlinearEstimator::Solver {
 
   struct Load {
     int site = 0;
-    double load_n = 0;                          // inwards
-    Vec2 sideways_n = Vec2::Zero();             // around and along the axis
-    Eigen::VectorXd motion;                     // of the shell, per N, by degree of freedom
-    Eigen::VectorXd column;                     // of the markers, per N
-    Eigen::MatrixXd sideways_motion, sideways;  // the same, around and along; empty: not solved for yet
+    double load_n = 0;               // inwards
+    Vec2 sideways_n = Vec2::Zero();  // around and along the axis
+    Eigen::VectorXd motion;          // of the shell, per N, by degree of freedom
+    Eigen::VectorXd column;          // of the markers, per N
+    bool has_sideways = false;       // the same, around and along the axis
+    std::array<Eigen::VectorXd, 2> sideways_motion, sideways;
   };
 
   void Rest();
@@ -192,19 +194,18 @@ void NonlinearEstimator::Solver::SolveColumns(Load& load) {
   AddForce(load.site, 0, 1, force);
   load.motion = Solve(force);
   MarkerMotions(model, mesh, shell, state, load.motion, load.column);
-  load.sideways.resize(load.column.size(), 0);
+  load.has_sideways = false;
 }
 
 void NonlinearEstimator::Solver::SolveSideways(Load& load) {
-  if (load.sideways.cols() > 0) return;
-  load.sideways.resize(load.column.size(), 2);
-  load.sideways_motion.resize(shell.dof_count(), 2);
+  if (load.has_sideways) return;
+  load.has_sideways = true;
   for (int direction = 0; direction < 2; ++direction) {
+    const auto d = static_cast<size_t>(direction);
     force.setZero(shell.dof_count());
     AddForce(load.site, direction + 1, 1, force);
-    load.sideways_motion.col(direction) = Solve(force);
-    MarkerMotions(model, mesh, shell, state, load.sideways_motion.col(direction), column);
-    load.sideways.col(direction) = column;
+    load.sideways_motion[d] = Solve(force);
+    MarkerMotions(model, mesh, shell, state, load.sideways_motion[d], load.sideways[d]);
   }
 }
 
@@ -273,7 +274,7 @@ void NonlinearEstimator::Solver::AddTangential() {
   for (Load& load : loads) {
     if (load.sideways_n.isZero()) continue;
     SolveSideways(load);
-    sum += load.sideways * load.sideways_n;
+    sum += load.sideways_n.x() * load.sideways[0] + load.sideways_n.y() * load.sideways[1];
   }
   fit.AddToData(sum);
   fit.AddTangential(data, [&](const auto& shares, int direction) -> const Eigen::VectorXd& {
@@ -282,7 +283,7 @@ void NonlinearEstimator::Solver::AddTangential() {
       if (shares[k] == 0) continue;
       const auto load = FindLoad(fit.sites_in()[static_cast<size_t>(k)]);
       SolveSideways(*load);
-      sum += shares[k] * load->sideways.col(direction);
+      sum += shares[k] * load->sideways[static_cast<size_t>(direction)];
     }
     return sum;
   });
@@ -303,7 +304,9 @@ double NonlinearEstimator::Solver::Advance() {
   for (size_t i = 0; i < loads.size(); ++i) {
     step += (wanted[i].inward - loads[i].load_n) * loads[i].motion;
     const Vec2 more = wanted[i].sideways - loads[i].sideways_n;
-    if (!more.isZero()) step += loads[i].sideways_motion * more;
+    for (size_t d = 0; d < 2; ++d) {
+      if (more[static_cast<int>(d)] != 0) step += more[static_cast<int>(d)] * loads[i].sideways_motion[d];
+    }
   }
   double longest = 0;
   for (int node = 0; node < shell.node_count(); ++node) {
