@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sensing/camera/closed_form.h"
+#include "sensing/camera/dome.h"
 #include "sensing/camera/projection.h"
 
 namespace taclink {
@@ -112,11 +113,7 @@ Vec3 SeenPoint(const LinkModel& model, int marker, const Vec3& camera_mm, bool d
   if (!domes || rise <= 0) return center;
   const double z = model.markers.rings_z_mm[static_cast<size_t>(model.RingOf(marker))];
   const Vec3 inward = -model.OutwardNormal(model.PathAngle(model.PathOf(marker)), z);
-  const Vec3 foot = center - rise * inward;
-  const Vec3 to_camera = (camera_mm - foot).normalized();
-  const double facing = std::clamp(inward.dot(to_camera), 0.0, 1.0);
-  const Vec3 across = inward - inward.dot(to_camera) * to_camera;
-  return across.norm() > 1e-9 ? Vec3(foot + rise * (1 - facing) * across.normalized()) : foot;
+  return SeenOfDome(center, inward, rise, camera_mm);
 }
 
 int CountUsable(std::span<const MarkerObservation> rest) {

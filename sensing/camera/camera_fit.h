@@ -10,11 +10,8 @@
 
 namespace taclink {
 
-/// The point of a marker whose projection is the centre of what `camera_mm` sees of it (link frame, mm). A
-/// dome of half a ball looks like a half disc from the side, and like a disc about its foot from above: its
-/// outline's centroid stands (1 - c) h off the foot, across the line of sight, where c is the cosine between
-/// that and the wall's inward normal and h = 4 r / (3 pi) how much deeper than the wall the model's
-/// center_depth_mm is. `domes` false: the model's centre, from everywhere.
+/// The point of a marker at rest whose projection is the centre of what `camera_mm` sees of it (link frame,
+/// mm), see SeenOfDome. `domes` false: the model's centre, from everywhere.
 Vec3 SeenPoint(const LinkModel& model, int marker, const Vec3& camera_mm, bool domes);
 
 struct CameraFitOptions {

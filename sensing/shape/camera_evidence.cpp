@@ -19,6 +19,7 @@ CameraEvidence::CameraEvidence(const LinkModel& model, const StereoRig& rig, con
       basis_(basis),
       projectors_{Projector(rig[CameraId::kTop]), Projector(rig[CameraId::kBottom])},
       rest_mm_(model.RestMarkers()),
+      looks_(model, basis, {projectors_[0].center_in_link(), projectors_[1].center_in_link()}),
       observations_(rest_mm_.size() * kCameraCount),
       exact_(rest_mm_.size()) {
   for (size_t i = 0; i < observations_.size(); ++i) {
@@ -33,8 +34,9 @@ CameraEvidence::CameraEvidence(const LinkModel& model, const StereoRig& rig, con
 // Where the point can't be projected, the old linearisation stays.
 void CameraEvidence::Linearise(Observation& o, size_t camera, int marker, const Vec3& u) const {
   const Mat3& frame = basis_.Frame(marker);
-  const auto projected =
-      projectors_[camera].ProjectWithJacobian(rest_mm_[static_cast<size_t>(marker)] + frame * u);
+  const auto m = static_cast<size_t>(marker);
+  const Vec3 seen = rest_mm_[m] + frame * u + (options_.domes ? looks_.Offset(m, camera) : Vec3::Zero());
+  const auto projected = projectors_[camera].ProjectWithJacobian(seen);
   if (!projected) return;
   o.linear = true;
   o.at = u;
@@ -42,7 +44,19 @@ void CameraEvidence::Linearise(Observation& o, size_t camera, int marker, const 
   o.jacobian.noalias() = projected->jacobian * frame;
 }
 
+double CameraEvidence::UpdateLooks(const Eigen::VectorXd& u) {
+  if (!options_.domes) return 0;
+  const double changed_mm = looks_.Update(u);
+  if (changed_mm == 0) return 0;
+  for (size_t i = 0; i < observations_.size(); ++i) {
+    Observation& o = observations_[i];
+    if (o.seen) Linearise(o, i % kCameraCount, static_cast<int>(i / kCameraCount), o.at);
+  }
+  return changed_mm;
+}
+
 void CameraEvidence::SetBaseline(const LabelledMarkers& rest, const Eigen::VectorXd& u) {
+  looks_.SetBaseline(u);
   for (size_t i = 0; i < observations_.size(); ++i) {
     Observation& o = observations_[i];
     const size_t camera = i % kCameraCount, marker = i / kCameraCount;

@@ -7,12 +7,15 @@
 #include "sensing/camera/projection.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
+#include "sensing/shape/dome_looks.h"
 #include "sensing/shape/evidence.h"
 #include "sensing/shape/skin_basis.h"
 
 namespace taclink {
 
 struct CameraEvidenceOptions {
+  /// Markers are half balls that show another side to a camera as the wall tilts; false: points.
+  bool domes = true;
   /// Error of the calibrated cameras themselves, px; added to each detection's.
   double camera_sigma_px = 0.1;
   /// Error of the places at rest beyond the covariances that come with them, px.
@@ -36,9 +39,13 @@ class CameraEvidence : public Evidence {
                  const CameraEvidenceOptions& options);
 
   /// Takes the markers at rest, where they are displaced by `u` from the model. What their pixels are off the
-  /// model's projection is systematic (a dome's centroid, the lens, its place in the mould), and is
-  /// subtracted from later observations, whose variance its noise joins.
+  /// model's projection is systematic (the lens, a marker's place in the mould), and is subtracted from later
+  /// observations, whose variance its noise joins.
   void SetBaseline(const LabelledMarkers& rest, const Eigen::VectorXd& u);
+
+  /// Takes the walls' tilts from displacements `u`: the last estimate. Returns the longest change of a seen
+  /// point against its marker's centre, mm; if it is large, the estimate is worth repeating.
+  double UpdateLooks(const Eigen::VectorXd& u);
 
   /// A new frame's observations. What was dropped stays so, until Readmit or the marker is not seen.
   void Observe(const LabelledMarkers& markers);
@@ -83,6 +90,7 @@ class CameraEvidence : public Evidence {
   const SkinBasis& basis_;
   const std::vector<Projector> projectors_;
   std::vector<Vec3> rest_mm_;  // link frame
+  DomeLooks looks_;
   std::vector<Observation> observations_;
   std::vector<MarkerEvidence> exact_;
   Misfit worst_;

@@ -7,6 +7,8 @@ namespace {
 
 // Where nothing was measured the estimate stands in, without information.
 constexpr double kNoInformation = 1e-9;  // 1/mm^2
+constexpr int kMostPasses = 3;
+constexpr double kSameLookMm = 0.1;
 
 // R M R^T of a symmetric M, R a turn about Z.
 Mat3 Turned(const Mat3& r, const Mat3& m) {
@@ -43,7 +45,11 @@ void ShapeReconstructor::SetBaseline(const LabelledMarkers& rest, double pressur
 void ShapeReconstructor::Reconstruct(const LabelledMarkers& markers, std::optional<double> pressure_mpa,
                                      SkinShape& shape) {
   evidence_.Observe(markers);
-  estimator_.Estimate(evidence_, {pressure_mpa.value_or(0), pressure_mpa.has_value()});
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    estimator_.Estimate(evidence_, {pressure_mpa.value_or(0), pressure_mpa.has_value()});
+    // A step between frames is small, and the next frame has it.
+    if (evidence_.UpdateLooks(estimator_.displacements()) < kSameLookMm) break;
+  }
   Write(shape);
 }
 

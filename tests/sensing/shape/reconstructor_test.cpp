@@ -35,6 +35,7 @@ class ReconstructorTest : public testing::TestWithParam<std::string> {
  protected:
   ReconstructorTest() {
     options_.cameras.camera_sigma_px = 0;
+    options_.cameras.domes = false;  // the eyes see points
     reconstructor_.emplace(model_, model_.nominal_rig, options_);
   }
   void TakeRest() { reconstructor_->SetBaseline(eyes_.See(model_.RestMarkers(), kNoisePx / std::sqrt(8.0))); }
