@@ -18,7 +18,8 @@ void Shape(benchmark::State& state) {
   const std::vector<Push> all = {{0.3, 0.5, 8}, {2.2, 0.3, 12}, {4.4, 0.7, 6}};
   const auto truth = TrueMarkers(model, {all.begin(), all.begin() + state.range(1)});
   Eyes eyes(model.nominal_rig);
-  ShapeReconstructor reconstructor(model, model.nominal_rig, {.cameras = {.domes = false}});  // points
+  ShapeReconstructor reconstructor(model, model.nominal_rig,
+                                   {.cameras = {.domes = false}, .estimator = {}});  // points
   reconstructor.SetBaseline(eyes.See(model.RestMarkers(), kNoisePx / std::sqrt(8.0)));
   std::vector<LabelledMarkers> frames;
   for (int i = 0; i < kFrames; ++i) frames.push_back(eyes.See(truth, kNoisePx));
