@@ -6,6 +6,8 @@
 namespace taclink {
 namespace {
 
+constexpr double kSameOffsetMm = 0.01;
+
 bool IsUsable(const MarkerObservation& o) {
   return o.seen && o.center_px.allFinite() && o.covariance_px2.allFinite() &&
          o.covariance_px2.diagonal().minCoeff() >= 0;
@@ -35,8 +37,8 @@ CameraEvidence::CameraEvidence(const LinkModel& model, const StereoRig& rig, con
 void CameraEvidence::Linearise(Observation& o, size_t camera, int marker, const Vec3& u) const {
   const Mat3& frame = basis_.Frame(marker);
   const auto m = static_cast<size_t>(marker);
-  const Vec3 seen = rest_mm_[m] + frame * u + (options_.domes ? looks_.Offset(m, camera) : Vec3::Zero());
-  const auto projected = projectors_[camera].ProjectWithJacobian(seen);
+  if (options_.domes) o.seen_offset = looks_.Offset(m, camera);
+  const auto projected = projectors_[camera].ProjectWithJacobian(rest_mm_[m] + frame * u + o.seen_offset);
   if (!projected) return;
   o.linear = true;
   o.at = u;
@@ -50,7 +52,10 @@ double CameraEvidence::UpdateLooks(const Eigen::VectorXd& u) {
   if (changed_mm == 0) return 0;
   for (size_t i = 0; i < observations_.size(); ++i) {
     Observation& o = observations_[i];
-    if (o.seen) Linearise(o, i % kCameraCount, static_cast<int>(i / kCameraCount), o.at);
+    const size_t m = i / kCameraCount, c = i % kCameraCount;
+    if (!o.seen || (looks_.Offset(m, c) - o.seen_offset).squaredNorm() < kSameOffsetMm * kSameOffsetMm)
+      continue;
+    Linearise(o, c, static_cast<int>(m), o.at);
   }
   return changed_mm;
 }

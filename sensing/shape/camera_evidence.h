@@ -79,6 +79,7 @@ class CameraEvidence : public Evidence {
     Vec2 rest_px = Vec2::Zero();
     bool linear = false;  // the rest is of the linearisation
     Vec3 at = Vec3::Zero();
+    Vec3 seen_offset = Vec3::Zero();  // from the centre to what is seen
     Vec2 projected = Vec2::Zero();
     Eigen::Matrix<double, 2, 3> jacobian = Eigen::Matrix<double, 2, 3>::Zero();
   };
