@@ -8,6 +8,8 @@
 namespace taclink {
 namespace {
 
+// A load between a clamped end and the first markers looks like a smaller one at these; of its significance.
+constexpr double kBeyondMarkers = 0.9;
 constexpr double kRidge = 1e-6;  // of the system's diagonal: neighbours on a fine grid are nearly alike
 
 // With the widest registers that the processor has.
@@ -141,7 +143,8 @@ int LoadFit::MostSignificant(const MarkerData& data, const SkinTangent& tangent)
   for (int s = 0; s < sites_.count(); ++s) {
     const auto i = static_cast<size_t>(s);
     if (!near_[i] || is_in_[i]) continue;
-    const double pull = Dot(tangent.inward_mm_n.col(s).data(), search_.data(), search_.size());
+    const double handicap = sites_.beyond_markers[i] ? kBeyondMarkers : 1;
+    const double pull = handicap * Dot(tangent.inward_mm_n.col(s).data(), search_.data(), search_.size());
     if (pull <= 0 || pull * pull <= best_score * best_score * LeastSquareOf(data, tangent, s)) continue;
     const double norm = NormOf(data, tangent, s);
     if (norm > 0 && pull > best_score * norm) {

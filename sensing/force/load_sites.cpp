@@ -49,7 +49,9 @@ LoadSites MakeLoadSites(const LinkModel& model, const ShellMesh& mesh, LoadSprea
       sites.spreads.push_back(SpreadAt(mesh, column * step, row * step, spread));
       sites.frames.push_back(frame);
       const double path = static_cast<double>(column) / sites.columns_per_path;
-      const double ring = std::clamp(static_cast<double>(row) / sites.columns_per_path - 1, 0.0, rings - 1.0);
+      const double free_ring = static_cast<double>(row) / sites.columns_per_path - 1;
+      const double ring = std::clamp(free_ring, 0.0, rings - 1.0);
+      sites.beyond_markers.push_back(ring != free_ring);
       const int path_0 = static_cast<int>(path), ring_0 = std::min(static_cast<int>(ring), rings - 2);
       const double a = path - path_0, b = ring - ring_0;
       const int path_1 = (path_0 + 1) % paths;

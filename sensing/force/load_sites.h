@@ -33,6 +33,7 @@ struct LoadSites {
   std::vector<std::array<Share, 4>> shares;
   std::vector<int> nearest_markers;
   std::vector<std::vector<int>> around_markers;  ///< the nearest one and its neighbours
+  std::vector<char> beyond_markers;              ///< between a clamped end and the ring next to it
 
   int count() const { return columns * rows; }
   int Column(int site) const { return site % columns; }
