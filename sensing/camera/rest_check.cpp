@@ -15,7 +15,7 @@ constexpr size_t kLeastNeighbours = 5;  // of a marker and the 8 around it
 // A mould's shape may be off by as much as 1 mm, smoothly; a patch is a touch if it stands out from such
 // errors, or is deeper than any.
 constexpr double kStandsOut = 3.5;
-constexpr double kNoMouldMm = 1.4;
+constexpr double kNoMouldMm = 1.2;
 
 // How far each marker lies further in than the model has it, if it moved along the radius only: least squares
 // over the pictures that show it. None: unseen.

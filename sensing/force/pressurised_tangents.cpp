@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <map>
-#include <utility>
 
 #include "sensing/mechanics/equilibrium.h"
 #include "sensing/mechanics/pressed_skin.h"
@@ -129,14 +127,12 @@ bool PressurisedTangents::Shell::Inflate(double from_mpa, double to_mpa, ShellSt
 
 // From its neighbour, to stay on the branch of the skin's states that begins at rest.
 std::unique_ptr<PressurisedTangents::Shell::Known> PressurisedTangents::Shell::Learn(int cell) {
+  const Known* near = cell == 0 ? nullptr : Find(cell > 0 ? cell - 1 : cell + 1);
+  if (cell != 0 && near == nullptr) return nullptr;
   auto fresh = std::make_unique<Known>();
   fresh->tangent.pressure_mpa = PressureOf(cell);
-  if (cell == 0) {
-    fresh->state = shell.Rest();
-  } else {
-    const Known* near = Find(cell > 0 ? cell - 1 : cell + 1);
-    if (near == nullptr) return nullptr;
-    fresh->state = near->state;
+  fresh->state = near != nullptr ? near->state : shell.Rest();
+  if (near != nullptr) {
     const double from_mpa = near->tangent.pressure_mpa, change = fresh->tangent.pressure_mpa - from_mpa;
     if (std::abs(change) <= kPressureStep * PressureScale(model)) {
       shell.Step(change * near->by_pressure, fresh->state);  // where it will be, nearly
@@ -144,8 +140,7 @@ std::unique_ptr<PressurisedTangents::Shell::Known> PressurisedTangents::Shell::L
     if (!Inflate(from_mpa, fresh->tangent.pressure_mpa, fresh->state)) return nullptr;
   }
   if (!Compute(*fresh)) return nullptr;
-  if (cell != 0 && !AreOnOneBranch(fresh->tangent, Find(cell > 0 ? cell - 1 : cell + 1)->tangent))
-    return nullptr;
+  if (near != nullptr && !AreOnOneBranch(fresh->tangent, near->tangent)) return nullptr;
   return fresh;
 }
 

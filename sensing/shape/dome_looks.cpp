@@ -13,8 +13,7 @@ constexpr double kStillMm = 0.2;  // a motion that tilts the wall by a degree at
 
 DomeLooks::DomeLooks(const LinkModel& model, const SkinBasis& basis,
                      const std::array<Vec3, kCameraCount>& cameras_mm)
-    : model_(model),
-      basis_(basis),
+    : basis_(basis),
       cameras_mm_(cameras_mm),
       rise_mm_(std::max(0.0, model.markers.center_depth_mm - model.thickness_mm)),
       rest_mm_(model.RestMarkers()),

@@ -28,7 +28,6 @@ class DomeLooks {
   Vec3 NormalAt(int marker) const;
   void Place(const Eigen::VectorXd& u);
 
-  const LinkModel model_;
   const SkinBasis& basis_;
   const std::array<Vec3, kCameraCount> cameras_mm_;
   const double rise_mm_;

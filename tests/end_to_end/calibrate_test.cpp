@@ -24,7 +24,7 @@ class CalibrateTest : public ScratchFolder {
     built_ = LoadLinkModel(Write("built.yaml", built)).value();
     const std::string scene = Write("scene.yaml",
                                     "taclink_scene: 1\nname: push\nmodel: cylinder\nframe_rate_hz: 10\n"
-                                    "duration_s: 3\ncontacts:\n  - {at: {path: 7, ring: 5}, force_n: 0.15, "
+                                    "duration_s: 3\ncontacts:\n  - {at: {path: 7, ring: 5}, force_n: 0.1, "
                                     "begin_s: 0.5, end_s: 2.9, ramp_s: 0.2}\n");
     const Finished run =
         Taclink({"simulate", "--scene", scene, "--model", Path("built.yaml"), "--out", Path("out")});
@@ -67,7 +67,7 @@ TEST_F(CalibrateTest, RigIsFoundWrittenAndSolvesWithIt) {
   ASSERT_EQ(solved.exit_code, 0) << solved.err;
   const json contacts = json::parse(solved.out).at("contacts");
   ASSERT_EQ(contacts.size(), 1u);
-  EXPECT_NEAR(ToVec3(contacts[0].at("force_n")).norm(), 0.15, 0.03);
+  EXPECT_NEAR(ToVec3(contacts[0].at("force_n")).norm(), 0.1, 0.02);
 }
 
 TEST_F(CalibrateTest, TableAndPictureOfResiduals) {

@@ -165,8 +165,11 @@ TEST(Calibration, FilesOfVersionOneAreRead) {
 TEST(Calibration, TouchedSkinIsRefusedAndSaidWhere) {
   const Cameras setup;
   std::mt19937 random(11);
-  for (const double depth_mm : {1.5, 4.0, -2.0}) {
-    const Dent dent{setup.truth.PathAngle(6), 90, depth_mm, 20};
+  struct Touch {
+    double depth_mm, width_mm;
+  };
+  for (const auto& [depth_mm, width_mm] : {Touch{1.5, 20}, Touch{4, 20}, Touch{-2, 20}, Touch{4, 9}}) {
+    const Dent dent{setup.truth.PathAngle(6), 90, depth_mm, width_mm};
     const auto view = See(setup.truth, setup.truth.nominal_rig, {dent}, {.noise_px = 0.1}, random);
     const auto found =
         CalibrateFromRest(setup.truth, LabelRestPair(setup.truth, view.detections).value(), kPoints);
