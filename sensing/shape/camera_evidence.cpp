@@ -61,7 +61,7 @@ double CameraEvidence::UpdateLooks(const Eigen::VectorXd& u) {
 }
 
 void CameraEvidence::SetBaseline(const LabelledMarkers& rest, const Eigen::VectorXd& u) {
-  looks_.SetBaseline(u);
+  looks_.Update(u);
   for (size_t i = 0; i < observations_.size(); ++i) {
     Observation& o = observations_[i];
     const size_t camera = i % kCameraCount, marker = i / kCameraCount;

@@ -30,14 +30,24 @@ DomeLooks::DomeLooks(const LinkModel& model, const SkinBasis& basis,
       ends_mm_.push_back(model.PointAtDepth(model.PathAngle(path), z, model.markers.center_depth_mm));
     }
   }
-  SetBaseline(Eigen::VectorXd::Zero(3 * model.markers.count()));
+  for (int m = 0; m < model.markers.count(); ++m) {
+    const auto i = static_cast<size_t>(m);
+    rest_normals_[i] = NormalAt(m);
+    offsets_[i].fill(Vec3::Zero());
+    Look(m, rest_inward_[i]);
+  }
 }
 
-void DomeLooks::Place(const Eigen::VectorXd& u) {
-  for (int m = 0; m < basis_.markers(); ++m) {
-    places_mm_[static_cast<size_t>(m)] =
-        rest_mm_[static_cast<size_t>(m)] + basis_.Frame(m) * u.segment<3>(3 * Eigen::Index{m});
+// Returns how far an offset has changed.
+double DomeLooks::Look(int marker, const Vec3& inward) {
+  const auto i = static_cast<size_t>(marker);
+  double most = 0;
+  for (size_t c = 0; c < kCameraCount; ++c) {
+    const Vec3 offset = SeenOfDome(places_mm_[i], inward, rise_mm_, cameras_mm_[c]) - places_mm_[i];
+    most = std::max(most, (offset - offsets_[i][c]).norm());
+    offsets_[i][c] = offset;
   }
+  return most;
 }
 
 // Inward, from the neighbours; the ends do not move.
@@ -51,16 +61,6 @@ Vec3 DomeLooks::NormalAt(int marker) const {
   const Vec3 around = at(path + 1 == paths ? 0 : path + 1, ring) - at(path == 0 ? paths - 1 : path - 1, ring);
   const Vec3 along = at(path, ring + 1) - at(path, ring - 1);
   return along.cross(around).normalized();
-}
-
-void DomeLooks::SetBaseline(const Eigen::VectorXd& u) {
-  Place(u);
-  for (size_t m = 0; m < rest_mm_.size(); ++m) {
-    rest_normals_[m] = NormalAt(static_cast<int>(m));
-    for (size_t c = 0; c < kCameraCount; ++c) {
-      offsets_[m][c] = SeenOfDome(places_mm_[m], rest_inward_[m], rise_mm_, cameras_mm_[c]) - places_mm_[m];
-    }
-  }
 }
 
 double DomeLooks::Update(const Eigen::VectorXd& u) {
@@ -86,11 +86,7 @@ double DomeLooks::Update(const Eigen::VectorXd& u) {
       continue;
     }
     const Vec3 inward = (rest_inward_[i] + NormalAt(m) - rest_normals_[i]).normalized();
-    for (size_t c = 0; c < kCameraCount; ++c) {
-      const Vec3 offset = SeenOfDome(places_mm_[i], inward, rise_mm_, cameras_mm_[c]) - places_mm_[i];
-      most = std::max(most, (offset - offsets_[i][c]).norm());
-      offsets_[i][c] = offset;
-    }
+    most = std::max(most, Look(m, inward));
   }
   return most;
 }

@@ -16,9 +16,8 @@ class DomeLooks {
   /// `cameras_mm`: where they are, link frame, by CameraId.
   DomeLooks(const LinkModel& model, const SkinBasis& basis, const std::array<Vec3, kCameraCount>& cameras_mm);
 
-  /// The skin at rest, displaced by `u` (3 a marker, own frames) from the model.
-  void SetBaseline(const Eigen::VectorXd& u);
-  /// The skin displaced by `u`. Returns the longest change of an offset, mm.
+  /// The skin displaced by `u` (3 a marker, own frames) from the model. Returns the longest change of an
+  /// offset, mm.
   double Update(const Eigen::VectorXd& u);
 
   /// From a marker's centre to the point that is seen of it, link frame, mm.
@@ -26,7 +25,7 @@ class DomeLooks {
 
  private:
   Vec3 NormalAt(int marker) const;
-  void Place(const Eigen::VectorXd& u);
+  double Look(int marker, const Vec3& inward);
 
   const SkinBasis& basis_;
   const std::array<Vec3, kCameraCount> cameras_mm_;
