@@ -1,8 +1,10 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,11 +48,13 @@ class PushTest : public testing::TestWithParam<std::string> {
     SkinTruth truth;
   };
 
-  Solved Solve(const Scene& scene) const {
+  Solved Solve(const Scene& scene, double touched_s = kTouchedS,
+               std::optional<ForceModel> force_model = ForceModel::kLinear) const {
     auto skin = SimulatedSkin::Make(model_, scene);
     const Renderer renderer(model_, model_.nominal_rig, scene.camera, scene.seed);
     PipelineOptions options;
     options.rest_frames = kRestFrames;
+    options.force.model = force_model;
     LinkPipeline pipeline(model_, options);
     Solved solved;
     StereoFrame frame;
@@ -65,7 +69,7 @@ class PushTest : public testing::TestWithParam<std::string> {
       pipeline.Process(frame, solved.state);
     };
     for (int k = 0; k < kRestFrames; ++k) take(k / kRateHz);
-    take(kTouchedS);
+    take(touched_s);
     return solved;
   }
 
@@ -97,6 +101,19 @@ TEST_P(PushTest, EveryPlaceOfTheSkin) {
   std::printf("%s: %zu pushes, force error median %.1f %%, worst %.1f %%; worst centre %.1f mm\n",
               GetParam().c_str(), forces.size(), 100 * forces[forces.size() / 2], 100 * worst_force,
               worst_center);
+}
+
+// Inflated to 1.5 kPa the walls beside the ends tilt by 20 degrees, which must not look like forces.
+TEST_P(PushTest, OnlyWhatTouchesAnInflatedSkinIsAContact) {
+  Scene scene = LoadScene("inflate").value();
+  constexpr double kInflatedS = 4.5, kHeldS = 6.5;
+  EXPECT_THAT(Solve(scene, kInflatedS, std::nullopt).state.contacts, testing::IsEmpty());
+  const Solved held = Solve(scene, kHeldS, std::nullopt);
+  ASSERT_EQ(held.state.contacts.size(), 1u) << held.state.status_reason;
+  const TrueContact& real = held.truth.contacts.at(0);
+  EXPECT_NEAR(held.truth.pressure_mpa, 1.5e-3, 1e-9);
+  EXPECT_LT((held.state.contacts[0].force_n - real.force_n).norm(), 0.25 * real.force_n.norm());
+  EXPECT_LT((held.state.contacts[0].center_mm - real.center_mm).norm(), 8);
 }
 
 INSTANTIATE_TEST_SUITE_P(ShippedModels, PushTest, testing::Values("cylinder", "barrel"));
