@@ -53,9 +53,9 @@ double CameraEvidence::UpdateLooks(const Eigen::VectorXd& u) {
   for (size_t i = 0; i < observations_.size(); ++i) {
     Observation& o = observations_[i];
     const size_t m = i / kCameraCount, c = i % kCameraCount;
-    if (!o.seen || (looks_.Offset(m, c) - o.seen_offset).squaredNorm() < kSameOffsetMm * kSameOffsetMm)
-      continue;
-    Linearise(o, c, static_cast<int>(m), o.at);
+    // Unseen ones too: they may come back when nothing moves any more.
+    const double changed2 = (looks_.Offset(m, c) - o.seen_offset).squaredNorm();
+    if (changed2 > kSameOffsetMm * kSameOffsetMm) Linearise(o, c, static_cast<int>(m), o.at);
   }
   return changed_mm;
 }
