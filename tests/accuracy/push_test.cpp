@@ -103,7 +103,7 @@ TEST_P(PushTest, EveryPlaceOfTheSkin) {
               worst_center);
 }
 
-// Inflated to 1.5 kPa the walls beside the ends tilt by 20 degrees, which must not look like forces.
+// The walls beside the ends of an inflated skin tilt, which must not look like forces.
 TEST_P(PushTest, OnlyWhatTouchesAnInflatedSkinIsAContact) {
   Scene scene = LoadScene("inflate").value();
   constexpr double kInflatedS = 4.5, kHeldS = 6.5;
