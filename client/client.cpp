@@ -1,11 +1,12 @@
 #include "client/taclink/client.h"
 
-#include <grpcpp/create_channel.h>
-
-#include <atomic>
 #include <utility>
 
+#include "client/channel.h"
+#include "client/connection.h"
 #include "client/messages.h"
+#include "client/stream_call.h"
+#include "taclink/v1/operations.grpc.pb.h"
 #include "taclink/v1/tactile.grpc.pb.h"
 
 namespace taclink::client {
@@ -20,7 +21,9 @@ int64_t UtcNowNs() {
 
 Error NoServer(const std::string& address) {
   return {ErrorCode::kUnavailable,
-          "no server answers at " + address + "; start taclinkd there or choose another with --server"};
+          "no server answers at " + address +
+              "; start taclinkd there or choose another with --server; a server with TLS needs --tls-ca, one "
+              "with client_ca also --tls-certificate and --tls-key"};
 }
 
 ErrorCode CodeOf(grpc::StatusCode code) {
@@ -39,12 +42,18 @@ ErrorCode CodeOf(grpc::StatusCode code) {
       return ErrorCode::kResourceExhausted;
     case grpc::StatusCode::UNIMPLEMENTED:
       return ErrorCode::kUnsupported;
+    case grpc::StatusCode::UNAUTHENTICATED:
+      return ErrorCode::kUnauthenticated;
+    case grpc::StatusCode::PERMISSION_DENIED:
+      return ErrorCode::kPermissionDenied;
     case grpc::StatusCode::CANCELLED:
       return ErrorCode::kEndOfData;
     default:
       return ErrorCode::kInternal;
   }
 }
+
+}  // namespace
 
 Error FromStatus(const grpc::Status& status, const std::string& address) {
   const ErrorCode code = CodeOf(status.error_code());
@@ -62,68 +71,9 @@ Error FromStatus(const grpc::Status& status, const std::string& address) {
                     : status.error_message()};
 }
 
-}  // namespace
-
-struct Client::Connection {
-  std::string address;
-  std::shared_ptr<grpc::Channel> channel;
-  std::unique_ptr<v1::TactileService::Stub> stub;
-};
-
-/// One call over its own completion queue, so that Next can wait with a timeout and leave the read under way.
-struct FrameReader::Call {
-  enum Tag : intptr_t { kStart = 1, kRead, kFinish };
-  static void* AsPointer(Tag tag) { return reinterpret_cast<void*>(tag); }
-
-  std::string address;
-  std::shared_ptr<grpc::Channel> channel;  // lives as long as the call
-  grpc::ClientContext context;
-  grpc::CompletionQueue queue;
-  std::unique_ptr<grpc::ClientAsyncReader<v1::StreamFramesResponse>> reader;
-  v1::StreamFramesResponse response;
-  grpc::Status status;
+struct FrameReader::Call : StreamCall<v1::StreamFramesResponse> {
+  using StreamCall::StreamCall;
   std::vector<StreamCounts> counts;
-  std::string end_reason;
-  bool started = false;
-  bool reading = false;
-  bool finished = false;
-  std::atomic<bool> cancelled = false;
-
-  ~Call() {
-    context.TryCancel();
-    queue.Shutdown();
-    void* tag = nullptr;
-    bool ok = false;
-    while (queue.Next(&tag, &ok)) {
-    }
-  }
-
-  // Waits for the next message of the stream in `response`.
-  Result<void> Read(system_clock::time_point deadline) {
-    while (!finished) {
-      if (started && !reading) {
-        reader->Read(&response, AsPointer(kRead));
-        reading = true;
-      }
-      void* tag = nullptr;
-      bool ok = false;
-      if (queue.AsyncNext(&tag, &ok, deadline) != grpc::CompletionQueue::GOT_EVENT) {
-        return Error{ErrorCode::kTimeout, "no frame in time"};
-      }
-      started = true;
-      if (tag == AsPointer(kFinish)) finished = true;
-      if (tag != AsPointer(kRead)) continue;
-      if (ok) return reading = false, Result<void>();
-      reader->Finish(&status, AsPointer(kFinish));
-    }
-    return EndError();
-  }
-
-  Error EndError() const {
-    if (cancelled) return {ErrorCode::kEndOfData, "the stream was cancelled"};
-    if (!end_reason.empty()) return {ErrorCode::kUnavailable, "the server ended the stream: " + end_reason};
-    return FromStatus(status, address);
-  }
 
   void TakeStatus() {
     counts = FromMessage(response.status());
@@ -148,8 +98,7 @@ Result<Frame> FrameReader::Next(milliseconds timeout) {
 }
 
 void FrameReader::Cancel() {
-  call_->cancelled = true;
-  call_->context.TryCancel();
+  call_->Cancel();
 }
 
 const std::vector<StreamCounts>& FrameReader::counts() const {
@@ -161,12 +110,13 @@ Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 
-Result<Client> Client::Connect(const std::string& address, milliseconds timeout) {
-  grpc::ChannelArguments arguments;
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);  // robots are on the local network
+Result<Client> Client::Connect(const std::string& address, milliseconds timeout,
+                               const Credentials& credentials) {
+  auto channel = MakeChannel(address, credentials);
+  if (!channel) return channel.error();
   auto connection = std::make_shared<Connection>();
   connection->address = address;
-  connection->channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  connection->channel = std::move(*channel);
   if (!connection->channel->WaitForConnected(system_clock::now() + timeout)) return NoServer(address);
   connection->stub = v1::TactileService::NewStub(connection->channel);
   return Client(std::move(connection));
@@ -179,6 +129,18 @@ Result<Arm> Client::GetArm(milliseconds timeout) {
   const grpc::Status status = connection_->stub->GetArm(&context, {}, &response);
   if (!status.ok()) return FromStatus(status, connection_->address);
   return FromMessage(response.arm());
+}
+
+Result<void> Client::RestartLink(const std::string& link, milliseconds timeout) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + timeout);
+  v1::RestartLinkRequest request;
+  request.set_link(link);
+  v1::RestartLinkResponse response;
+  const grpc::Status status =
+      v1::OperationsService::NewStub(connection_->channel)->RestartLink(&context, request, &response);
+  if (!status.ok()) return FromStatus(status, connection_->address);
+  return {};
 }
 
 Result<CalibrationResult> Client::Calibrate(const CalibrateOptions& options,
@@ -204,18 +166,12 @@ Result<CalibrationResult> Client::Calibrate(const CalibrateOptions& options,
 
 Result<std::unique_ptr<FrameReader>> Client::StreamFrames(const StreamOptions& options,
                                                           milliseconds timeout) {
-  auto call = std::make_unique<FrameReader::Call>();
-  call->address = connection_->address;
-  call->channel = connection_->channel;
-  call->reader =
-      connection_->stub->AsyncStreamFrames(&call->context, ToMessage(options), &call->queue,
-                                           FrameReader::Call::AsPointer(FrameReader::Call::kStart));
-  const auto accepted = call->Read(system_clock::now() + timeout);  // a stream begins with its status
-  if (!accepted) {
-    if (accepted.error().code != ErrorCode::kTimeout) return accepted.error();
-    return Error{ErrorCode::kTimeout,
-                 "the server at " + connection_->address + " did not answer in time; try again"};
-  }
+  using Call = FrameReader::Call;
+  auto call = std::make_unique<Call>(connection_->address, connection_->channel);
+  call->reader = connection_->stub->AsyncStreamFrames(&call->context, ToMessage(options), &call->queue,
+                                                      Call::AsPointer(Call::kStart));
+  // A stream begins with its status.
+  if (const auto accepted = call->ReadFirst(timeout); !accepted) return accepted.error();
   call->TakeStatus();
   return std::unique_ptr<FrameReader>(new FrameReader(std::move(call)));
 }

@@ -6,6 +6,21 @@
 namespace taclink::client {
 namespace {
 
+Supervision From(v1::Supervision supervision) {
+  switch (supervision) {
+    case v1::SUPERVISION_RUNNING:
+      return Supervision::kRunning;
+    case v1::SUPERVISION_OVERDUE:
+      return Supervision::kOverdue;
+    case v1::SUPERVISION_RESTARTING:
+      return Supervision::kRestarting;
+    case v1::SUPERVISION_RESTING:
+      return Supervision::kResting;
+    default:
+      return Supervision::kUnknown;
+  }
+}
+
 using Floats = google::protobuf::RepeatedField<float>;
 
 Vector3 From(const v1::Vector3& v) {
@@ -103,13 +118,28 @@ LinkModel From(const v1::LinkModel& message) {
   return model;
 }
 
+Camera From(const v1::Camera& message) {
+  return {.name = message.name(),
+          .configured = message.configured(),
+          .device = message.device(),
+          .format = message.format(),
+          .trouble = message.trouble(),
+          .rate_hz = message.rate_hz(),
+          .pictures = message.pictures(),
+          .lost = message.lost(),
+          .damaged = message.damaged(),
+          .undecodable = message.undecodable(),
+          .unpaired = message.unpaired(),
+          .stamped_on_arrival = message.stamped_on_arrival()};
+}
+
 Link From(const v1::Link& message) {
   Link link;
   link.name = message.name();
   link.index = static_cast<int>(message.index());
   link.model = From(message.model());
-  const v1::Quaternion& q = message.base_from_link().rotation();
-  link.base_from_link = {From(message.base_from_link().translation_m()), {q.x(), q.y(), q.z(), q.w()}};
+  link.base_from_link = FromMessage(message.base_from_link());
+  link.frame = message.frame();
   link.source = From(message.source().kind());
   link.source_description = message.source().description();
   link.status = From(message.status());
@@ -122,7 +152,27 @@ Link From(const v1::Link& message) {
   link.frames_skipped = statistics.frames_skipped();
   link.source_restarts = statistics.source_restarts();
   link.contacts = static_cast<int>(statistics.contacts());
+  link.supervision = From(message.supervision());
+  link.supervision_reason = message.supervision_reason();
+  link.worker_restarts = statistics.worker_restarts();
+  link.stage_overruns = statistics.stage_overruns();
+  link.workers_abandoned = statistics.workers_abandoned();
+  link.last_failure = statistics.last_failure();
+  link.pairs_skipped = statistics.pairs_skipped();
+  for (const auto& camera : message.cameras()) link.cameras.push_back(From(camera));
+  for (const auto& state : message.force_levels()) link.force_levels.push_back(FromMessage(state));
+  link.baseline = FromMessage(message.baseline());
   return link;
+}
+
+Joint From(const v1::Joint& message) {
+  Joint joint;
+  joint.name = message.name();
+  if (message.has_lower()) joint.lower = message.lower();
+  if (message.has_upper()) joint.upper = message.upper();
+  if (message.has_position()) joint.position = message.position();
+  joint.position_age_s = message.position_age_s();
+  return joint;
 }
 
 std::optional<Covariance3> From(const google::protobuf::RepeatedField<double>& covariance) {
@@ -130,6 +180,34 @@ std::optional<Covariance3> From(const google::protobuf::RepeatedField<double>& c
   if (static_cast<size_t>(covariance.size()) != numbers.size()) return std::nullopt;
   std::copy(covariance.begin(), covariance.end(), numbers.begin());
   return numbers;
+}
+
+const char* Name(v1::PressureOrigin origin) {
+  switch (origin) {
+    case v1::PRESSURE_ORIGIN_CONSTANT:
+      return "constant";
+    case v1::PRESSURE_ORIGIN_SIMULATED:
+      return "simulated";
+    case v1::PRESSURE_ORIGIN_FILE:
+      return "file";
+    case v1::PRESSURE_ORIGIN_SERIAL:
+      return "serial";
+    case v1::PRESSURE_ORIGIN_CLIENT:
+      return "client";
+    default:
+      return "none";
+  }
+}
+
+PressureReport From(const v1::PressureReport& message) {
+  PressureReport report;
+  report.origin = Name(message.origin());
+  report.assumed = message.assumed() || message.origin() == v1::PRESSURE_ORIGIN_UNSPECIFIED;
+  report.stale = message.stale();
+  report.pressure_pa = message.pressure_pa();
+  if (message.has_age_s()) report.age_s = message.age_s();
+  report.trouble = message.trouble();
+  return report;
 }
 
 Contact From(const v1::Contact& message) {
@@ -196,6 +274,22 @@ const char* Name(ForceModel model) {
   return "unknown";
 }
 
+const char* Name(Supervision supervision) {
+  switch (supervision) {
+    case Supervision::kRunning:
+      return "running";
+    case Supervision::kOverdue:
+      return "overdue";
+    case Supervision::kRestarting:
+      return "restarting";
+    case Supervision::kResting:
+      return "resting";
+    case Supervision::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
 const char* Name(SourceKind kind) {
   switch (kind) {
     case SourceKind::kV4l2:
@@ -210,8 +304,27 @@ const char* Name(SourceKind kind) {
   return "unknown";
 }
 
+Vector3 FromMessage(const v1::Vector3& message) {
+  return From(message);
+}
+
+Pose FromMessage(const v1::Pose& message) {
+  const v1::Quaternion& q = message.rotation();
+  return {From(message.translation_m()), {q.x(), q.y(), q.z(), q.w()}};
+}
+
+LinkStatus FromMessage(v1::LinkStatus status) {
+  return From(status);
+}
+
+std::optional<Covariance3> FromMessage(const google::protobuf::RepeatedField<double>& covariance) {
+  return From(covariance);
+}
+
 Arm FromMessage(const v1::Arm& message) {
   Arm arm{.name = message.name(), .server_version = message.server_version(), .links = {}};
+  arm.base_frame = message.base_frame();
+  for (const auto& joint : message.joints()) arm.joints.push_back(From(joint));
   for (const auto& link : message.links()) arm.links.push_back(From(link));
   return arm;
 }
@@ -225,12 +338,15 @@ Frame FromMessage(const v1::LinkFrame& message) {
   frame.status = From(message.status());
   frame.status_reason = message.status_reason();
   if (message.has_pressure_pa()) frame.pressure_pa = message.pressure_pa();
+  frame.pressure = From(message.pressure());
   frame.markers_seen = static_cast<int>(message.markers_seen());
   frame.markers_inferred = static_cast<int>(message.markers_inferred());
   for (const auto& contact : message.contacts()) frame.contacts.push_back(From(contact));
   frame.total_force_n = From(message.total_force_n());
+  frame.unchanged = message.unchanged();
   frame.force_model = From(message.force_model());
   frame.baseline_age_s = message.baseline_age_s();
+  frame.baseline = FromMessage(message.baseline());
   frame.tracked = message.tracking_mode() == v1::TRACKING_MODE_TRACKED;
   for (const auto& camera : message.cameras())
     frame.picture_share += static_cast<double>(camera.share_read()) / message.cameras_size();
@@ -256,7 +372,8 @@ Frame FromMessage(const v1::LinkFrame& message) {
 std::vector<StreamCounts> FromMessage(const v1::StreamStatus& message) {
   std::vector<StreamCounts> counts;
   for (const auto& link : message.links())
-    counts.push_back({link.link(), link.frames_sent(), link.frames_dropped()});
+    counts.push_back({link.link(), link.frames_sent(), link.frames_dropped(), link.frames_dropped_for_bytes(),
+                      link.frames_unchanged()});
   return counts;
 }
 
@@ -267,6 +384,8 @@ v1::StreamFramesRequest ToMessage(const StreamOptions& options) {
                      : options.detail == Detail::kGeometry ? v1::DETAIL_GEOMETRY
                                                            : v1::DETAIL_CONTACTS);
   request.set_max_rate_hz(options.max_rate_hz);
+  request.set_deadband_force_n(options.deadband_force_n);
+  request.set_deadband_move_m(options.deadband_move_m);
   request.set_delivery(options.delivery == Delivery::kEvery ? v1::DELIVERY_EVERY : v1::DELIVERY_LATEST);
   return request;
 }

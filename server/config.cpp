@@ -10,7 +10,10 @@
 
 #include "sensing/core/embedded_file.h"
 #include "sensing/yaml/yaml_reader.h"
+#include "server/config_drift.h"
+#include "server/config_events.h"
 #include "server/config_names.h"
+#include "server/config_watchdog.h"
 
 namespace taclink {
 std::span<const EmbeddedFile> EmbeddedConfigs();
@@ -21,10 +24,12 @@ namespace {
 
 constexpr Range kPixels{.min = 16, .max = 16384};
 constexpr Range kFrameRate{.min = 0.01, .max = 1000};
+constexpr Range kStartAfter{.min = 0, .max = 3600};
 constexpr double kLongestArmMm = 1e5;
 
 struct Reader {
   std::string folder;
+  RealtimeOptions realtime = {};  // for all links
 
   std::string Path(const std::string& path) const {
     return (std::filesystem::path(folder) / path).lexically_normal().string();
@@ -45,13 +50,20 @@ V4l2SourceConfig ReadV4l2(YamlMap& link) {
   const auto devices = link.Texts("devices");
   if (devices.size() == kCameraCount) {
     std::copy(devices.begin(), devices.end(), config.devices.begin());
+    for (const std::string& device : devices) {
+      const bool good = device.starts_with("/") || (device.starts_with("usb:") && device.size() > 4) ||
+                        (device.starts_with("serial:") && device.size() > 7);
+      if (!good)
+        link.Fail("devices", "must be device paths, usb:1-2.3 or serial:NUMBER, not '" + device + "'");
+    }
   } else {
-    link.Fail("devices", "must be a list of two device paths, the top and the bottom camera's");
+    link.Fail("devices", "must be a list of two cameras, the top and the bottom one");
   }
   config.width_px = link.Integer("width_px", config.width_px, kPixels);
   config.height_px = link.Integer("height_px", config.height_px, kPixels);
   config.frame_rate_hz = link.Number("frame_rate_hz", config.frame_rate_hz, kFrameRate);
-  config.format = kCameraFormats[link.Choice("format", {kFormatNames.begin(), kFormatNames.end()}, 0)];
+  const size_t format = link.Choice("format", {kFormatNames.begin(), kFormatNames.end()}, 0);
+  if (format > 0) config.format = kCameraFormats[format - 1];
   if (link.Has("exposure_100us")) config.exposure_100us = link.Integer("exposure_100us", {.min = 1});
   if (link.Has("gain")) config.gain = link.Integer("gain", kNotNegative);
   return config;
@@ -66,6 +78,8 @@ SourceConfig Reader::ReadSource(YamlMap& link) const {
       config.folder = Path(link.Text("folder"));
       config.frame_rate_hz = link.Number("frame_rate_hz", config.frame_rate_hz, kFrameRate);
       config.loop = link.Bool("loop", config.loop);
+      if (link.Has("start_after_s")) config.start_after_s = link.Number("start_after_s", 0, kStartAfter);
+      config.in_memory = link.Bool("in_memory", config.in_memory);
       return config;
     }
     default:
@@ -85,13 +99,16 @@ LinkConfig Reader::ReadLink(YamlMap link) const {
   config.model = NameOrPath(link.Text("model"));
   config.source = ReadSource(link);
   if (link.Has("calibration")) config.calibration = Path(link.Text("calibration"));
-  if (link.Has("pressure_kpa")) config.pressure_kpa = link.Number("pressure_kpa", {.min = -100, .max = 100});
+  config.pressure = ReadPressure(link, std::holds_alternative<SimulatedSourceConfig>(config.source), folder);
   if (link.Has("force_model")) {
     const size_t model = link.Choice("force_model", {kForceModelNames.begin(), kForceModelNames.end()});
     config.force_model = model == 0 ? std::nullopt : std::optional<ForceModel>(kForceModels[model - 1]);
   }
   config.force_refinement = link.Integer("force_refinement", config.force_refinement, {.min = 0, .max = 3});
+  config.drift = ReadDrift(link);
+  config.rules = ReadRules(link);
   if (YamlMap pose = link.Map("pose"); link.Has("pose")) {
+    config.frame = pose.Text("frame", "");
     const auto position = pose.Numbers("position_mm", 3, {.min = -kLongestArmMm, .max = kLongestArmMm});
     std::copy_n(position.begin(), 3, config.position_mm.begin());
     if (pose.Has("rotation_deg")) {
@@ -100,6 +117,7 @@ LinkConfig Reader::ReadLink(YamlMap link) const {
     }
     pose.Done();
   }
+  config.realtime = ReadRealtime(link, realtime);
   link.Done();
   return config;
 }
@@ -109,21 +127,19 @@ void ReadServer(YamlMap& root, Config& config) {
   config.listen = server.Text("listen", config.listen);
   if (const auto good = CheckListenAddress(config.listen); !good) server.Fail("listen", good.error().message);
   server.Done();
-  YamlMap limits = root.Map("limits");
-  config.limits.max_streams =
-      limits.Integer("max_streams", config.limits.max_streams, {.min = 1, .max = 10000});
-  config.limits.queue_messages =
-      limits.Integer("queue_messages", config.limits.queue_messages, {.min = 1, .max = 100000});
-  limits.Done();
+  config.limits = ReadLimits(root);
 }
 
 void ReadArm(YamlMap& root, const Reader& reader, Config& config) {
   YamlMap arm = root.Map("arm");
   config.arm_name = arm.Text("name");
   if (!GoodName(config.arm_name)) arm.Fail("name", "must be 1 to 64 letters, digits, '_', '-' or '.'");
+  config.kinematics = ReadKinematics(arm, reader.folder);
   std::set<std::string> names;
   for (YamlMap& link : arm.Maps("links")) {
     config.links.push_back(reader.ReadLink(link));
+    if (!config.links.back().frame.empty() && !config.kinematics.urdf)
+      link.Fail("pose", "has a 'frame', so the arm must have a 'urdf' that holds it");
     if (!names.insert(config.links.back().name).second) link.Fail("name", "is used by another link");
   }
   if (config.links.empty()) arm.Fail("links", "must name at least one link");
@@ -140,7 +156,16 @@ Result<Config> ParseConfig(const std::string& name, std::string_view text, const
   if (version != kConfigVersion) root.Fail("taclink_config", "must be 1, the version of this format");
   Config config;
   ReadServer(root, config);
-  ReadArm(root, Reader{folder}, config);
+  config.log = ReadLog(root);
+  config.shutdown = ReadShutdown(root);
+  config.watchdog = ReadWatchdog(root);
+  config.realtime = ReadRealtime(root, {});
+  const Reader reader{folder, config.realtime};
+  const auto path = [&reader](const std::string& relative) { return reader.Path(relative); };
+  config.http = ReadHttp(root, path);
+  config.security = ReadSecurity(root, path);
+  config.events = ReadEvents(root, folder);
+  ReadArm(root, reader, config);
   root.Done();
   if (const auto finished = file->Finish(); !finished) return finished.error();
   return config;
@@ -164,7 +189,7 @@ Result<Config> DemoConfig() {
   return ParseConfig("demo.yaml", DemoConfigText(), "");
 }
 
-Rigid3 LinkConfig::BaseFromLink() const {
+Rigid3 LinkConfig::FrameFromLink() const {
   const auto about = [this](size_t axis, const Vec3& unit) {
     return Eigen::AngleAxisd(RadFromDeg(rotation_deg[axis]), unit);
   };

@@ -11,15 +11,25 @@
 #include "sensing/core/frame.h"
 #include "sensing/core/geometry.h"
 #include "sensing/core/result.h"
+#include "sensing/pipeline/drift_options.h"
+#include "server/config_http.h"
+#include "server/config_kinematics.h"
+#include "server/config_limits.h"
+#include "server/config_operations.h"
+#include "server/config_pressure.h"
+#include "server/config_security.h"
+#include "server/events/options.h"
+#include "server/link_supervisor.h"
+#include "server/thread_setup.h"
 
 namespace taclink::server {
 
 struct V4l2SourceConfig {
-  std::array<std::string, kCameraCount> devices;  ///< top, bottom
+  std::array<std::string, kCameraCount> devices;  ///< top, bottom: a path, usb:1-2.3 or serial:NUMBER
   int width_px = 640;
   int height_px = 480;
   double frame_rate_hz = 30;
-  PixelFormat format = PixelFormat::kYuyv;
+  std::optional<PixelFormat> format;  ///< none: the best that the cameras have at that size and rate
   std::optional<int> exposure_100us;  ///< none: the camera decides
   std::optional<int> gain;
 };
@@ -28,6 +38,8 @@ struct FileSourceConfig {
   std::string folder;
   double frame_rate_hz = 30;
   bool loop = true;
+  std::optional<double> start_after_s = {};  ///< a full second of the machine's clock; none: at once
+  bool in_memory = false;                    ///< pictures are read once, at the start
 };
 
 struct SimulatedSourceConfig {
@@ -41,27 +53,35 @@ struct LinkConfig {
   std::string model;  ///< name of a shipped one or path
   SourceConfig source;
   std::optional<std::string> calibration;  ///< path; none: from the first rest picture
-  std::optional<double> pressure_kpa;      ///< gauge, constant; none: the source's, or 0
+  std::optional<PressureConfig> pressure;  ///< none: the source's, or 0
   std::optional<ForceModel> force_model;   ///< none: the cheapest that is good enough, frame by frame
   int force_refinement =
       0;  ///< elements per interval of the marker grid, 1 to 3; 0: what the model does best with
-  std::array<double, 3> position_mm{};  ///< of the link frame's origin in the base frame
-  /// Roll, pitch, yaw about the base frame's fixed x, y, z, applied in this order (as in URDF).
+  LinkRules rules;
+  std::optional<DriftOptions> drift = DriftOptions{};  ///< none: the baseline does not follow
+  std::string frame;                    ///< link of the URDF that the pose is relative to; empty: the base
+  std::array<double, 3> position_mm{};  ///< of the link frame's origin in that frame
+  /// Roll, pitch, yaw about that frame's fixed x, y, z, applied in this order (as in URDF).
   std::array<double, 3> rotation_deg{};
 
-  Rigid3 BaseFromLink() const;
-};
+  RealtimeOptions realtime = {};
 
-struct LimitsConfig {
-  int max_streams = 64;
-  int queue_messages = 256;  ///< frames that can wait for one stream with `every`
+  Rigid3 FrameFromLink() const;
 };
 
 /// All that `taclinkd` is told. Paths are usable as they stand.
 struct Config {
   std::string listen = "127.0.0.1:50051";  ///< host:port, [ip6]:port or unix:path; port 0: any free one
   LimitsConfig limits;
+  WatchdogOptions watchdog;
+  LogOptions log;
+  ShutdownConfig shutdown;
+  RealtimeOptions realtime;  ///< of links that do not say it themselves
+  HttpConfig http;
+  SecurityConfig security;
+  EventOptions events;
   std::string arm_name;
+  KinematicsConfig kinematics;
   std::vector<LinkConfig> links;
 };
 

@@ -1,15 +1,26 @@
 #include "server/hub.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "server/state_bytes.h"
 #include "server/subscriber_queue.h"
 
 namespace taclink::server {
 
+std::shared_ptr<const std::string> LinkEncoder::Encode(const LinkState& state, Detail detail) {
+  auto encoded = std::make_shared<const std::string>(encoder_(link_, state, detail));
+  bytes_[Index(detail)].store(encoded->capacity(), std::memory_order_relaxed);
+  return encoded;
+}
+
+Publication::Publication(uint64_t order, std::shared_ptr<const LinkState> state, LinkEncoder& encoder)
+    : order_(order), state_(std::move(state)), state_bytes_(StateBytes(*state_)), encoder_(encoder) {}
+
 std::shared_ptr<const std::string> Publication::Encoded(Detail detail) const {
   const std::lock_guard lock(mutex_);
   auto& encoded = encoded_[Index(detail)];
-  if (!encoded) encoded = std::make_shared<const std::string>(encoder_(link_, *state_, detail));
+  if (!encoded) encoded = encoder_.Encode(*state_, detail);
   return encoded;
 }
 
@@ -17,8 +28,8 @@ Subscription::~Subscription() {
   queue_->Close();
 }
 
-PublicationPtr Subscription::Take() {
-  return queue_->Take();
+PublicationPtr Subscription::Take(bool* unchanged) {
+  return queue_->Take(unchanged);
 }
 
 std::vector<DeliveryCounts> Subscription::Counts() const {
@@ -33,15 +44,18 @@ size_t Subscription::waiting() const {
   return queue_->waiting();
 }
 
+size_t Subscription::waiting_bytes() const {
+  return queue_->waiting_bytes();
+}
+
 size_t Subscription::capacity() const {
   return queue_->capacity();
 }
 
 Hub::Hub(size_t links, FrameEncoder encoder)
-    : links_(links),
-      encoder_(std::move(encoder)),
-      latest_(links),
-      queues_(std::make_shared<const Queues>()) {}
+    : encoder_(std::move(encoder)), latest_(links), queues_(std::make_shared<const Queues>()) {
+  for (size_t link = 0; link < links; ++link) links_.push_back(std::make_unique<LinkEncoder>(link, encoder_));
+}
 
 Hub::~Hub() = default;
 
@@ -50,7 +64,7 @@ void Hub::Publish(size_t link, std::shared_ptr<const LinkState> state) {
   PublicationPtr publication, previous;
   {
     const std::lock_guard lock(mutex_);
-    publication = std::make_shared<const Publication>(link, next_order_++, std::move(state), encoder_);
+    publication = std::make_shared<const Publication>(next_order_++, std::move(state), *links_[link]);
     previous = std::exchange(latest_[link], publication);
     queues = queues_;
   }
@@ -62,7 +76,12 @@ void Hub::Publish(size_t link, std::shared_ptr<const LinkState> state) {
 
 std::unique_ptr<Subscription> Hub::Subscribe(SubscriberOptions options, std::function<void()> notify) {
   const Delivery delivery = options.delivery;
-  auto queue = std::make_shared<SubscriberQueue>(links_, std::move(options), std::move(notify));
+  const std::shared_ptr<SubscriberQueue> queue(
+      new SubscriberQueue(links_.size(), std::move(options), std::move(notify)),
+      [before = dropped_before_](SubscriberQueue* leaving) {
+        *before += leaving->dropped();
+        delete leaving;
+      });
   const std::lock_guard lock(mutex_);
   if (delivery == Delivery::kLatest) {
     for (const auto& latest : latest_) {
@@ -75,7 +94,24 @@ std::unique_ptr<Subscription> Hub::Subscribe(SubscriberOptions options, std::fun
   }
   queues->push_back(queue);
   queues_ = std::move(queues);
-  return std::make_unique<Subscription>(std::move(queue));
+  return std::make_unique<Subscription>(queue);
+}
+
+HubTotals Hub::Totals() const {
+  const std::lock_guard lock(mutex_);
+  HubTotals out;
+  uint64_t dropped = 0;
+  for (const auto& weak : *queues_) {
+    const auto queue = weak.lock();
+    if (!queue || queue->closed()) continue;
+    ++out.subscribers;
+    out.waiting += queue->waiting();
+    dropped += queue->dropped();
+  }
+  // One that leaves just now is counted in neither.
+  dropped_told_ = std::max(dropped_told_, dropped + *dropped_before_);
+  out.dropped = dropped_told_;
+  return out;
 }
 
 PublicationPtr Hub::Latest(size_t link) const {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "sensing/core/baseline.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/link_state.h"
 #include "sensing/core/result.h"
@@ -46,6 +47,15 @@ class LinkProcessor {
   virtual CalibrationProgress PollCalibration() = 0;
   /// Back to how it was.
   virtual void CancelCalibration() = 0;
+
+  /// Makes the mean of the next frames the baseline. Errors: kFailedPrecondition (there is none yet, one is
+  /// under way), kUnsupported.
+  virtual Result<void> BeginTare(const TareOptions&) {
+    return Error{ErrorCode::kUnsupported, "this link has no baseline"};
+  }
+  /// After each Process since BeginTare, until it has told the end. An error leaves the link as it was.
+  virtual std::optional<Result<TareSummary>> TakeTareEnd() { return {}; }
+  virtual void CancelTare() {}
 };
 
 }  // namespace taclink::server

@@ -29,6 +29,11 @@ void LinkStatisticsCollector::Record(uint64_t sequence, int64_t exposure_ns, int
   ++frames_;
 }
 
+void LinkStatisticsCollector::RecordPictures(const std::array<CameraCounts, kCameraCount>& cameras) {
+  const std::lock_guard lock(mutex_);
+  for (size_t i = 0; i < kCameraCount; ++i) bad_pictures_[i] += cameras[i].bad_picture ? 1 : 0;
+}
+
 // From the first to the last frame within the window. A window with room for more frames than are kept is
 // short.
 double LinkStatisticsCollector::Rate(int64_t now_ns) const {
@@ -47,7 +52,10 @@ double LinkStatisticsCollector::Rate(int64_t now_ns) const {
 
 LinkStatistics LinkStatisticsCollector::Snapshot(int64_t now_ns) const {
   const std::lock_guard lock(mutex_);
-  LinkStatistics out{.rate_hz = Rate(now_ns), .frames = frames_, .frames_skipped = frames_skipped_};
+  LinkStatistics out{.rate_hz = Rate(now_ns),
+                     .frames = frames_,
+                     .frames_skipped = frames_skipped_,
+                     .bad_pictures = bad_pictures_};
   std::vector<int64_t> latencies;
   for (uint64_t i = 0; i < std::min<uint64_t>(frames_, ring_.size()); ++i)
     latencies.push_back(ring_[i].latency_ns);

@@ -4,55 +4,101 @@
 
 #include <algorithm>
 #include <exception>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 namespace taclink::server {
-namespace {
 
-// A state that says nothing but `status`; its buffers stay.
-void ResetTo(LinkState& state, LinkStatus status, std::string reason) {
-  state.times = {};
-  state.status = status;
-  state.status_reason = std::move(reason);
-  state.pressure_mpa.reset();
-  state.cameras = {};
-  state.tracking = {};
-  state.shape.positions_mm.clear();
-  state.shape.displacements_mm.clear();
-  state.shape.covariances_mm2.clear();
-  state.shape.sources.clear();
-  state.shape.measured.clear();
-  state.shape.rejected.clear();
-  state.forces.forces_n.clear();
-  state.forces.sigmas_n.clear();
-  state.forces.residual = 0;
-  state.forces.converged = true;
-  state.contacts.clear();
-  state.total_force_n = Vec3::Zero();
-  state.baseline_age_s = 0;
-  state.stage_ms = {};
-}
-
-}  // namespace
+LinkWorker::LinkWorker(std::string name, std::unique_ptr<FrameSource> source,
+                       std::unique_ptr<LinkProcessor> processor, std::shared_ptr<LinkOutlet> outlet,
+                       Clock& clock, LinkWorkerOptions options)
+    : name_(std::move(name)),
+      outlet_(std::move(outlet)),
+      life_(outlet_->NewLife()),
+      clock_(clock),
+      options_(std::move(options)),
+      supervisor_(name_, std::move(source), clock, options_.supervisor, &capture_mark_),
+      processor_(std::move(processor)) {}
 
 LinkWorker::LinkWorker(size_t link, std::string name, std::unique_ptr<FrameSource> source,
                        std::unique_ptr<LinkProcessor> processor, Hub& hub, Clock& clock,
                        LinkWorkerOptions options)
-    : link_(link),
-      name_(std::move(name)),
-      hub_(hub),
-      clock_(clock),
-      options_(options),
-      supervisor_(name_, std::move(source), clock, options.supervisor),
-      processor_(std::move(processor)) {}
+    : LinkWorker(std::move(name), std::move(source), std::move(processor),
+                 std::make_shared<LinkOutlet>(link, hub, clock), clock, std::move(options)) {}
 
 LinkWorker::~LinkWorker() {
   Stop();
 }
 
 void LinkWorker::Start() {
-  capture_ = std::jthread([this](const std::stop_token& stop) { Capture(stop); });
-  solve_ = std::jthread([this](const std::stop_token& stop) { Solve(stop); });
+  capture_ = StartThread("cap", &LinkWorker::Capture);
+  solve_ = StartThread("fem", &LinkWorker::Solve);
+}
+
+std::jthread LinkWorker::StartThread(const char* kind, void (LinkWorker::*loop)(const std::stop_token&)) {
+  const int64_t now_ns = clock_.MonotonicNs();
+  (kind == std::string_view("cap") ? capture_mark_ : fem_mark_).Begin(WorkStage::kWait, now_ns);
+  {
+    const std::lock_guard lock(end_mutex_);
+    ++running_;
+  }
+  try {
+    return std::jthread([this, kind, loop, self = weak_from_this().lock()](const std::stop_token& stop) {
+      RunThread(kind, loop, stop);
+    });
+  } catch (const std::system_error& e) {
+    Died(std::string("no thread for it: ") + e.what());
+    const std::lock_guard lock(end_mutex_);
+    --running_;
+    return {};
+  }
+}
+
+// The root of both threads: what leaves a loop ends here and is the watchdog's to deal with.
+void LinkWorker::RunThread(const char* kind, void (LinkWorker::*loop)(const std::stop_token&),
+                           const std::stop_token& stop) {
+  SetUpThread(std::string(kind) + ":" + name_, options_.realtime);
+  try {
+    (this->*loop)(stop);
+  } catch (const std::exception& e) {
+    Died(e.what());
+  } catch (...) {
+    Died("an exception of unknown type");
+  }
+  const std::lock_guard lock(end_mutex_);
+  --running_;
+  ended_.notify_all();
+}
+
+void LinkWorker::Died(const std::string& reason) {
+  const Error error{ErrorCode::kInternal, "the link's worker failed: " + reason};
+  EndCalibrationFromOutside(error);
+  tare_.EndFromOutside(error);
+  const std::lock_guard lock(end_mutex_);
+  if (!failure_) failure_ = reason;
+}
+
+std::optional<std::string> LinkWorker::failure() const {
+  const std::lock_guard lock(end_mutex_);
+  return failure_;
+}
+
+int LinkWorker::WaitEnded(std::chrono::milliseconds limit) {
+  std::unique_lock lock(end_mutex_);
+  ended_.wait_for(lock, limit, [this] { return running_ == 0; });
+  return running_;
+}
+
+void LinkWorker::Abandon() {
+  RequestStop();
+  if (outlet_->IsCurrent(life_)) outlet_->NewLife();  // nobody's, until the next worker is there
+  const Error error{ErrorCode::kUnavailable, "the link's worker hangs and was given up"};
+  EndCalibrationFromOutside(error);
+  tare_.EndFromOutside(error);
+  if (capture_.joinable()) capture_.detach();
+  if (solve_.joinable()) solve_.detach();
 }
 
 void LinkWorker::RequestStop() {
@@ -69,15 +115,20 @@ void LinkWorker::Stop() {
 void LinkWorker::Capture(const std::stop_token& stop) {
   StereoFrame frame;
   while (!stop.stop_requested()) {
-    if (supervisor_.Next(frame, options_.poll)) mailbox_.Put(frame);
+    capture_mark_.Begin(WorkStage::kWait, clock_.MonotonicNs());
+    if (!supervisor_.Next(frame, options_.poll)) continue;
+    if (options_.pressure) options_.pressure->Apply(frame);
+    mailbox_.Put(frame);
   }
 }
 
 void LinkWorker::Solve(const std::stop_token& stop) {
   StereoFrame frame;
   while (!stop.stop_requested()) {
+    fem_mark_.Begin(WorkStage::kWait, clock_.MonotonicNs());
     const bool any = mailbox_.Take(frame, options_.poll);
     TakeCalibrationOrder();
+    tare_.Begin(*processor_, clock_.MonotonicNs());
     if (any) {
       SolveOne(frame);
       TellCalibration();
@@ -87,16 +138,26 @@ void LinkWorker::Solve(const std::stop_token& stop) {
                       std::chrono::nanoseconds(options_.calibration_patience).count())
         EndCalibrationWithout({ErrorCode::kUnavailable, "no pictures come from the link's cameras"});
     }
+    tare_.Poll(*processor_, clock_.MonotonicNs(),
+               std::chrono::nanoseconds(options_.calibration_patience).count());
   }
   TakeCalibrationOrder();
-  if (job_) EndCalibrationWithout({ErrorCode::kUnavailable, "server is shutting down"});
+  if (job_) EndCalibrationWithout({ErrorCode::kUnavailable, "the link is stopping"});
+  tare_.End(*processor_, {ErrorCode::kUnavailable, "the link is stopping"});
+  // Nobody would answer what is ordered from now on.
+  EndCalibrationFromOutside({ErrorCode::kUnavailable, "the link is stopping"});
+  tare_.EndFromOutside({ErrorCode::kUnavailable, "the link is stopping"});
 }
 
 Result<void> LinkWorker::Calibrate(const CalibrationOrder& order, CalibrationObserver observer) {
   const std::lock_guard lock(calibration_mutex_);
+  if (calibration_closed_)
+    return Error{ErrorCode::kUnavailable,
+                 "the worker of link '" + name_ + "' has ended; try again when it runs"};
   if (calibrating_)
     return Error{ErrorCode::kFailedPrecondition, "a calibration of link '" + name_ + "' is under way"};
   calibrating_ = true;
+  watching_ = observer;
   ordered_ = CalibrationJob{order, std::move(observer)};
   return {};
 }
@@ -116,74 +177,84 @@ void LinkWorker::TellCalibration() {
   if (!job_) return;
   job_frame_ns_ = clock_.MonotonicNs();
   const CalibrationProgress progress = processor_->PollCalibration();
-  const bool go_on = job_->observer(progress);
-  if (go_on && !progress.end) return;
-  if (!progress.end) processor_->CancelCalibration();
-  spdlog::info("link {}: calibration: {}", name_,
-               !progress.end   ? "cancelled"
-               : *progress.end ? "done"
-                               : progress.end->error().message);
+  if (progress.end) {
+    spdlog::info("link {}: calibration: {}", name_, *progress.end ? "done" : progress.end->error().message);
+    if (const auto observer = ForgetCalibration()) observer(progress);
+  } else if (!job_->observer(progress)) {
+    processor_->CancelCalibration();
+    spdlog::info("link {}: calibration: cancelled", name_);
+    ForgetCalibration();
+  }
+}
+
+// Who is to be told of the end; none: it was told from outside.
+CalibrationObserver LinkWorker::ForgetCalibration() {
   job_.reset();
   const std::lock_guard lock(calibration_mutex_);
   calibrating_ = false;
+  return std::exchange(watching_, nullptr);
 }
 
 void LinkWorker::EndCalibrationWithout(const Error& error) {
   processor_->CancelCalibration();
-  job_->observer({.end = error});
   spdlog::info("link {}: calibration: {}", name_, error.message);
-  job_.reset();
-  const std::lock_guard lock(calibration_mutex_);
-  calibrating_ = false;
+  if (const auto observer = ForgetCalibration()) observer({.end = error});
+}
+
+void LinkWorker::EndCalibrationFromOutside(const Error& error) {
+  CalibrationObserver observer;
+  {
+    const std::lock_guard lock(calibration_mutex_);
+    calibration_closed_ = true;
+    observer = std::exchange(watching_, nullptr);
+    ordered_.reset();
+  }
+  if (observer) observer({.end = error});
 }
 
 void LinkWorker::SolveOne(const StereoFrame& frame) {
-  auto state = pool_.Acquire();
+  auto state = outlet_->Acquire();
+  fem_mark_.Begin(settled_ && !job_ ? WorkStage::kFrame : WorkStage::kFirstFrames, clock_.MonotonicNs());
   try {
     processor_->Process(frame, *state);
-    failing_ = false;
+    failing_ = 0;
+    settled_ = state->status == LinkStatus::kOk || state->status == LinkStatus::kDegraded;
   } catch (const std::exception& e) {
-    if (!failing_)
+    if (failing_ == 0)
       spdlog::error("link {}: frame {} could not be processed: {}", name_, frame.sequence, e.what());
-    failing_ = true;
+    if (++failing_ >= options_.failures)
+      throw std::runtime_error(std::to_string(failing_) + " frames in a row failed: " + e.what());
     ResetTo(*state, LinkStatus::kLost, std::string("processing failed: ") + e.what());
     state->times = frame.times;
   }
   state->sequence = frame.sequence;
-  last_sequence_ = frame.sequence;
-  Stamp(*state);
-  statistics_.Record(frame.sequence, frame.times.exposure_monotonic_ns, last_published_ns_);
-  hub_.Publish(link_, pool_.Share(std::move(state)));
+  fem_mark_.Begin(WorkStage::kPublish, clock_.MonotonicNs());
+  outlet_->PublishFrame(life_, std::move(state), frame.times.exposure_monotonic_ns);
 }
 
 void LinkWorker::PublishStatusIfDue() {
+  if (outlet_->trouble()) return;
   const SourceCondition condition = supervisor_.condition();
   const bool running = condition.state == SourceCondition::State::kRunning;
   const bool news = !running && condition.changes != reported_changes_;
-  const int64_t silence_ns = clock_.MonotonicNs() - last_published_ns_;
+  const int64_t last_published_ns = outlet_->last_published_ns();
+  const int64_t silence_ns = clock_.MonotonicNs() - last_published_ns;
   // A slow source is not lost between its frames.
   const double rate_hz = running ? condition.info.frame_rate_hz : 0;
   const int64_t three_frames = rate_hz > 0 ? static_cast<int64_t>(3e9 / rate_hz) : 0;
   const int64_t patience_ns =
       std::max<int64_t>(std::chrono::nanoseconds(options_.heartbeat).count(), three_frames);
-  const bool due = last_published_ns_ == 0 || silence_ns >= patience_ns;
+  const bool due = last_published_ns == 0 || silence_ns >= patience_ns;
   if (!news && !due) return;
   reported_changes_ = condition.changes;
 
-  auto state = pool_.Acquire();
+  auto state = outlet_->Acquire();
   if (condition.state == SourceCondition::State::kStarting) {
     ResetTo(*state, LinkStatus::kStarting, "waiting for the first frame");
   } else {
     ResetTo(*state, LinkStatus::kLost, running ? "no new frame; waiting" : condition.reason);
   }
-  state->sequence = last_sequence_;
-  Stamp(*state);
-  hub_.Publish(link_, pool_.Share(std::move(state)));
-}
-
-void LinkWorker::Stamp(LinkState& state) {
-  last_published_ns_ = clock_.MonotonicNs();
-  state.times.published_ns = last_published_ns_;
+  outlet_->PublishReport(life_, std::move(state));
 }
 
 }  // namespace taclink::server

@@ -1,44 +1,47 @@
 #include <grpc/support/log.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/signal_set.hpp>
-#include <csignal>
+#include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <optional>
 #include <string>
 
 #include "server/assembly/arm_builder.h"
+#include "server/assembly/config_check.h"
 #include "server/config.h"
+#include "server/gateway/setup.h"
+#include "server/log.h"
+#include "server/reload.h"
 #include "server/rpc/rpc_server.h"
+#include "server/security/exposure.h"
+#include "server/security/security.h"
+#include "server/signals.h"
+#include "server/systemd_notify.h"
 
 namespace taclink::server {
 namespace {
 
 constexpr int kFailed = 1;
 constexpr int kUsage = 2;
-constexpr std::chrono::milliseconds kShutdownPatience{1000};
+constexpr std::chrono::seconds kLogFlush{10};
 
 struct Options {
   std::string config;
   std::string listen;
+  std::optional<std::string> http_listen;
   bool insecure_open = false;
+  std::string log_level, log_format;  // in place of the configured ones
   bool print_config = false;
+  bool check_config = false;
 };
 
 int Complain(std::string message, int code) {
   for (char& c : message) c = c == '\n' ? ' ' : c;
   std::fprintf(stderr, "taclinkd: %s\n", message.c_str());
   return code;
-}
-
-void SetUpLog() {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("taclinkd"));
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %v");
-  // gRPC's own messages are for its developers.
-  gpr_set_log_function([](gpr_log_func_args* args) { spdlog::debug("grpc: {}", args->message); });
 }
 
 Result<Config> Configure(const Options& options) {
@@ -49,50 +52,104 @@ Result<Config> Configure(const Options& options) {
     if (!good) return Error{good.error().code, "--listen " + good.error().message};
     config->listen = options.listen;
   }
+  if (options.http_listen) {
+    const auto good = CheckHttpListen(*options.http_listen);
+    if (!good) return Error{good.error().code, "--http-listen " + good.error().message};
+    config->http.listen = options.http_listen;
+  }
+  if (!options.log_level.empty()) config->log.level = options.log_level;
+  if (!options.log_format.empty())
+    config->log.format = options.log_format == "json" ? LogFormat::kJson : LogFormat::kText;
   return config;
 }
 
-// Without TLS everyone who can connect sees everything.
-Result<void> CheckOpen(const Config& config, bool insecure_open) {
-  if (IsLoopback(config.listen)) return {};
-  if (!insecure_open) {
-    return Error{
-        ErrorCode::kInvalidArgument,
-        "refusing to listen on " + config.listen +
-            " without encryption; use a loopback address, or --insecure-open if the network is trusted"};
+// Everything that a change of the configuration can do without a restart.
+void AddReloads(Reloader& reloader, RpcServer& server, Arm& arm) {
+  reloader.AddAlways("log",
+                     [](const Config& next) { return SetUpLog(next.log); });  // also opens its file anew
+  reloader.Add("log", [](const Config&) { return Result<void>(); });
+  reloader.Add("limits", [&server](const Config& next) {
+    server.SetLimits(ToServiceLimits(next.limits));
+    spdlog::info(
+        "of the limits, those of streams and their queues hold from now on, the others from the next start");
+    return Result<void>();
+  });
+  reloader.AddAlways("links", [&arm](const Config&) {
+    for (size_t link = 0; link < arm.links().size(); ++link) arm.worker(link).Wake();
+    return Result<void>();
+  });
+}
+
+void Reload(const Options& options, Reloader& reloader, const SystemdNotifier& systemd) {
+  const int64_t now_us = SystemClock().MonotonicNs() / 1000;
+  systemd.Send("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(now_us));
+  if (const auto next = Configure(options); !next) {
+    spdlog::error("SIGHUP: the configuration in use stays: {}", next.error().message);
+  } else {
+    const Reloader::Outcome outcome = reloader.Reload(*next);
+    for (const auto& error : outcome.errors) spdlog::error("SIGHUP: {}", error);
+    const std::string none = "nothing";
+    spdlog::info(
+        "SIGHUP: taken over: {}; needs a restart: {}",
+        outcome.applied.empty() ? none : fmt::format("{}", fmt::join(outcome.applied, ", ")),
+        outcome.needs_restart.empty() ? none : fmt::format("{}", fmt::join(outcome.needs_restart, ", ")));
   }
-  spdlog::warn(
-      "LISTENING ON {} WITHOUT ENCRYPTION OR AUTHENTICATION: anyone who can reach it can use this server",
-      config.listen);
-  return {};
+  systemd.Send("READY=1");
 }
 
-// SIGTERM and SIGINT; returns the signal's name.
-std::string WaitForSignal() {
-  boost::asio::io_context context;
-  boost::asio::signal_set signals(context, SIGINT, SIGTERM);
-  std::string name;
-  signals.async_wait(
-      [&](const boost::system::error_code&, int number) { name = number == SIGTERM ? "SIGTERM" : "SIGINT"; });
-  context.run();
-  return name;
+// systemd hears of life only while the watchdog finds every link looked after.
+void PingSystemd(Arm& arm, const SystemdNotifier& systemd) {
+  if (systemd.watchdog_ns() == 0) return;
+  arm.watchdog().OnRound([&systemd, last_ns = int64_t{0}]() mutable {
+    const int64_t now_ns = SystemClock().MonotonicNs();
+    if (now_ns - last_ns < systemd.watchdog_ns() / 4) return;
+    last_ns = now_ns;
+    systemd.Send("WATCHDOG=1");
+  });
 }
 
-Result<void> Run(const Config& config) {
+Result<void> Run(const Options& options, const Config& config) {
+  Signals signals;
+  const SystemdNotifier systemd = SystemdNotifier::FromEnvironment();
+  const auto security = Security::Load(config.security);
+  if (!security) return security.error();
   const auto arm = BuildArm(config, SystemClock());
   if (!arm) return arm.error();
-  const auto server = RpcServer::Start(config.listen, **arm,
-                                       {.max_streams = static_cast<size_t>(config.limits.max_streams),
-                                        .queue_messages = static_cast<size_t>(config.limits.queue_messages)});
+  const auto server = RpcServer::Start(config.listen, **arm, ToServiceLimits(config.limits), *security);
   if (!server) return server.error();
+  const auto gateway = StartGateway(config.http, **arm, **server, *security);
+  if (!gateway) return gateway.error();
+  (*security)->Watch();
+  PingSystemd(**arm, systemd);
   (*arm)->Start();
+  Reloader reloader(config);
+  AddReloads(reloader, **server, **arm);
+  signals.OnReload([&] { Reload(options, reloader, systemd); });
   spdlog::info("taclinkd {}: arm {} with {} links, listening on {}", TACLINK_VERSION, config.arm_name,
                config.links.size(), (*server)->address());
-  spdlog::info("{}: shutting down", WaitForSignal());
-  (*server)->Shutdown("server is shutting down", kShutdownPatience);
+  systemd.Send("READY=1\nSTATUS=listening on " + (*server)->address());
+  spdlog::info("{}: shutting down", signals.WaitForStop());
+  systemd.Send("STOPPING=1");
+  if (*gateway) (*gateway)->Drain();
+  (*server)->Shutdown("server is shutting down", config.shutdown.limit);
   (*arm)->Stop();
   spdlog::info("stopped");
+  for (size_t link = 0; link < config.links.size(); ++link) {
+    if (!(*arm)->worker(link).LeavesThreads()) continue;
+    spdlog::default_logger()->flush();
+    std::_Exit(0);  // such a thread may yet use what exit() destroys
+  }
   return {};
+}
+
+int Check(const Config& config) {
+  if (const auto log = SetUpLog({.level = "warning"}); !log) return Complain(log.error().message, kFailed);
+  const ConfigFindings findings = CheckConfig(config);
+  for (const auto& note : findings.notes) std::fprintf(stderr, "taclinkd: note: %s\n", note.c_str());
+  for (const auto& error : findings.errors) Complain(error, kFailed);
+  if (!findings.errors.empty()) return kFailed;
+  std::printf("OK\n");
+  return 0;
 }
 
 int Main(int argc, char** argv) {
@@ -102,25 +159,38 @@ int Main(int argc, char** argv) {
   app.add_option("--config", options.config, "Configuration file (default: a simulated arm of four links)");
   app.add_option("--listen", options.listen,
                  "Address to listen on, in place of the configured one; port 0: any");
+  app.add_option("--http-listen", options.http_listen,
+                 "Address of the web page, in place of the configured one; port 0: any; '': none");
   app.add_flag("--insecure-open", options.insecure_open,
-               "Allow other addresses than loopback without encryption");
+               "Allow other addresses than loopback without encryption or without tokens");
   app.add_flag("--print-config", options.print_config, "Print the effective configuration and exit");
+  app.add_flag("--check-config", options.check_config,
+               "Make all that the configuration names, say OK or all that is wrong, and exit");
+  app.add_option("--log-level", options.log_level, "In place of the configured one")
+      ->check(CLI::IsMember({"debug", "info", "warning", "error"}));
+  app.add_option("--log-format", options.log_format, "In place of the configured one")
+      ->check(CLI::IsMember({"text", "json"}));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);
     return Complain(std::string(e.what()) + "; see taclinkd --help", kUsage);
   }
-  SetUpLog();
+  // gRPC's own messages are for its developers.
+  gpr_set_log_function([](gpr_log_func_args* args) { spdlog::debug("grpc: {}", args->message); });
   const auto config = Configure(options);
   if (!config) return Complain(config.error().message, kFailed);
   if (options.print_config) {
     std::fputs(ConfigText(*config).c_str(), stdout);
     return 0;
   }
-  if (const auto open = CheckOpen(*config, options.insecure_open); !open)
-    return Complain(open.error().message, kFailed);
-  const auto ran = Run(*config);
+  if (options.check_config) return Check(*config);
+  if (const auto log = SetUpLog(config->log); !log) return Complain(log.error().message, kFailed);
+  spdlog::flush_every(kLogFlush);  // also tells what the rate limit swallowed
+  const auto exposure = CheckExposure(*config, options.insecure_open);
+  if (!exposure) return Complain(exposure.error().message, kFailed);
+  for (const std::string& warning : *exposure) spdlog::warn("{}", warning);
+  const auto ran = Run(options, *config);
   return ran ? 0 : Complain(ran.error().message, kFailed);
 }
 

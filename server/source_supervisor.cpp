@@ -29,11 +29,12 @@ Result<void> Guarded(F call) {
 }  // namespace
 
 SourceSupervisor::SourceSupervisor(std::string name, std::unique_ptr<FrameSource> source, Clock& clock,
-                                   SupervisorOptions options)
+                                   SupervisorOptions options, StageMark* mark)
     : name_(std::move(name)),
       source_(std::move(source)),
       clock_(clock),
       options_(options),
+      mark_(mark),
       backoff_(options.first_backoff) {}
 
 bool SourceSupervisor::Next(StereoFrame& frame, milliseconds timeout) {
@@ -57,18 +58,35 @@ void SourceSupervisor::TryStart() {
     const std::lock_guard lock(mutex_);
     ++condition_.restarts;
   }
-  const auto result = Guarded([this] { return source_->Start(); });
+  const auto result = Guarded([this] {
+    const StageScope scope(mark_, WorkStage::kSourceStart, clock_);
+    return source_->Start();
+  });
+  Observe();
   if (!result) return Failed(result.error());
   started_ = true;
   alive_at_ns_ = clock_.MonotonicNs();
-  const SourceInfo info = source_->Info();
+  SourceInfo info = source_->Info();
   spdlog::info("link {}: source started: {}", name_, info.description);
   const std::lock_guard lock(mutex_);
-  condition_.info = info;
+  condition_.info = std::move(info);
+  condition_.counters = source_->Counters();
+}
+
+// What the source says of itself, for other threads.
+void SourceSupervisor::Observe() {
+  const SourceCounters counters = source_->Counters();
+  const std::lock_guard lock(mutex_);
+  if (counters.info_changes != condition_.counters.info_changes) condition_.info = source_->Info();
+  condition_.counters = counters;
 }
 
 bool SourceSupervisor::TryNext(StereoFrame& frame, milliseconds timeout) {
-  const auto result = Guarded([&] { return source_->Next(frame, timeout); });
+  const auto result = Guarded([&] {
+    const StageScope scope(mark_, WorkStage::kSourceNext, clock_);
+    return source_->Next(frame, timeout);
+  });
+  Observe();
   if (result) {
     alive_at_ns_ = clock_.MonotonicNs();
     backoff_ = options_.first_backoff;  // only a frame proves that the source works
@@ -76,12 +94,18 @@ bool SourceSupervisor::TryNext(StereoFrame& frame, milliseconds timeout) {
     return true;
   }
   switch (result.error().code) {
-    case ErrorCode::kTimeout:
-      if (clock_.MonotonicNs() - alive_at_ns_ >= StallNs()) {
-        Failed({ErrorCode::kUnavailable, "no frame for " + std::to_string(StallNs() / 1'000'000'000) +
+    case ErrorCode::kTimeout: {
+      const int64_t silent_ns = clock_.MonotonicNs() - alive_at_ns_;
+      const int64_t stall_ns = FramesOr(options_.stall, 5);
+      if (silent_ns >= stall_ns) {
+        Failed({ErrorCode::kUnavailable, "no frame for " + std::to_string(stall_ns / 1'000'000'000) +
                                              " s: " + result.error().message});
+      } else if (condition().state == SourceCondition::State::kRunning &&
+                 silent_ns >= FramesOr(options_.silence, 3)) {
+        SetCondition(SourceCondition::State::kLost, result.error().message + "; waiting");
       }
       break;
+    }
     case ErrorCode::kEndOfData:
       started_ = false;
       SetCondition(SourceCondition::State::kEnded,
@@ -100,10 +124,9 @@ void SourceSupervisor::Failed(const Error& error) {
   SetCondition(SourceCondition::State::kLost, error.message + "; trying again");
 }
 
-int64_t SourceSupervisor::StallNs() const {
+int64_t SourceSupervisor::FramesOr(milliseconds least, double frames) const {
   const double rate_hz = condition().info.frame_rate_hz;
-  const int64_t five_frames = rate_hz > 0 ? static_cast<int64_t>(5e9 / rate_hz) : 0;
-  return std::max(Ns(options_.stall), five_frames);
+  return std::max(Ns(least), rate_hz > 0 ? static_cast<int64_t>(frames * 1e9 / rate_hz) : 0);
 }
 
 void SourceSupervisor::SetCondition(SourceCondition::State state, std::string reason) {

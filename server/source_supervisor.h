@@ -9,14 +9,17 @@
 
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
+#include "server/stage_mark.h"
 
 namespace taclink::server {
 
 struct SupervisorOptions {
   std::chrono::milliseconds first_backoff{100};
-  std::chrono::milliseconds longest_backoff{2000};
+  std::chrono::milliseconds longest_backoff{500};
   /// A started source that gives nothing for this long (or for 5 frames of its rate) is started again.
   std::chrono::milliseconds stall{2000};
+  /// One that gave frames and is silent for this long (or for 3 frames of its rate) is called lost.
+  std::chrono::milliseconds silence{500};
 };
 
 /// How a source does, for those who report it.
@@ -26,7 +29,8 @@ struct SourceCondition {
   std::string reason;     ///< what failed and what happens next; empty while it runs
   uint64_t restarts = 0;  ///< attempts to start after the first
   uint64_t changes = 0;   ///< rises whenever state or reason change
-  SourceInfo info;        ///< of the last good start
+  SourceInfo info;        ///< of the last good start, and what changed since
+  SourceCounters counters;
 };
 
 /// Starts a source, starts it again with growing pauses when it fails, and knows what to say about it. An
@@ -34,7 +38,7 @@ struct SourceCondition {
 class SourceSupervisor {
  public:
   SourceSupervisor(std::string name, std::unique_ptr<FrameSource> source, Clock& clock,
-                   SupervisorOptions options = {});
+                   SupervisorOptions options = {}, StageMark* mark = nullptr);
 
   /// Does one thing that is due: starts the source, waits before the next attempt, or waits for a frame; for
   /// about `timeout` at most, as far as the source keeps to it. True: `frame` is filled. One thread.
@@ -47,14 +51,16 @@ class SourceSupervisor {
   void TryStart();
   bool TryNext(StereoFrame& frame, std::chrono::milliseconds timeout);
   void Failed(const Error& error);
+  void Observe();
   void SetCondition(SourceCondition::State state, std::string reason);
-  int64_t StallNs() const;
+  int64_t FramesOr(std::chrono::milliseconds least, double frames) const;
 
   // Constant after construction.
   const std::string name_;
   const std::unique_ptr<FrameSource> source_;
   Clock& clock_;
   const SupervisorOptions options_;
+  StageMark* const mark_;  // of Next's thread; null: nobody watches
 
   // Used by Next's thread only.
   bool started_ = false;

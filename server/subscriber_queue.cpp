@@ -6,12 +6,6 @@
 namespace taclink::server {
 namespace {
 
-// How early a frame may come and still count, for cameras are not exactly regular: a part of the period, and
-// at most.
-constexpr int64_t kEarlyDivisor = 4;
-constexpr int64_t kEarlyMaxNs = 10'000'000;
-constexpr double kLongestPeriodNs = 1e15;  // any client may ask for any rate
-
 size_t Capacity(size_t links, const SubscriberOptions& options) {
   return options.delivery == Delivery::kLatest ? links : std::max<size_t>(options.queue_capacity, 1);
 }
@@ -20,75 +14,119 @@ size_t Capacity(size_t links, const SubscriberOptions& options) {
 
 SubscriberQueue::SubscriberQueue(size_t links, SubscriberOptions options, std::function<void()> notify)
     : delivery_(options.delivery),
-      period_ns_(options.max_rate_hz > 0
-                     ? static_cast<int64_t>(std::min(1e9 / options.max_rate_hz, kLongestPeriodNs))
-                     : 0),
+      most_bytes_(options.queue_bytes),
+      detail_(options.detail),
+      deadband_(options.deadband),
       notify_(std::move(notify)),
       links_(links),
       ring_(Capacity(links, options)) {
+  for (PerLink& link : links_) link.rate = RateLimit(options.max_rate_hz);
   for (size_t i = 0; i < links && i < options.links.size(); ++i) links_[i].wanted = options.links[i];
 }
 
-// The schedule goes on from its own last date, so that frames that come a little early or late do not lower
-// the rate in the long run.
-bool SubscriberQueue::Due(PerLink& link, int64_t published_ns) const {
-  if (period_ns_ == 0) return true;
-  if (published_ns < link.next_due_ns - std::min(period_ns_ / kEarlyDivisor, kEarlyMaxNs)) return false;
-  link.next_due_ns += period_ns_;
-  if (link.next_due_ns <= published_ns) link.next_due_ns = published_ns + period_ns_;
-  return true;
+// A link within its deadband is let in once in a while, so that its silence means something.
+SubscriberQueue::News SubscriberQueue::Judge(PerLink& link, const LinkState& state) const {
+  if (!deadband_.on() || !link.reference || !Within(deadband_, *link.reference, state)) return News::kChanged;
+  const bool due = state.times.published_ns - link.accepted_ns >= kUnchangedPeriodNs;
+  return due ? News::kUnchanged : News::kNone;
 }
 
 bool SubscriberQueue::Offer(const PublicationPtr& publication) {
-  PublicationPtr moving = publication;  // holds what falls out, to be released after the lock
+  // What falls out is released after the lock.
+  PublicationPtr replaced;
+  std::vector<PublicationPtr> fallen;
+  std::shared_ptr<const LinkState> reference;
   const std::lock_guard lock(mutex_);
   PerLink& link = links_[publication->link()];
-  if (!link.wanted || !Due(link, publication->state().times.published_ns)) return false;
+  if (!link.wanted) return false;
+  const int64_t published_ns = publication->state().times.published_ns;
+  const News news = Judge(link, publication->state());
+  if (news == News::kNone) {
+    ++link.counts.unchanged;
+    return false;
+  }
+  if (!link.rate.Due(published_ns)) return false;
+  if (deadband_.on()) {
+    if (news == News::kChanged) reference = std::exchange(link.reference, publication->shared_state());
+    link.accepted_ns = published_ns;
+  }
+  Place place{publication, publication->Cost(detail_), news == News::kUnchanged};
   if (delivery_ == Delivery::kEvery) {
-    PushEvery(moving);
+    PushEvery(std::move(place), fallen);
   } else {
-    PushLatest(moving);
+    PushLatest(std::move(place), replaced);
   }
   return std::exchange(armed_, false);
 }
 
-void SubscriberQueue::CountDrop(size_t link) {
-  ++links_[link].counts.dropped;
+// `incoming` is about to be let in.
+void SubscriberQueue::Drop(const Place& place, bool for_bytes, Place& incoming) {
+  const size_t number = place.publication->link();
+  PerLink& link = links_[number];
+  ++link.counts.dropped;
+  link.counts.dropped_for_bytes += for_bytes ? 1 : 0;
   ++dropped_;
+  if (!deadband_.on() || place.unchanged) return;
+  for (size_t i = 0; i < count_; ++i) {
+    if (Place& next = At(i); next.publication && next.publication->link() == number)
+      return ReferTo(place, next);
+  }
+  if (incoming.publication->link() == number) return ReferTo(place, incoming);
+  link.reference.reset();
 }
 
-void SubscriberQueue::PushEvery(PublicationPtr& publication) {
-  if (count_ < ring_.size()) {
-    std::swap(At(count_++), publication);
-    return;
-  }
-  std::swap(At(0), publication);
+// The subscriber never gets `dropped`, so what follows it is not unchanged to it.
+void SubscriberQueue::ReferTo(const Place& dropped, Place& next) {
+  next.unchanged = false;
+  auto& reference = links_[next.publication->link()].reference;
+  if (reference == dropped.publication->shared_state()) reference = next.publication->shared_state();
+}
+
+SubscriberQueue::Place SubscriberQueue::PopFirst() {
+  Place first = std::exchange(At(0), Place{});
   first_ = (first_ + 1) % ring_.size();
-  CountDrop(publication->link());
+  --count_;
+  bytes_ -= first.cost;
+  return first;
+}
+
+void SubscriberQueue::PushEvery(Place place, std::vector<PublicationPtr>& fallen) {
+  while (count_ > 0 && (count_ == ring_.size() || bytes_ + place.cost > most_bytes_)) {
+    const bool for_bytes = count_ < ring_.size();
+    Place oldest = PopFirst();
+    Drop(oldest, for_bytes, place);
+    fallen.push_back(std::move(oldest.publication));
+  }
+  bytes_ += place.cost;
+  At(count_++) = std::move(place);
 }
 
 // The newest takes the place of the older one, so that a fast link can't push a slow one back.
-void SubscriberQueue::PushLatest(PublicationPtr& publication) {
-  for (size_t place = 0; place < count_; ++place) {
-    if (At(place)->link() != publication->link()) continue;
-    CountDrop(publication->link());
-    std::swap(At(place), publication);
+void SubscriberQueue::PushLatest(Place place, PublicationPtr& replaced) {
+  bytes_ += place.cost;
+  for (size_t i = 0; i < count_; ++i) {
+    Place& older = At(i);
+    if (older.publication->link() != place.publication->link()) continue;
+    bytes_ -= older.cost;
+    const Place dropped = std::exchange(older, Place{});
+    Drop(dropped, false, place);
+    replaced = dropped.publication;
+    older = std::move(place);
     return;
   }
-  std::swap(At(count_++), publication);
+  At(count_++) = std::move(place);
 }
 
-PublicationPtr SubscriberQueue::Take() {
+PublicationPtr SubscriberQueue::Take(bool* unchanged) {
   const std::lock_guard lock(mutex_);
   if (count_ == 0) {
     armed_ = true;
     return nullptr;
   }
-  PublicationPtr next = std::move(At(0));
-  first_ = (first_ + 1) % ring_.size();
-  --count_;
-  ++links_[next->link()].counts.taken;
-  return next;
+  Place next = PopFirst();
+  ++links_[next.publication->link()].counts.taken;
+  if (unchanged) *unchanged = next.unchanged;
+  return std::move(next.publication);
 }
 
 std::vector<DeliveryCounts> SubscriberQueue::Counts() const {
@@ -96,6 +134,11 @@ std::vector<DeliveryCounts> SubscriberQueue::Counts() const {
   std::vector<DeliveryCounts> counts;
   for (const PerLink& link : links_) counts.push_back(link.counts);
   return counts;
+}
+
+size_t SubscriberQueue::waiting_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return bytes_;
 }
 
 size_t SubscriberQueue::waiting() const {

@@ -2,22 +2,23 @@
 
 #include <atomic>
 #include <functional>
-#include <limits>
+#include <memory>
 #include <mutex>
 #include <vector>
 
 #include "server/hub.h"
+#include "server/rate_limit.h"
 
 namespace taclink::server {
 
-/// What waits for one subscriber. Its size is fixed at construction.
+/// What waits for one subscriber. Bounded in number and in bytes.
 class SubscriberQueue {
  public:
   SubscriberQueue(size_t links, SubscriberOptions options, std::function<void()> notify);
 
   /// True: the subscriber waits and is to be notified.
   bool Offer(const PublicationPtr& publication);
-  PublicationPtr Take();
+  PublicationPtr Take(bool* unchanged);
   void Notify() const { notify_(); }
   void Close() { closed_ = true; }
   bool closed() const { return closed_; }
@@ -25,24 +26,38 @@ class SubscriberQueue {
   std::vector<DeliveryCounts> Counts() const;
   uint64_t dropped() const { return dropped_; }
   size_t waiting() const;
+  size_t waiting_bytes() const;
   size_t capacity() const { return ring_.size(); }
 
  private:
   struct PerLink {
     bool wanted = true;
-    int64_t next_due_ns = std::numeric_limits<int64_t>::min() / 2;  // of the rate limit, in published_ns
+    RateLimit rate{0};  // of published_ns
     DeliveryCounts counts;
+    // Of the deadband.
+    std::shared_ptr<const LinkState> reference;  // the newest that changed; all that follow are like it
+    int64_t accepted_ns = 0;                     // the newest that was let in, in published_ns
+  };
+  struct Place {
+    PublicationPtr publication;
+    size_t cost = 0;         // bytes
+    bool unchanged = false;  // within the deadband
   };
 
-  void CountDrop(size_t link);
-  bool Due(PerLink& link, int64_t published_ns) const;
-  void PushEvery(PublicationPtr& publication);
-  void PushLatest(PublicationPtr& publication);
-  PublicationPtr& At(size_t place) { return ring_[(first_ + place) % ring_.size()]; }
+  enum class News { kNone, kUnchanged, kChanged };
+  News Judge(PerLink& link, const LinkState& state) const;
+  Place PopFirst();
+  void Drop(const Place& place, bool for_bytes, Place& incoming);
+  void ReferTo(const Place& dropped, Place& next);
+  void PushEvery(Place place, std::vector<PublicationPtr>& fallen);
+  void PushLatest(Place place, PublicationPtr& replaced);
+  Place& At(size_t place) { return ring_[(first_ + place) % ring_.size()]; }
 
   // Constant after construction.
   const Delivery delivery_;
-  const int64_t period_ns_;  // of the rate limit; 0: none
+  const size_t most_bytes_;
+  const Detail detail_;
+  const Deadband deadband_;
   const std::function<void()> notify_;
 
   std::atomic<bool> closed_ = false;
@@ -50,9 +65,10 @@ class SubscriberQueue {
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   std::vector<PerLink> links_;
-  std::vector<PublicationPtr> ring_;  // count_ of them from first_ on, oldest first
+  std::vector<Place> ring_;  // count_ of them from first_ on, oldest first
   size_t first_ = 0;
   size_t count_ = 0;
+  size_t bytes_ = 0;    // cost of all places
   bool armed_ = false;  // Take found nothing since the last notification
 };
 

@@ -1,5 +1,7 @@
 #include "wire/convert.h"
 
+#include <cmath>
+
 #include "wire/units.h"
 
 namespace taclink::wire {
@@ -118,6 +120,19 @@ MarkerSource FromWire(v1::MarkerSource source) {
   }
 }
 
+void Fill(const FrameTimes& times, v1::FrameTimes& out) {
+  out.set_exposure_utc_ns(times.exposure_utc_ns);
+  out.set_exposure_ns(times.exposure_monotonic_ns);
+  out.set_received_ns(times.received_ns);
+  out.set_tracked_ns(times.tracked_ns);
+  out.set_solved_ns(times.solved_ns);
+  out.set_published_ns(times.published_ns);
+}
+
+void FillCovariance(const Mat3& covariance, double scale, google::protobuf::RepeatedField<double>& out) {
+  for (const auto& [row, column] : kUpperTriangle) out.Add(covariance(row, column) * scale * scale);
+}
+
 void Fill(const Vec3& value, double scale, v1::Vector3& out) {
   out.set_x(value.x() * scale);
   out.set_y(value.y() * scale);
@@ -172,6 +187,30 @@ void Fill(const LinkModel& model, v1::LinkModel& out) {
 // Both are numbered alike.
 static_assert(static_cast<int>(TrackingMode::kTracked) == v1::TRACKING_MODE_TRACKED);
 static_assert(static_cast<int>(AcquireReason::kForced) == v1::ACQUIRE_REASON_FORCED);
+
+static_assert(static_cast<int>(PressureOrigin::kNone) + 1 == v1::PRESSURE_ORIGIN_NONE);
+static_assert(static_cast<int>(PressureOrigin::kSimulated) + 1 == v1::PRESSURE_ORIGIN_SIMULATED);
+static_assert(static_cast<int>(PressureOrigin::kClient) + 1 == v1::PRESSURE_ORIGIN_CLIENT);
+
+void Fill(const PressureReport& report, v1::PressureReport& out) {
+  out.set_origin(static_cast<v1::PressureOrigin>(static_cast<int>(report.origin) + 1));
+  out.set_assumed(report.assumed());
+  out.set_stale(report.stale);
+  out.set_pressure_pa(report.mpa * kPascalsPerMpa);
+  if (report.age_ns >= 0) out.set_age_s(static_cast<double>(report.age_ns) * 1e-9);
+  out.set_trouble(report.trouble);
+}
+
+PressureReport FromWire(const v1::PressureReport& message) {
+  PressureReport report;
+  if (v1::PressureOrigin_IsValid(message.origin()) && message.origin() != v1::PRESSURE_ORIGIN_UNSPECIFIED)
+    report.origin = static_cast<PressureOrigin>(message.origin() - 1);
+  report.stale = message.stale();
+  report.mpa = message.pressure_pa() / kPascalsPerMpa;
+  if (message.has_age_s()) report.age_ns = std::llround(message.age_s() * 1e9);
+  report.trouble = message.trouble();
+  return report;
+}
 
 v1::TrackingMode ToWire(TrackingMode mode) {
   return static_cast<v1::TrackingMode>(mode);

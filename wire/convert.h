@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <utility>
+
 #include "sensing/core/contact.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/link_state.h"
@@ -19,6 +22,8 @@ v1::AcquireReason ToWire(AcquireReason reason);
 AcquireReason FromWire(v1::AcquireReason reason);
 v1::ForceModel ToWire(ForceModel model);
 v1::MarkerSource ToWire(MarkerSource source);
+void Fill(const Baseline& baseline, v1::Baseline& out);
+Baseline FromWire(const v1::Baseline& baseline);
 
 /// Values that this build does not know become the weakest one: kContacts, kLost, kLinear, kInferred.
 Detail FromWire(v1::Detail detail);
@@ -26,6 +31,16 @@ LinkStatus FromWire(v1::LinkStatus status);
 ForceModel FromWire(v1::ForceModel model);
 MarkerSource FromWire(v1::MarkerSource source);
 
+void Fill(const PressureReport& report, v1::PressureReport& out);
+PressureReport FromWire(const v1::PressureReport& message);
+
+/// The upper triangle row by row, in which all covariances are sent.
+inline constexpr std::array<std::pair<int, int>, 6> kUpperTriangle = {
+    {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
+
+void Fill(const FrameTimes& times, v1::FrameTimes& out);
+/// `scale`: of the quantity whose covariance it is.
+void FillCovariance(const Mat3& covariance, double scale, google::protobuf::RepeatedField<double>& out);
 void Fill(const Vec3& value, double scale, v1::Vector3& out);
 Vec3 FromWire(const v1::Vector3& value, double scale);
 

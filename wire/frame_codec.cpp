@@ -3,7 +3,6 @@
 #include <google/protobuf/io/coded_stream.h>
 
 #include <array>
-#include <utility>
 
 #include "taclink/v1/tactile.pb.h"
 #include "wire/convert.h"
@@ -13,10 +12,6 @@ namespace taclink::wire {
 namespace {
 
 using Floats = google::protobuf::RepeatedField<float>;
-
-// The upper triangle row by row, as displacement_covariances_m2 documents.
-constexpr std::array<std::pair<int, int>, 6> kUpperTriangle = {
-    {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
 
 void FillVectors(const std::vector<Vec3>& values, double scale, Floats& out) {
   out.Reserve(static_cast<int>(values.size()) * 3);
@@ -33,15 +28,6 @@ std::vector<Vec3> VectorsFrom(const Floats& values, double scale) {
     }
   }
   return out;
-}
-
-void FillTimes(const FrameTimes& times, v1::FrameTimes& out) {
-  out.set_exposure_utc_ns(times.exposure_utc_ns);
-  out.set_exposure_ns(times.exposure_monotonic_ns);
-  out.set_received_ns(times.received_ns);
-  out.set_tracked_ns(times.tracked_ns);
-  out.set_solved_ns(times.solved_ns);
-  out.set_published_ns(times.published_ns);
 }
 
 FrameTimes TimesFrom(const v1::FrameTimes& times) {
@@ -67,10 +53,6 @@ StageTimes StageTimesFrom(const v1::StageTimes& s) {
           .register_ = s.register_s() / kSecondsPerMs,
           .reconstruct = s.reconstruct_s() / kSecondsPerMs,
           .force = s.force_s() / kSecondsPerMs};
-}
-
-void FillCovariance(const Mat3& covariance, double scale, google::protobuf::RepeatedField<double>& out) {
-  for (const auto& [row, column] : kUpperTriangle) out.Add(covariance(row, column) * scale * scale);
 }
 
 std::optional<Mat3> CovarianceFrom(const google::protobuf::RepeatedField<double>& numbers, double scale) {
@@ -191,17 +173,19 @@ void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFra
   out.set_link(link.name);
   out.set_link_index(link.index);
   out.set_sequence(state.sequence);
-  FillTimes(state.times, *out.mutable_times());
+  Fill(state.times, *out.mutable_times());
   out.set_status(ToWire(state.status));
   out.set_status_reason(state.status_reason);
   out.set_detail(ToWire(detail));
   if (state.pressure_mpa) out.set_pressure_pa(*state.pressure_mpa * kPascalsPerMpa);
+  if (state.times.exposure_monotonic_ns != 0) Fill(state.pressure, *out.mutable_pressure());
   out.set_markers_seen(static_cast<uint32_t>(state.shape.seen()));
   out.set_markers_inferred(static_cast<uint32_t>(state.shape.CountOf(MarkerSource::kInferred)));
   for (const Contact& contact : state.contacts) FillContact(contact, *out.add_contacts());
   Fill(state.total_force_n, 1, *out.mutable_total_force_n());
   out.set_force_model(ToWire(state.forces.model));
   out.set_baseline_age_s(state.baseline_age_s);
+  Fill(state.baseline, *out.mutable_baseline());
   FillStageTimes(state.stage_ms, *out.mutable_stage_times());
   for (size_t i = 0; i < kCameraCount; ++i)
     FillCamera(state.cameras[i], state.tracking.cameras[i], *out.add_cameras());
@@ -229,6 +213,12 @@ std::string FrameResponsePrefix(size_t frame_bytes) {
   return {buffer.data(), end};
 }
 
+std::string UnchangedMark() {
+  v1::LinkFrame frame;
+  frame.set_unchanged(true);
+  return frame.SerializeAsString();
+}
+
 Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
   if (!LengthsFit(frame)) {
     return Error{ErrorCode::kInvalidArgument, "frame " + std::to_string(frame.sequence()) + " of link '" +
@@ -242,11 +232,13 @@ Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
   state.times = TimesFrom(frame.times());
   state.status = FromWire(frame.status());
   state.status_reason = frame.status_reason();
+  if (frame.has_pressure()) state.pressure = FromWire(frame.pressure());
   if (frame.has_pressure_pa()) state.pressure_mpa = frame.pressure_pa() / kPascalsPerMpa;
   for (const auto& contact : frame.contacts()) state.contacts.push_back(ContactFrom(contact));
   state.total_force_n = FromWire(frame.total_force_n(), 1);
   state.forces.model = FromWire(frame.force_model());
   state.baseline_age_s = frame.baseline_age_s();
+  state.baseline = FromWire(frame.baseline());
   state.stage_ms = StageTimesFrom(frame.stage_times());
   for (size_t i = 0; i < kCameraCount && static_cast<int>(i) < frame.cameras_size(); ++i) {
     ReadCamera(frame.cameras(static_cast<int>(i)), state.cameras[i], state.tracking.cameras[i]);

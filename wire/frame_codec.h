@@ -27,6 +27,9 @@ std::string EncodeFrame(const LinkId& link, const LinkState& state, Detail detai
 /// itself is encoded once for all who want it.
 std::string FrameResponsePrefix(size_t frame_bytes);
 
+/// What makes a LinkFrame unchanged (LinkFrame.unchanged) when it stands after its bytes.
+std::string UnchangedMark();
+
 struct DecodedFrame {
   LinkId link;
   Detail detail = Detail::kContacts;

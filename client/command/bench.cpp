@@ -9,6 +9,7 @@
 #include "client/command/bench_accuracy.h"
 #include "client/command/bench_files.h"
 #include "client/command/bench_json.h"
+#include "client/command/bench_server.h"
 #include "client/command/commands.h"
 #include "sensing/capture/image_io.h"
 #include "sensing/evaluation/scene_generator.h"
@@ -204,6 +205,7 @@ void AddBench(CLI::App& app, Selected& selected) {
   vision->callback([options, &selected] { selected = [options] { return Vision(*options); }; });
   AddBenchAccuracy(*bench, selected);
   AddBenchStability(*bench, selected);
+  AddBenchServer(*bench, selected);
 }
 
 }  // namespace taclink::command

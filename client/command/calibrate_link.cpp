@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "client/command/connect.h"
 #include "client/command/json.h"
 
 namespace taclink::command {
@@ -37,7 +38,7 @@ void PrintJson(const std::string& link, const client::CalibrationResult& result)
 }  // namespace
 
 Result<void> CalibrateLink(const LinkCalibration& calibration) {
-  auto connection = client::Client::Connect(calibration.server);
+  auto connection = ConnectTo(calibration.server);
   if (!connection) return connection.error();
   bool told = false;
   const auto result = connection->Calibrate(calibration.options, [&told](int taken, int wanted) {

@@ -24,6 +24,15 @@ Json ContactJson(const client::Contact& contact) {
           {"area_mm2", contact.area_m2 * kMm2PerSquareMetre}};
 }
 
+Json PressureJson(const client::PressureReport& pressure) {
+  return {{"kpa", pressure.pressure_pa * kKpaPerPascal},
+          {"origin", pressure.origin},
+          {"assumed", pressure.assumed},
+          {"stale", pressure.stale},
+          {"age_s", pressure.age_s ? Json(*pressure.age_s) : Json(nullptr)},
+          {"trouble", pressure.trouble}};
+}
+
 }  // namespace
 
 std::string FrameJson(const client::Frame& frame) {
@@ -37,10 +46,12 @@ std::string FrameJson(const client::Frame& frame) {
                {"status", client::Name(frame.status)},
                {"reason", frame.status_reason},
                {"pressure_kpa", frame.pressure_pa ? Json(*frame.pressure_pa * kKpaPerPascal) : Json(nullptr)},
+               {"pressure", PressureJson(frame.pressure)},
                {"force_model", client::Name(frame.force_model)},
                {"markers", {{"seen", frame.markers_seen}, {"inferred", frame.markers_inferred}}},
                {"tracked", frame.tracked},
                {"picture_share", frame.picture_share},
+               {"unchanged", frame.unchanged},
                {"contacts", std::move(contacts)},
                {"total_force_n", frame.total_force_n}};
   if (!frame.positions_m.empty()) json["positions_mm"] = ToJson(frame.positions_m, kMmPerMetre);

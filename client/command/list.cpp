@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "client/command/commands.h"
+#include "client/command/connect.h"
 #include "client/command/json.h"
 #include "client/taclink/client.h"
 
@@ -33,9 +34,40 @@ void PrintTable(const client::Arm& arm) {
   }
 }
 
+void PrintCameras(const client::Arm& arm) {
+  size_t width = 4;
+  bool any = false;
+  for (const auto& link : arm.links) {
+    width = std::max(width, link.name.size());
+    any = any || !link.cameras.empty();
+  }
+  if (!any) return;
+  fmt::print("\n{:<{}}  {:<6}  {:<14}  {:>6}  {:>8}  {:>6}  {:>7}  {:>6}  {:>8}  {}\n", "LINK", width,
+             "CAMERA", "FORMAT", "RATE/s", "PICTURES", "LOST", "DAMAGED", "UNREAD", "UNPAIRED", "DEVICE");
+  for (const auto& link : arm.links) {
+    for (const auto& camera : link.cameras) {
+      fmt::print("{:<{}}  {:<6}  {:<14}  {:>6.1f}  {:>8}  {:>6}  {:>7}  {:>6}  {:>8}  {}\n", link.name, width,
+                 camera.name, camera.format.empty() ? "-" : camera.format, camera.rate_hz, camera.pictures,
+                 camera.lost, camera.damaged, camera.undecodable, camera.unpaired,
+                 camera.trouble.empty() ? camera.device : camera.trouble);
+    }
+  }
+}
+
+Json CameraJson(const client::Camera& camera) {
+  return {{"camera", camera.name},       {"configured", camera.configured},
+          {"device", camera.device},     {"format", camera.format},
+          {"trouble", camera.trouble},   {"rate_hz", camera.rate_hz},
+          {"pictures", camera.pictures}, {"lost", camera.lost},
+          {"damaged", camera.damaged},   {"undecodable", camera.undecodable},
+          {"unpaired", camera.unpaired}, {"stamped_on_arrival", camera.stamped_on_arrival}};
+}
+
 void PrintJson(const client::Arm& arm) {
   Json links = Json::array();
   for (const auto& link : arm.links) {
+    Json cameras = Json::array();
+    for (const auto& camera : link.cameras) cameras.push_back(CameraJson(camera));
     links.push_back({{"link", link.name},
                      {"model", link.model.name},
                      {"source", client::Name(link.source)},
@@ -48,14 +80,21 @@ void PrintJson(const client::Arm& arm) {
                      {"contacts", link.contacts},
                      {"frames", link.frames},
                      {"frames_skipped", link.frames_skipped},
-                     {"source_restarts", link.source_restarts}});
+                     {"source_restarts", link.source_restarts},
+                     {"supervision", client::Name(link.supervision)},
+                     {"worker_restarts", link.worker_restarts},
+                     {"stage_overruns", link.stage_overruns},
+                     {"workers_abandoned", link.workers_abandoned},
+                     {"last_failure", link.last_failure},
+                     {"pairs_skipped", link.pairs_skipped},
+                     {"cameras", std::move(cameras)}});
   }
   const Json json = {{"arm", arm.name}, {"server_version", arm.server_version}, {"links", std::move(links)}};
   fmt::print("{}\n", json.dump());
 }
 
 Result<void> Run(const Options& options) {
-  auto connection = client::Client::Connect(options.server);
+  auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   const auto arm = connection->GetArm();
   if (!arm) return arm.error();
@@ -63,6 +102,7 @@ Result<void> Run(const Options& options) {
     PrintJson(*arm);
   } else {
     PrintTable(*arm);
+    PrintCameras(*arm);
   }
   return {};
 }

@@ -20,15 +20,6 @@ int Complain(std::string message, int code) {
 
 namespace taclink::command {
 
-void AddServerOption(CLI::App& command, std::string& address) {
-  command.add_option("--server", address, "Address of the server, host:port")
-      ->envname("TACLINK_SERVER")
-      ->check([](const std::string& text) {
-        return text.empty() ? std::string("must be host:port") : std::string();
-      })
-      ->capture_default_str();
-}
-
 CLI::Validator Within(double min, double max) {
   return {[=](std::string& text) -> std::string {
             double value = 0;
@@ -46,7 +37,10 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", std::string(TACLINK_VERSION));
   app.require_subcommand(1);
   taclink::command::Selected selected;
+  taclink::command::AddCameras(app, selected);
   taclink::command::AddList(app, selected);
+  taclink::command::AddLog(app, selected);
+  taclink::command::AddRestart(app, selected);
   taclink::command::AddWatch(app, selected);
   taclink::command::AddDetect(app, selected);
   taclink::command::AddSolve(app, selected);
@@ -54,7 +48,13 @@ int main(int argc, char** argv) {
   taclink::command::AddSimulate(app, selected);
   taclink::command::AddSkin(app, selected);
   taclink::command::AddBench(app, selected);
+  taclink::command::AddContacts(app, selected);
+  taclink::command::AddJoints(app, selected);
   taclink::command::AddShow(app, selected);
+  taclink::command::AddToken(app, selected);
+  taclink::command::AddTare(app, selected);
+  taclink::command::AddEvents(app, selected);
+  taclink::command::AddThresholds(app, selected);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

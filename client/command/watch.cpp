@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "client/command/commands.h"
+#include "client/command/connect.h"
 #include "client/command/frame_json.h"
 #include "client/command/json.h"
 #include "client/command/watch_view.h"
@@ -27,6 +28,7 @@ struct Options {
   std::vector<std::string> links;
   std::string detail = "contacts";
   double rate_hz = 0;
+  double deadband_n = 0, deadband_mm = 0;
   double patience_s = 5;
   bool every = false;
   bool json = false;
@@ -41,7 +43,9 @@ client::StreamOptions ToStream(const Options& options) {
                     : options.detail == "geometry" ? client::Detail::kGeometry
                                                    : client::Detail::kContacts,
           .max_rate_hz = options.rate_hz,
-          .delivery = options.every ? client::Delivery::kEvery : client::Delivery::kLatest};
+          .delivery = options.every ? client::Delivery::kEvery : client::Delivery::kLatest,
+          .deadband_force_n = options.deadband_n,
+          .deadband_move_m = options.deadband_mm * 1e-3};
 }
 
 /// Where frames go: one of three forms.
@@ -98,7 +102,7 @@ class Output {
 };
 
 Result<void> Run(const Options& options) {
-  auto connection = client::Client::Connect(options.server);
+  auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   auto reader = connection->StreamFrames(ToStream(options));
   if (!reader) return reader.error();
@@ -140,6 +144,10 @@ void AddWatch(CLI::App& app, Selected& selected) {
   command->add_option("--detail", options->detail, "contacts, geometry or full")
       ->check(CLI::IsMember({"contacts", "geometry", "full"}))
       ->capture_default_str();
+  command->add_option("--deadband-force", options->deadband_n, "Pass over forces that change by less, N")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--deadband-move", options->deadband_mm, "Pass over markers that move by less, mm")
+      ->check(CLI::PositiveNumber);
   command->add_flag("--every", options->every, "Every frame in order, not only the newest");
   command->add_flag("--json", options->json, "One JSON object a line for each frame");
   command->add_option("--patience", options->patience_s, "Seconds without any word before it gives up")

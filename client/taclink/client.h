@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "client/taclink/events.h"
 #include "sensing/core/result.h"
 
 /// Client of a TacLINK server. Everything is in SI units (m, N, Pa, s, rad); vectors of a link are in its
@@ -43,6 +44,10 @@ enum class MarkerSource : uint8_t { kUnknown, kBoth, kTop, kBottom, kInferred };
 enum class SourceKind { kUnknown, kV4l2, kFiles, kSimulated };
 const char* Name(SourceKind kind);
 
+/// How the worker of a link does: late, being started again, or dead so often that it waits for RestartLink.
+enum class Supervision { kUnknown, kRunning, kOverdue, kRestarting, kResting };
+const char* Name(Supervision supervision);
+
 /// A type of link. Per-marker data, here and in Frame, is ring by ring: index = ring * paths + path, from 0.
 struct LinkModel {
   std::string name;
@@ -68,11 +73,28 @@ struct Pose {
   std::array<double, 4> rotation_xyzw{0, 0, 0, 1};  ///< unit quaternion
 };
 
+/// One camera of a link. Counts are since the server started.
+struct Camera {
+  std::string name;          ///< "top" or "bottom"
+  std::string configured;    ///< as the configuration names it
+  std::string device;        ///< what was found by that name; empty: not open
+  std::string format;        ///< "MJPEG 640x480"; empty: not open
+  std::string trouble;       ///< why it gives no pictures; empty: it does
+  double rate_hz = 0;        ///< as measured; 0: gives none
+  uint64_t pictures = 0;     ///< came whole from the driver
+  uint64_t lost = 0;         ///< counted but never handed out by the driver
+  uint64_t damaged = 0;      ///< marked bad by the driver, or empty
+  uint64_t undecodable = 0;  ///< no picture could be made of it
+  uint64_t unpaired = 0;     ///< the other camera had none of that time
+  uint64_t stamped_on_arrival = 0;
+};
+
 struct Link {
   std::string name;
   int index = 0;
   LinkModel model;
-  Pose base_from_link;
+  Pose base_from_link;  ///< now
+  std::string frame;    ///< link of the URDF that it is fixed to; empty: the base
   SourceKind source = SourceKind::kUnknown;
   std::string source_description;
   LinkStatus status = LinkStatus::kUnknown;
@@ -83,13 +105,34 @@ struct Link {
   uint64_t frames = 0;  ///< since the server started
   uint64_t frames_skipped = 0;
   uint64_t source_restarts = 0;
+  uint64_t pairs_skipped = 0;  ///< of frames_skipped, before the server fetched them
   int contacts = 0;
+  std::vector<Camera> cameras;  ///< top, bottom; none: the source has no cameras
+  Supervision supervision = Supervision::kUnknown;
+  std::string
+      supervision_reason;  ///< what is wrong with the worker and what happens next; empty while it runs
+  uint64_t worker_restarts = 0;
+  uint64_t stage_overruns = 0;                ///< stages of the worker that took longer than they may
+  uint64_t workers_abandoned = 0;             ///< that hung
+  std::string last_failure;                   ///< why the last worker died; empty: none did
+  std::vector<ForceLevelState> force_levels;  ///< of the whole link, then of its regions
+  Baseline baseline;
+};
+
+/// A joint of the arm's URDF that moves by itself. Positions in rad; prismatic: m.
+struct Joint {
+  std::string name;
+  std::optional<double> lower, upper;  ///< range; none: not limited
+  std::optional<double> position;      ///< now, after the newest state; none: the server was told none
+  double position_age_s = 0;
 };
 
 struct Arm {
   std::string name;
   std::string server_version;
   std::vector<Link> links;
+  std::string base_frame = {};     ///< link of the URDF; empty: there is no URDF
+  std::vector<Joint> joints = {};  ///< from the base to the tips
 };
 
 struct Contact {
@@ -119,6 +162,16 @@ struct StageTimes {
   double decode_s = 0, detect_s = 0, register_s = 0, reconstruct_s = 0, force_s = 0;
 };
 
+/// How the pressure inside a skin is known.
+struct PressureReport {
+  std::string origin = "none";  ///< none, constant, simulated, file, serial, client
+  bool assumed = true;          ///< configured, or taken as 0: not measured
+  bool stale = false;           ///< the sensor's newest reading is too old, or there is none
+  double pressure_pa = 0;       ///< the reading, or what is assumed; gauge
+  std::optional<double> age_s;  ///< from the reading to the exposure; none: there is no reading
+  std::string trouble;          ///< what is wrong with the sensor; empty: nothing
+};
+
 struct Frame {
   std::string link;
   int link_index = 0;
@@ -126,16 +179,19 @@ struct Frame {
   FrameTimes times;
   LinkStatus status = LinkStatus::kUnknown;
   std::string status_reason;
-  std::optional<double> pressure_pa;
+  std::optional<double> pressure_pa;  ///< measured
+  PressureReport pressure;
   int markers_seen = 0;
   int markers_inferred = 0;
   std::vector<Contact> contacts;
   Vector3 total_force_n{};
   ForceModel force_model = ForceModel::kUnknown;
   double baseline_age_s = 0;
+  Baseline baseline;
   StageTimes stage_times;
   bool tracked = false;      ///< markers were followed; else the full pictures were searched
   double picture_share = 0;  ///< part of both pictures' pixels that were read
+  bool unchanged = false;    ///< within the stream's deadband; at kContacts
 
   // kGeometry
   std::vector<Vector3> positions_m;
@@ -161,13 +217,19 @@ struct StreamOptions {
   Detail detail = Detail::kContacts;
   double max_rate_hz = 0;  ///< of each link; 0: all frames
   Delivery delivery = Delivery::kLatest;
+  /// A link that changes less is sent once a second only (Frame::unchanged); 0: this does not count, both 0:
+  /// all.
+  double deadband_force_n = 0;
+  double deadband_move_m = 0;
 };
 
 /// As the server counts them since the stream began.
 struct StreamCounts {
   std::string link;
   uint64_t frames_sent = 0;
-  uint64_t frames_dropped = 0;  ///< because this client was too slow
+  uint64_t frames_dropped = 0;            ///< because this client was too slow
+  uint64_t frames_dropped_for_bytes = 0;  ///< of these, because of the bytes that waited, not their number
+  uint64_t frames_unchanged = 0;          ///< left out because of the deadband
 };
 
 struct CalibrateOptions {
@@ -214,12 +276,24 @@ class FrameReader {
   std::unique_ptr<Call> call_;
 };
 
+/// How a client knows the server and shows who it is itself. Files are PEM; empty: not used.
+struct Credentials {
+  std::string ca_file = {};  ///< the server's certificate must be signed by one of these; empty: no TLS
+  std::string certificate_file = {};  ///< this client's own, for servers that ask for one
+  std::string key_file = {};          ///< of that certificate
+  std::string token = {};             ///< goes with every call; never in the clear to another machine
+};
+class ContactReader;     // taclink/arm_contacts.h
+class JointStateWriter;  // likewise
+
 /// A connection to one server.
 class Client {
  public:
-  /// Errors: kUnavailable (no server there within `timeout`, with what to do).
+  /// Errors: kUnavailable (no server there within `timeout`, with what to do), kNotFound (a file),
+  /// kInvalidArgument (credentials that can't be used so).
   static Result<Client> Connect(const std::string& address,
-                                std::chrono::milliseconds timeout = std::chrono::seconds(3));
+                                std::chrono::milliseconds timeout = std::chrono::seconds(3),
+                                const Credentials& credentials = {});
   ~Client();
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
@@ -231,14 +305,43 @@ class Client {
   Result<std::unique_ptr<FrameReader>> StreamFrames(
       const StreamOptions& options, std::chrono::milliseconds timeout = std::chrono::seconds(10));
 
+  /// Gives the link a fresh source and processor, as after the server's start. Returns when it is ordered;
+  /// GetArm tells how it goes. Errors: kNotFound, kUnavailable.
+  Result<void> RestartLink(const std::string& link,
+                           std::chrono::milliseconds timeout = std::chrono::seconds(10));
+
   /// Finds the link's cameras and rest shape anew; nothing may touch the skin. Waits for the end. Errors:
   /// kNotFound, kFailedPrecondition (touched, moved, does not fit: the message says), kUnavailable,
   /// kEndOfData (cancelled); then the link stays as it was.
   Result<CalibrationResult> Calibrate(const CalibrateOptions& options, const CalibrateProgress& progress = {},
                                       std::chrono::milliseconds timeout = std::chrono::seconds(60));
 
+  /// All contacts of the arm in its base frame. `max_rate_hz` 0: whenever a link publishes. Returns once the
+  /// server has accepted. Errors: kInvalidArgument, kResourceExhausted, kUnavailable.
+  Result<std::unique_ptr<ContactReader>> StreamContacts(
+      double max_rate_hz = 0, std::chrono::milliseconds timeout = std::chrono::seconds(10));
+
+  /// Begins to tell the server where the joints are. What it refuses is told by the writer.
+  std::unique_ptr<JointStateWriter> UpdateJointStates();
+
+  /// Makes what the links show now their baseline; each is accepted or refused for itself. Errors: kNotFound,
+  /// kInvalidArgument, kUnavailable.
+  Result<std::vector<LinkTare>> Tare(const TareRequest& request,
+                                     std::chrono::milliseconds timeout = std::chrono::seconds(60));
+
+  /// `region` empty: the whole link. Errors: kNotFound (no such link or region), kInvalidArgument.
+  Result<ForceLevelState> SetThresholds(const std::string& link, const std::string& region,
+                                        const Thresholds& thresholds,
+                                        std::chrono::milliseconds timeout = std::chrono::seconds(10));
+
+  /// Returns once the server has accepted. Errors: as StreamFrames.
+  Result<std::unique_ptr<EventReader>> StreamEvents(
+      const EventOptions& options, std::chrono::milliseconds timeout = std::chrono::seconds(10));
+
  private:
+  friend class JointStateWriter;
   struct Connection;
+  friend class EventReader;
   explicit Client(std::shared_ptr<Connection> connection);
 
   std::shared_ptr<Connection> connection_;

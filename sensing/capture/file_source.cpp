@@ -82,6 +82,7 @@ class FileSource final : public FrameSource {
 
  private:
   Result<void> CheckSizes();
+  Result<void> LoadAll();
   Result<void> Load(StereoFrame& frame);
   int64_t DueNs(uint64_t index) const {
     return start_ns_ + std::llround(1e9 * static_cast<double>(index) / options_.frame_rate_hz);
@@ -91,6 +92,7 @@ class FileSource final : public FrameSource {
   const FileOptions options_;
   Clock& clock_;
   std::vector<PicturePair> pairs_;
+  std::vector<std::array<RawImage, kCameraCount>> loaded_;  ///< by pair, if in memory
   int width_px_ = 0;
   int height_px_ = 0;
   int64_t start_ns_ = 0;
@@ -112,7 +114,27 @@ Result<void> FileSource::Start() {
     pairs_.clear();
     return checked;
   }
+  loaded_.clear();
+  if (auto loaded = options_.in_memory ? LoadAll() : Result<void>(); !loaded) {
+    pairs_.clear();
+    return loaded;
+  }
   start_ns_ = clock_.MonotonicNs();
+  if (options_.start_after_s) {
+    constexpr int64_t kSecondNs = 1'000'000'000;
+    start_ns_ = (start_ns_ / kSecondNs + 1) * kSecondNs + static_cast<int64_t>(1e9 * *options_.start_after_s);
+  }
+  return {};
+}
+
+Result<void> FileSource::LoadAll() {
+  for (const PicturePair& pair : pairs_) {
+    auto& images = loaded_.emplace_back();
+    for (const CameraId id : kBothCameras) {
+      if (pair[Index(id)].empty()) continue;
+      if (auto read = ReadRawImage(pair[Index(id)], images[Index(id)]); !read) return read;
+    }
+  }
   return {};
 }
 
@@ -181,6 +203,8 @@ Result<void> FileSource::Load(StereoFrame& frame) {
     image.valid = false;
     if (pair[Index(id)].empty()) {
       ++counters_.unpaired[Index(id == CameraId::kTop ? CameraId::kBottom : CameraId::kTop)];
+    } else if (!loaded_.empty()) {
+      image = loaded_[next_ % pairs_.size()][Index(id)];
     } else if (auto read = ReadRawImage(pair[Index(id)], image); !read) {
       return read;
     }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "sensing/capture/frame_source.h"
@@ -14,6 +15,10 @@ struct FileOptions {
   bool loop = true;  ///< begins again after the last pair; false: kEndOfData
   bool paced =
       true;  ///< at the frame rate, skipping what is late; false: every pair, as fast as they are asked for
+  std::optional<double> start_after_s =
+      {};                  ///< Start puts the first pair so long after a full second of `clock`,
+                           ///< so that sources are in step, or out of it; none: at once
+  bool in_memory = false;  ///< Start reads all pictures, so that Next only copies
 };
 
 /// Numbered picture pairs in a folder: top_000001.png and bottom_000001.png, also .jpg and .jpeg, any count

@@ -4,11 +4,20 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "sensing/core/frame.h"
 #include "sensing/core/result.h"
 
 namespace taclink {
+
+/// One camera of a source, in words for people.
+struct SourceCamera {
+  std::string configured;  ///< as the configuration names it
+  std::string device;      ///< what was found: "/dev/video0 (usb:1-2, serial:A1)"; empty: not open
+  std::string format;      ///< "YUYV 640x480"; empty: not open
+  std::string trouble;     ///< why it gives no pictures now; empty: it does
+};
 
 /// What a source delivers, known after Start.
 struct SourceInfo {
@@ -16,13 +25,21 @@ struct SourceInfo {
   int width_px = 0;
   int height_px = 0;
   double frame_rate_hz = 0;
+  std::vector<SourceCamera> cameras = {};  ///< top, bottom; none: the source has no cameras
 };
 
-/// Pictures that were taken but not delivered, since the source was made.
+/// What became of the pictures since the source was made.
 struct SourceCounters {
+  std::array<uint64_t, kCameraCount> pictures{};  ///< by camera: came whole out of the driver
+  std::array<double, kCameraCount> rate_hz{};     ///< by camera: as measured lately; 0: gives none
+  /// By camera: exposed, by the driver's count, but never handed out by it.
+  std::array<uint64_t, kCameraCount> lost{};
   std::array<uint64_t, kCameraCount> damaged{};   ///< by camera: marked bad by the driver, or empty
   std::array<uint64_t, kCameraCount> unpaired{};  ///< by camera: the other camera had none of that time
-  uint64_t skipped_pairs = 0;                     ///< newer ones were there when the caller asked
+  /// By camera: the driver's timestamp was no monotonic time, so that of arrival was taken.
+  std::array<uint64_t, kCameraCount> stamped_on_arrival{};
+  uint64_t skipped_pairs = 0;  ///< newer ones were there when the caller asked
+  uint64_t info_changes = 0;   ///< rises whenever Info would say something else
 };
 
 /// The seam between what makes pictures (cameras, files, a simulation, a log) and all that follows.
@@ -36,7 +53,8 @@ class FrameSource {
   virtual Result<void> Start() = 0;
 
   /// Waits for the next pair and writes it into `frame`, whose buffers it reuses. Skips to the newest pair if
-  /// it is late. Errors: kTimeout (nothing yet, call again), kUnavailable (lost: Start again), kEndOfData.
+  /// it is late. While a source has only one of its cameras the other image is not valid. Errors: kTimeout
+  /// (nothing yet, call again), kUnavailable (lost: Start again), kEndOfData.
   virtual Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) = 0;
 
   virtual SourceInfo Info() const = 0;

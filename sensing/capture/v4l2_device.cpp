@@ -12,6 +12,7 @@
 #include <cstring>
 #include <utility>
 
+#include "sensing/capture/camera_finder.h"
 #include "sensing/capture/v4l2_offers.h"
 
 namespace taclink {
@@ -45,8 +46,10 @@ v4l2_buffer BufferRequest(int index = 0) {
   return buffer;
 }
 
+// Wraps where a driver's time does.
 int64_t TimestampNs(const v4l2_buffer& buffer) {
-  return int64_t{buffer.timestamp.tv_sec} * 1'000'000'000 + int64_t{buffer.timestamp.tv_usec} * 1'000;
+  return static_cast<int64_t>(static_cast<uint64_t>(buffer.timestamp.tv_sec) * 1'000'000'000u +
+                              static_cast<uint64_t>(buffer.timestamp.tv_usec) * 1'000u);
 }
 
 std::string SizeText(int width_px, int height_px) {
@@ -66,6 +69,13 @@ Result<void> CheckOptions(const V4l2DeviceOptions& options) {
   }
   if (options.buffers < 2 || options.buffers > 32) return bad("buffers must be from 2 to 32");
   return {};
+}
+
+std::string WhatThereIs() {
+  std::string list;
+  for (const FoundCamera& camera : ListCameras())
+    list += (list.empty() ? " There are " : ", ") + Describe(camera);
+  return list;
 }
 
 }  // namespace
@@ -90,8 +100,8 @@ Result<V4l2Device> V4l2Device::Open(const V4l2DeviceOptions& options) {
   }
   V4l2Device device(options, open(options.path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
   if (device.fd_ < 0) return device.Failed("can't be opened");
-  for (const auto step : {&V4l2Device::CheckIsCamera, &V4l2Device::SetFormat, &V4l2Device::SetFrameRate,
-                          &V4l2Device::SetExposureAndGain, &V4l2Device::MapBuffers}) {
+  for (const auto step : {&V4l2Device::CheckIsCamera, &V4l2Device::Negotiate, &V4l2Device::SetExposureAndGain,
+                          &V4l2Device::MapBuffers}) {
     if (auto done = (device.*step)(); !done) return done.error();
   }
   return device;
@@ -100,6 +110,7 @@ Result<V4l2Device> V4l2Device::Open(const V4l2DeviceOptions& options) {
 V4l2Device::V4l2Device(V4l2Device&& other) noexcept
     : options_(std::move(other.options_)),
       fd_(std::exchange(other.fd_, -1)),
+      format_(other.format_),
       bytes_per_line_(other.bytes_per_line_),
       streaming_(std::exchange(other.streaming_, false)),
       buffers_(std::exchange(other.buffers_, {})),
@@ -110,6 +121,7 @@ V4l2Device& V4l2Device::operator=(V4l2Device&& other) noexcept {
   Close();
   options_ = std::move(other.options_);
   fd_ = std::exchange(other.fd_, -1);
+  format_ = other.format_;
   bytes_per_line_ = other.bytes_per_line_;
   streaming_ = std::exchange(other.streaming_, false);
   buffers_ = std::exchange(other.buffers_, {});
@@ -137,7 +149,7 @@ Error V4l2Device::Failed(const std::string& doing) const {
     case ENXIO:
     case ENODEV:
       return {ErrorCode::kUnavailable,
-              options_.path + ": " + doing + ": no such device; is the camera plugged in?"};
+              options_.path + ": " + doing + ": no such device; is the camera plugged in?" + WhatThereIs()};
     case EBUSY:
       return {ErrorCode::kUnavailable,
               options_.path + ": " + doing + ": busy; another program uses this camera"};
@@ -169,25 +181,45 @@ Result<void> V4l2Device::CheckIsCamera() {
   return {};
 }
 
+/// Format and rate. Without a format asked for: the first of these that the camera has at that size and rate;
+/// what is not compressed shows the markers best.
+Result<void> V4l2Device::Negotiate() {
+  if (options_.format) {
+    format_ = *options_.format;
+    const auto set = SetFormat();
+    return set ? SetFrameRate() : set;
+  }
+  std::optional<Error> refusal;
+  for (const PixelFormat format : {PixelFormat::kYuyv, PixelFormat::kMjpeg, PixelFormat::kGray8}) {
+    format_ = format;
+    const auto size = SetFormat();
+    const auto rate = size ? SetFrameRate() : size;
+    if (rate) return {};
+    if (rate.error().code != ErrorCode::kUnsupported) return rate;
+    if (size || !refusal) refusal = rate.error();  // a rate that is missing says more
+  }
+  return *refusal;
+}
+
 Result<void> V4l2Device::SetFormat() {
-  const std::string asked =
-      SizeText(options_.width_px, options_.height_px) + " " + FormatName(options_.format);
+  const std::string asked = SizeText(options_.width_px, options_.height_px) +
+                            (options_.format ? std::string(" ") + FormatName(format_) : "");
   v4l2_format format{};
   format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   format.fmt.pix.width = static_cast<uint32_t>(options_.width_px);
   format.fmt.pix.height = static_cast<uint32_t>(options_.height_px);
-  format.fmt.pix.pixelformat = FourCc(options_.format);
+  format.fmt.pix.pixelformat = FourCc(format_);
   format.fmt.pix.field = V4L2_FIELD_NONE;
   if (Ioctl(fd_, VIDIOC_S_FMT, &format) != 0 && errno != EINVAL) return Failed("can't be set to " + asked);
   const v4l2_pix_format& got = format.fmt.pix;
   if (got.width != static_cast<uint32_t>(options_.width_px) ||
-      got.height != static_cast<uint32_t>(options_.height_px) || got.pixelformat != FourCc(options_.format) ||
+      got.height != static_cast<uint32_t>(options_.height_px) || got.pixelformat != FourCc(format_) ||
       got.field != V4L2_FIELD_NONE) {
     return Error{ErrorCode::kUnsupported, options_.path + ": does not give " + asked +
                                               " whole frames; it offers " + OfferedFormats(fd_)};
   }
-  const int pixel_bytes = options_.format == PixelFormat::kYuyv ? 2 : 1;
-  bytes_per_line_ = options_.format == PixelFormat::kMjpeg
+  const int pixel_bytes = format_ == PixelFormat::kYuyv ? 2 : 1;
+  bytes_per_line_ = format_ == PixelFormat::kMjpeg
                         ? 0
                         : std::max(static_cast<int>(got.bytesperline), options_.width_px * pixel_bytes);
   return {};
@@ -211,8 +243,8 @@ Result<void> V4l2Device::SetFrameRate() {
   return Error{ErrorCode::kUnsupported,
                options_.path + ": does not give " + RateText(options_.frame_rate_hz) +
                    " frames per second at " + SizeText(options_.width_px, options_.height_px) + " " +
-                   FormatName(options_.format) + "; it offers " +
-                   OfferedRates(fd_, FourCc(options_.format), options_.width_px, options_.height_px)};
+                   FormatName(format_) + "; it offers " +
+                   OfferedRates(fd_, FourCc(format_), options_.width_px, options_.height_px)};
 }
 
 Result<void> V4l2Device::SetExposureAndGain() {
@@ -297,7 +329,7 @@ Result<void> V4l2Device::StartStreaming() {
   }
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   if (Ioctl(fd_, VIDIOC_STREAMON, &type) != 0) {
-    return errno == ENOSPC ? Error{ErrorCode::kUnavailable,
+    return errno == ENOSPC ? Error{ErrorCode::kResourceExhausted,
                                    options_.path +
                                        ": can't stream: no bandwidth left on its USB bus; use MJPEG, a "
                                        "lower rate, or another bus"}
@@ -307,11 +339,11 @@ Result<void> V4l2Device::StartStreaming() {
   return {};
 }
 
-Result<std::optional<V4l2Picture>> V4l2Device::Dequeue() {
+Result<std::optional<DriverPicture>> V4l2Device::Dequeue() {
   while (true) {
     v4l2_buffer buffer = BufferRequest();
     if (Ioctl(fd_, VIDIOC_DQBUF, &buffer) != 0) {
-      if (errno == EAGAIN) return std::optional<V4l2Picture>();
+      if (errno == EAGAIN) return std::optional<DriverPicture>();
       return Failed("stopped giving pictures");
     }
     const bool damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0 || buffer.bytesused == 0 ||
@@ -324,7 +356,7 @@ Result<std::optional<V4l2Picture>> V4l2Device::Dequeue() {
     if (!damaged) {
       const auto* const start = static_cast<const uint8_t*>(buffers_[buffer.index].start);
       return std::optional(
-          V4l2Picture{{start, buffer.bytesused}, buffer.sequence, TimestampNs(buffer), index});
+          DriverPicture{{start, buffer.bytesused}, buffer.sequence, TimestampNs(buffer), index});
     }
     ++damaged_;
     if (auto queued = Requeue(index); !queued) return queued.error();

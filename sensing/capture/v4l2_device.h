@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "sensing/capture/camera_device.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/result.h"
 
@@ -19,19 +20,11 @@ struct V4l2DeviceOptions {
   int width_px = 640;
   int height_px = 480;
   double frame_rate_hz = 30;
-  PixelFormat format = PixelFormat::kYuyv;
+  std::optional<PixelFormat> format = PixelFormat::kYuyv;  ///< none: the best it has at that size and rate
   std::optional<int>
       exposure_100us;       ///< exposure time, 0.1 ms; turns automatic exposure off. None: left as it is
   std::optional<int> gain;  ///< camera's own units; turns automatic gain off. None: left as it is
   int buffers = 4;          ///< pictures that the driver can hold
-};
-
-/// A picture in the driver's memory, until its buffer is given back.
-struct V4l2Picture {
-  std::span<const uint8_t> bytes;
-  uint32_t sequence = 0;     ///< the driver's count of exposures; wraps
-  int64_t timestamp_ns = 0;  ///< CLOCK_MONOTONIC: start of exposure or, with some drivers, end of transfer
-  int buffer = 0;
 };
 
 /// One camera under Linux' V4L2 interface, with memory-mapped buffers. Owns the device: while it lives nobody
@@ -39,8 +32,8 @@ struct V4l2Picture {
 /// destruction helps.
 ///
 /// Error codes: kUnavailable: not there, busy, no permission, unplugged; kInvalidArgument: no camera, or an
-/// option no camera could fulfil; kUnsupported: this camera can't. All messages name the device, what was
-/// asked and, where the camera decides, what it offers.
+/// option no camera could fulfil; kUnsupported: this camera can't; kResourceExhausted: its USB bus is full.
+/// All messages name the device, what was asked and, where the camera decides, what it offers.
 class V4l2Device {
  public:
   /// Sets format, rate and controls exactly as asked or fails. Does not stream yet.
@@ -54,7 +47,7 @@ class V4l2Device {
 
   /// The next picture in the driver's queue, oldest first; none: nothing new yet. Damaged ones go back to the
   /// driver and are counted. Wait with poll(POLLIN) on fd(); it also reports the loss of the device.
-  Result<std::optional<V4l2Picture>> Dequeue();
+  Result<std::optional<DriverPicture>> Dequeue();
   Result<void> Requeue(int buffer);
 
   /// Any control of the camera by its V4L2 number. `name` is for the error message.
@@ -63,6 +56,7 @@ class V4l2Device {
 
   int fd() const { return fd_; }
   const std::string& path() const { return options_.path; }
+  PixelFormat format() const { return format_; }
   int bytes_per_line() const { return bytes_per_line_; }  ///< at least the picture's width; 0 for MJPEG
   int buffer_count() const { return static_cast<int>(buffers_.size()); }
   uint64_t damaged() const { return damaged_; }  ///< pictures marked bad by the driver, or empty
@@ -75,6 +69,7 @@ class V4l2Device {
 
   V4l2Device(V4l2DeviceOptions options, int fd) : options_(std::move(options)), fd_(fd) {}
   Result<void> CheckIsCamera();
+  Result<void> Negotiate();
   Result<void> SetFormat();
   Result<void> SetFrameRate();
   Result<void> SetExposureAndGain();
@@ -85,6 +80,7 @@ class V4l2Device {
 
   V4l2DeviceOptions options_;
   int fd_ = -1;
+  PixelFormat format_ = PixelFormat::kYuyv;
   int bytes_per_line_ = 0;
   bool streaming_ = false;
   std::vector<Mapping> buffers_;

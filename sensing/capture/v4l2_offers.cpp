@@ -66,6 +66,33 @@ std::string OfferedFormats(int fd) {
          " (and formats that can't be read here: " + others + ")";
 }
 
+std::vector<CameraOffer> ListOffers(int fd) {
+  std::vector<CameraOffer> offers;
+  v4l2_fmtdesc format{};
+  format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  for (; ioctl(fd, VIDIOC_ENUM_FMT, &format) == 0; ++format.index) {
+    CameraOffer offer{.format = FourCcText(format.pixelformat),
+                      .readable = IsReadable(format.pixelformat),
+                      .size = {},
+                      .rates = {}};
+    v4l2_frmsizeenum size{};
+    size.pixel_format = format.pixelformat;
+    for (; ioctl(fd, VIDIOC_ENUM_FRAMESIZES, &size) == 0; ++size.index) {
+      if (size.type != V4L2_FRMSIZE_TYPE_DISCRETE) {
+        offer.size = OfferedSizes(fd, format.pixelformat);
+        offers.push_back(offer);
+        break;
+      }
+      const auto width = static_cast<int>(size.discrete.width);
+      const auto height = static_cast<int>(size.discrete.height);
+      offer.size = std::to_string(width) + "x" + std::to_string(height);
+      offer.rates = OfferedRates(fd, format.pixelformat, width, height);
+      offers.push_back(offer);
+    }
+  }
+  return offers;
+}
+
 std::string OfferedRates(int fd, uint32_t four_cc, int width_px, int height_px) {
   std::string list;
   v4l2_frmivalenum interval{};

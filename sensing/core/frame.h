@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "sensing/core/camera_model.h"
@@ -17,7 +18,8 @@ struct RawImage {
   int width_px = 0;
   int height_px = 0;
   std::vector<uint8_t> bytes;
-  bool valid = false;  ///< false: this camera gave no picture for this frame
+  bool valid = false;            ///< false: this camera gave no picture for this frame
+  std::string why_missing = {};  ///< for people, when not valid; may be empty
 };
 
 /// When things happened to a frame. Nanoseconds; 0: has not happened. Monotonic times are CLOCK_MONOTONIC's.
@@ -30,12 +32,35 @@ struct FrameTimes {
   int64_t published_ns = 0;           ///< handed to the hub
 };
 
+/// Who says what the pressure inside a skin is.
+enum class PressureOrigin : uint8_t {
+  kNone,       ///< nobody: taken as 0
+  kConstant,   ///< the configuration
+  kSimulated,  ///< the simulation that makes the pictures
+  kFile,       ///< a sensor, through a file or pipe
+  kSerial,     ///< a sensor on a serial line
+  kClient,     ///< a client of the server
+};
+
+/// How the pressure of a frame is known.
+struct PressureReport {
+  PressureOrigin origin = PressureOrigin::kNone;
+  bool stale = false;        ///< the sensor's newest reading is too old, or there is none: it is not used
+  double mpa = 0;            ///< the newest reading, or what is assumed
+  int64_t age_ns = -1;       ///< from the reading to the exposure; -1: there is no reading
+  std::string trouble = {};  ///< what is wrong with the sensor and what to do; empty: nothing
+
+  /// Configured, not measured.
+  bool assumed() const { return origin == PressureOrigin::kNone || origin == PressureOrigin::kConstant; }
+};
+
 /// What a link's cameras saw at one moment.
 struct StereoFrame {
   uint64_t sequence = 0;  ///< counts exposures of this source; a gap is a frame that was not seen
   FrameTimes times;
   std::array<RawImage, kCameraCount> images;
   std::optional<double> pressure_mpa;  ///< gauge pressure inside the skin at that time; none: not measured
+  PressureReport pressure;
 };
 
 }  // namespace taclink

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "sensing/core/baseline.h"
 #include "sensing/core/contact.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/skin_shape.h"
@@ -32,6 +33,7 @@ struct StageTimes {
 struct CameraCounts {
   int detections = 0;  ///< spots in the full picture; while tracked, those of labelled markers
   int labelled = 0;
+  bool bad_picture = false;  ///< there was one, but it could not be decoded or has the wrong size
 };
 
 /// All that one frame told about one link. Immutable once published.
@@ -39,8 +41,9 @@ struct LinkState {
   uint64_t sequence = 0;  ///< of the frame
   FrameTimes times;
   LinkStatus status = LinkStatus::kStarting;
-  std::string status_reason;  ///< empty when kOk
-  std::optional<double> pressure_mpa;
+  std::string status_reason;           ///< empty when kOk
+  std::optional<double> pressure_mpa;  ///< measured; none: assumed, or the sensor's is stale
+  PressureReport pressure;
 
   std::array<CameraCounts, kCameraCount> cameras;
   TrackingReport tracking;
@@ -49,9 +52,27 @@ struct LinkState {
   std::vector<Contact> contacts;
   Vec3 total_force_n = Vec3::Zero();  ///< sum over the contacts
   double baseline_age_s = 0;          ///< since the rest shape was taken
+  Baseline baseline;
   StageTimes stage_ms;
 
   bool measured() const { return !shape.positions_mm.empty(); }
+  /// Nothing is measured; most buffers stay.
+  void ClearMeasurement() {
+    shape.positions_mm.clear();
+    shape.displacements_mm.clear();
+    shape.covariances_mm2.clear();
+    shape.sources.clear();
+    shape.measured.clear();
+    shape.rejected.clear();
+    forces.forces_n.clear();
+    forces.sigmas_n.clear();
+    forces.loaded.clear();
+    forces.loaded_covariance.resize(0, 0);
+    forces.residual = 0;
+    forces.converged = true;
+    contacts.clear();
+    total_force_n.setZero();
+  }
 };
 
 }  // namespace taclink

@@ -17,6 +17,8 @@ enum class ErrorCode {
   kFailedPrecondition,  ///< the state does not allow it: no rest picture yet
   kResourceExhausted,   ///< a configured limit is reached
   kUnsupported,         ///< known, but not offered by this build or device
+  kUnauthenticated,     ///< the caller has not shown who it is
+  kPermissionDenied,    ///< the caller may not do this
   kInternal,            ///< a defect of this program
 };
 

@@ -20,6 +20,7 @@ namespace {
 constexpr int kDefaultRefinement = 1;
 // In one frame, which bounds its time; the next frame goes on from there.
 constexpr int kMostIterations = 6, kMostTangents = 1;
+constexpr int kMostUnsettled = 8;         // such frames in a row
 constexpr int kNewLoadsPerIteration = 3;  // the linearisation is only good near the state
 constexpr double kMaxStepMm = 4;
 constexpr double kSettledMm = 0.02;       // of a step: a fifth of the markers' noise
@@ -73,7 +74,8 @@ struct NonlinearEstimator::Solver {
   bool FindLoads(const SkinTangent& tangent);
   void AddTangential();
   double Advance();
-  bool Iterate(const SkinShape& shape, const SkinTangent& tangent, double pressure_mpa);
+  enum class Outcome { kSettled, kUnderWay, kNoEquilibrium };
+  Outcome Iterate(const SkinShape& shape, const SkinTangent& tangent, double pressure_mpa);
 
   LinkModel model;
   ShellMesh mesh;
@@ -89,6 +91,7 @@ struct NonlinearEstimator::Solver {
   static constexpr double kNever = -1e9;
   double rest_coordinate = kNever;
   SparseCholesky* in_use = nullptr;
+  int unsettled = 0;         // frames in a row
   double shrinkage = kSlow;  // of one step to the next, seen with this tangent
   // Springs that hold the loaded nodes in the factorised matrix, and what undoes them in a solution.
   std::vector<int> held;         // first degrees of freedom of those nodes
@@ -108,6 +111,7 @@ void NonlinearEstimator::Solver::Rest() {
   loads.clear();
   held.clear();
   in_use = nullptr;
+  unsettled = 0;
 }
 
 // At the inflated skin, whose factor is kept: a touch begins without a new one.
@@ -323,32 +327,33 @@ double NonlinearEstimator::Solver::Advance() {
   return longest;
 }
 
-// Gauss-Newton until the state rests. The tangent is kept for as long as its steps shrink. False: it did not.
-bool NonlinearEstimator::Solver::Iterate(const SkinShape& shape, const SkinTangent& tangent,
-                                         double pressure_mpa) {
+// Gauss-Newton until the state rests. The tangent is kept for as long as its steps shrink.
+NonlinearEstimator::Solver::Outcome NonlinearEstimator::Solver::Iterate(const SkinShape& shape,
+                                                                        const SkinTangent& tangent,
+                                                                        double pressure_mpa) {
   const FollowerPressure pressure(model.thickness_mm, pressure_mpa);
   const ElementLoad* all[] = {&pressure};
   double longest = 0, before = 0;  // of the last two steps
   int made = 0;                    // tangents
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     ++work.iterations;
-    if (!std::isfinite(Unbalance(pressure))) return false;
+    if (!std::isfinite(Unbalance(pressure))) return Outcome::kNoEquilibrium;
     const bool slow = iteration > 1 && longest > kSlow * before;
     if (in_use == nullptr || (slow && made < kMostTangents)) {
       ++made;
       shell.Hessian(state, all, gradient, hessian);
       SubtractLoads();
-      if (!Refactor()) return false;
+      if (!Refactor()) return Outcome::kNoEquilibrium;
     }
     SetData(shape, tangent, pressure_mpa);
-    if (!FindLoads(tangent)) return false;
+    if (!FindLoads(tangent)) return Outcome::kNoEquilibrium;
     before = longest;
     longest = Advance();
-    if (!std::isfinite(longest)) return false;
+    if (!std::isfinite(longest)) return Outcome::kNoEquilibrium;
     if (iteration > 0) shrinkage = std::max(0.5 * shrinkage, longest / before);
-    if (longest < kSettledMm || longest * shrinkage < 0.5 * kSettledMm) return true;
+    if (longest < kSettledMm || longest * shrinkage < 0.5 * kSettledMm) return Outcome::kSettled;
   }
-  return longest < kNearlySettledMm;
+  return longest < kNearlySettledMm ? Outcome::kSettled : Outcome::kUnderWay;
 }
 
 NonlinearEstimator::NonlinearEstimator(const LinkModel& model, const ForceOptions& options,
@@ -393,14 +398,17 @@ void NonlinearEstimator::Estimate(const SkinShape& shape, double pressure_mpa, N
       return;
     }
   }
-  if (!s.Iterate(shape, *tangent, pressure_mpa)) {
-    // No equilibrium found: the next frame starts anew, and this one says what the cheaper model knows.
-    s.Rest();
+  const Solver::Outcome outcome = s.Iterate(shape, *tangent, pressure_mpa);
+  if (outcome != Solver::Outcome::kSettled) {
+    // A hit may be too deep for one frame's iterations: the next ones go on from there, and meanwhile the
+    // cheaper model says what it knows.
+    if (outcome == Solver::Outcome::kNoEquilibrium || ++s.unsettled > kMostUnsettled) s.Rest();
     fallback_->Restart();
     fallback_->Estimate(shape, pressure_mpa, forces);
     forces.converged = false;
     return;
   }
+  s.unsettled = 0;
   s.fit.Write(s.data, forces);
 }
 

@@ -10,6 +10,7 @@
 #include "sensing/markers/detector.h"
 #include "sensing/markers/marker_tracker.h"
 #include "sensing/markers/path_tracker.h"
+#include "sensing/pipeline/baseline_keeper.h"
 #include "sensing/pipeline/rest_pose.h"
 #include "sensing/shape/reconstructor.h"
 
@@ -31,23 +32,6 @@ void SetStatus(LinkState& state, LinkStatus status, std::string reason) {
   state.status_reason = std::move(reason);
 }
 
-void ClearMeasurement(LinkState& state) {
-  state.shape.positions_mm.clear();
-  state.shape.displacements_mm.clear();
-  state.shape.covariances_mm2.clear();
-  state.shape.sources.clear();
-  state.shape.measured.clear();
-  state.shape.rejected.clear();
-  state.forces.forces_n.clear();
-  state.forces.sigmas_n.clear();
-  state.forces.loaded.clear();
-  state.forces.loaded_covariance.resize(0, 0);
-  state.forces.residual = 0;
-  state.forces.converged = true;
-  state.contacts.clear();
-  state.total_force_n.setZero();
-}
-
 }  // namespace
 
 struct LinkPipeline::Stages {
@@ -56,8 +40,9 @@ struct LinkPipeline::Stages {
         options(pipeline_options),
         clock(pipeline_clock),
         estimator(MakeForceEstimator(link_model, pipeline_options.force)),
-        finder(link_model, pipeline_options.contact) {
-    BeginRest(options.rig, options.rest_frames);
+        finder(link_model, pipeline_options.contact),
+        keeper(link_model, pipeline_options.drift) {
+    BeginRest(options.rig, options.rest_frames, BaselineOrigin::kStart);
   }
 
   const LinkModel model;
@@ -71,14 +56,13 @@ struct LinkPipeline::Stages {
   std::array<Detections, kCameraCount> detections;
   std::optional<RestPose> rest;  // while rest pairs are taken
   RestProgress rest_progress;
+  BaselineOrigin rest_origin = BaselineOrigin::kNone;  // of what is being taken
   int64_t refused_ns = 0, wait_ns = 0;  // exposure of the pair last refused; until the next is tried
   // Made when the rest pose is known.
   std::optional<CalibrationSummary> calibration;
   std::optional<PathTracker> acquirer;
   std::optional<MarkerTracker> tracker;
   std::optional<ShapeReconstructor> reconstructor;
-  int64_t baseline_ns = 0;
-  double baseline_pressure_mpa = 0;
 
   MarkerTracker::Pictures pictures;              // of the frame in work; empty where there is none
   AcquireReason reason = AcquireReason::kFirst;  // of the frame in work
@@ -87,6 +71,7 @@ struct LinkPipeline::Stages {
   std::vector<Vec3> predicted_mm;  // the shape of the last frame that had one
   std::unique_ptr<ForceEstimator> estimator;
   ContactFinder finder;
+  BaselineKeeper keeper;
 
   std::string camera_trouble;  // of the frame in work
 
@@ -99,13 +84,15 @@ struct LinkPipeline::Stages {
     return options.rig ? *options.rig : model.nominal_rig;
   }
 
-  void Decode(const StereoFrame& frame) {
+  void Decode(const StereoFrame& frame, LinkState& state) {
     camera_trouble.clear();
     for (const CameraId id : kBothCameras) {
       const auto i = Index(id);
       has_picture[i] = false;
+      state.cameras[i].bad_picture = frame.images[i].valid;  // until it is found to be good
       if (!frame.images[i].valid) {
         camera_trouble = std::string("no picture from the ") + Name(id) + " camera";
+        if (!frame.images[i].why_missing.empty()) camera_trouble += ": " + frame.images[i].why_missing;
         continue;
       }
       if (auto decoded = decoders[i].Decode(frame.images[i], gray[i]); !decoded) {
@@ -114,6 +101,7 @@ struct LinkPipeline::Stages {
       }
       const CameraModel& expected = CurrentRig()[id];
       has_picture[i] = gray[i].cols == expected.width_px && gray[i].rows == expected.height_px;
+      state.cameras[i].bad_picture = !has_picture[i];
       if (!has_picture[i]) {
         camera_trouble = std::string(Name(id)) + " camera: the picture is " + std::to_string(gray[i].cols) +
                          "x" + std::to_string(gray[i].rows) + ", the camera's model is for " +
@@ -150,7 +138,9 @@ struct LinkPipeline::Stages {
     Detect(state);
   }
 
-  void BeginRest(const std::optional<StereoRig>& rig, int pairs) {
+  void BeginRest(const std::optional<StereoRig>& rig, int pairs, BaselineOrigin origin) {
+    keeper.AbortTare("the rest shape is being taken anew");
+    rest_origin = origin;
     rest.emplace(model, rig, pairs);
     rest_progress = {.taken = 0, .wanted = pairs, .refusal = {}};
     wait_ns = 0;
@@ -163,7 +153,7 @@ struct LinkPipeline::Stages {
   }
 
   void SkipRest(LinkState& state) {
-    ClearMeasurement(state);
+    state.ClearMeasurement();
     state.tracking = {};
     for (size_t i = 0; i < kCameraCount; ++i)
       state.cameras[i].detections = static_cast<int>(detections[i].size());
@@ -171,9 +161,16 @@ struct LinkPipeline::Stages {
               camera_trouble.empty() ? rest_progress.refusal->message : camera_trouble);
   }
 
+  // A baseline under a pressure that is not known would be wrong for good.
+  void WaitForPressure(LinkState& state) {
+    state.ClearMeasurement();
+    SetStatus(state, LinkStatus::kCalibrating,
+              "the rest shape waits for the pressure sensor: " + state.pressure.trouble);
+  }
+
   // A pair before the baseline is known.
   void TakeRest(const FrameTimes& times, double pressure_mpa, LinkState& state) {
-    ClearMeasurement(state);
+    state.ClearMeasurement();
     if (!camera_trouble.empty()) return SetStatus(state, LinkStatus::kCalibrating, camera_trouble);
     const auto complete = rest->Add(detections);
     rest_progress.taken = rest->taken();
@@ -194,8 +191,7 @@ struct LinkPipeline::Stages {
     shape_options.cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
     reconstructor.emplace(model, calibration->rig, shape_options);
     reconstructor->SetBaseline(rest->markers(), pressure_mpa);
-    baseline_ns = clock.MonotonicNs();
-    baseline_pressure_mpa = pressure_mpa;
+    keeper.Take(rest_origin, pressure_mpa, clock);
     predicted_mm.clear();
     rest.reset();
   }
@@ -205,13 +201,17 @@ struct LinkPipeline::Stages {
     const auto count = [&] { return std::to_string(seen) + " of " + std::to_string(all) + " markers seen"; };
     if (seen < kLostFraction * all) {
       SetStatus(state, LinkStatus::kLost, count() + (camera_trouble.empty() ? "" : "; " + camera_trouble));
-      ClearMeasurement(state);
+      state.ClearMeasurement();
     } else if (!camera_trouble.empty()) {
       SetStatus(state, LinkStatus::kDegraded, camera_trouble);
     } else if (seen < kDegradedFraction * all) {
       SetStatus(state, LinkStatus::kDegraded, count());
     } else if (!state.forces.converged) {
       SetStatus(state, LinkStatus::kDegraded, "more loads than the force model takes");
+    } else if (state.pressure.stale) {
+      SetStatus(state, LinkStatus::kDegraded, "the pressure is not known: " + state.pressure.trouble);
+    } else if (keeper.HasDriftedFar()) {
+      SetStatus(state, LinkStatus::kDegraded, keeper.DriftAdvice());
     } else {
       SetStatus(state, LinkStatus::kOk, "");
     }
@@ -257,7 +257,7 @@ LinkPipeline::~LinkPipeline() = default;
 LinkPipeline::LinkPipeline(LinkPipeline&&) noexcept = default;
 
 void LinkPipeline::Restart() {
-  stages_->BeginRest(stages_->options.rig, stages_->options.rest_frames);
+  stages_->BeginRest(stages_->options.rig, stages_->options.rest_frames, BaselineOrigin::kStart);
   stages_->calibration.reset();
   stages_->acquirer.reset();
   stages_->tracker.reset();
@@ -277,7 +277,7 @@ const std::optional<CalibrationSummary>& LinkPipeline::calibration() const {
 }
 
 void LinkPipeline::BeginRest(int pairs) {
-  stages_->BeginRest(std::nullopt, pairs);
+  stages_->BeginRest(std::nullopt, pairs, BaselineOrigin::kCalibration);
 }
 void LinkPipeline::CancelRest() {
   if (stages_->reconstructor) stages_->rest.reset();
@@ -286,41 +286,59 @@ const RestProgress& LinkPipeline::rest_progress() const {
   return stages_->rest_progress;
 }
 
+Result<void> LinkPipeline::BeginTare(const TareOptions& options) {
+  if (stages_->rest || !stages_->reconstructor)
+    return Error{ErrorCode::kFailedPrecondition,
+                 "the link's rest shape is being taken; wait until it measures"};
+  return stages_->keeper.BeginTare(options);
+}
+void LinkPipeline::CancelTare() {
+  stages_->keeper.CancelTare();
+}
+std::optional<Result<TareSummary>> LinkPipeline::TakeTareEnd() {
+  return stages_->keeper.TakeTareEnd();
+}
+
 void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   Stages& s = *stages_;
   state.sequence = frame.sequence;
   state.times = frame.times;
   state.pressure_mpa = frame.pressure_mpa;
+  state.pressure = frame.pressure;
   state.stage_ms = {};
-  const double pressure_mpa = frame.pressure_mpa.value_or(s.options.pressure_mpa);
+  const bool stale = frame.pressure.stale;
+  // A sensor that fell silent: the forces hold on to what it said last, the shape finds the pressure itself.
+  const double pressure_mpa =
+      stale ? frame.pressure.mpa : frame.pressure_mpa.value_or(s.options.pressure_mpa);
+  const std::optional<double> known_mpa = stale ? std::nullopt : std::optional(pressure_mpa);
 
   const auto timed = [&s](double& stage_ms, auto&& stage) {
     const int64_t start = s.clock.MonotonicNs();
     stage();
     stage_ms = s.MsSince(start);
   };
-  timed(state.stage_ms.decode, [&] { s.Decode(frame); });
+  timed(state.stage_ms.decode, [&] { s.Decode(frame, state); });
   if (s.WaitsForRest(frame.times)) return s.SkipRest(state);
   timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });
   if (s.rest) {
+    if (stale) return s.WaitForPressure(state);
     s.TakeRest(frame.times, pressure_mpa, state);
     return;
   }
   timed(state.stage_ms.register_, [&] { s.Label(state); });
   state.times.tracked_ns = s.clock.MonotonicNs();
-  timed(state.stage_ms.reconstruct,
-        [&] { s.reconstructor->Reconstruct(s.labels, pressure_mpa, state.shape); });
+  timed(state.stage_ms.reconstruct, [&] { s.reconstructor->Reconstruct(s.labels, known_mpa, state.shape); });
   s.TakeBackRejected(state);
   s.predicted_mm = state.shape.positions_mm;
+  s.keeper.Apply(*s.reconstructor, pressure_mpa, state.shape);
   timed(state.stage_ms.force, [&] {
-    const double pressure_change_mpa = pressure_mpa - s.baseline_pressure_mpa;
-    s.estimator->Estimate(state.shape, pressure_change_mpa, state.forces);
+    s.estimator->Estimate(state.shape, s.keeper.PressureChange(pressure_mpa), state.forces);
     s.finder.Find(state.shape, state.forces, state.contacts);
   });
   state.total_force_n.setZero();
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
-  state.baseline_age_s = s.MsSince(s.baseline_ns) * 1e-3;
   s.Judge(state);
+  s.keeper.Learn(frame.times, state, s.labels, *s.reconstructor, s.clock);
   state.times.solved_ns = s.clock.MonotonicNs();
 }
 

@@ -5,6 +5,7 @@
 
 #include "sensing/camera/calibration.h"
 #include "sensing/contact/contact_finder.h"
+#include "sensing/core/baseline.h"
 #include "sensing/core/clock.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/link_model.h"
@@ -13,6 +14,7 @@
 #include "sensing/core/result.h"
 #include "sensing/force/force_estimator.h"
 #include "sensing/markers/marker_tracker.h"
+#include "sensing/pipeline/drift_options.h"
 
 namespace taclink {
 
@@ -28,6 +30,8 @@ struct PipelineOptions {
   MarkerTrackerOptions tracking;
   ForceOptions force;
   ContactOptions contact;
+  /// How the baseline follows a skin that creeps; none: it stays as it was taken.
+  std::optional<DriftOptions> drift;
 };
 
 /// How the taking of rest pairs goes.
@@ -60,6 +64,14 @@ class LinkPipeline {
   /// Gives that up, if it was not complete: goes on as before, where there is a baseline.
   void CancelRest();
   const RestProgress& rest_progress() const;
+
+  /// Makes the mean of the next frames the baseline, the cameras stay. Meanwhile all goes on as before.
+  /// Errors: kFailedPrecondition (no baseline yet, or rest pairs are being taken).
+  Result<void> BeginTare(const TareOptions& options);
+  void CancelTare();
+  /// After each Process, once: how the tare ended. Errors: as TareCollector::Add; then the old baseline
+  /// stays.
+  std::optional<Result<TareSummary>> TakeTareEnd();
 
   const LinkModel& model() const;
   /// Of the last pair that was measured: which detection is which marker.

@@ -1,10 +1,7 @@
 #include "sensing/pipeline/rest_pose.h"
 
-#include <algorithm>
-#include <cmath>
 #include <string>
 
-#include "sensing/core/median.h"
 #include "sensing/markers/rest_labels.h"
 #include "sensing/pipeline/rest_match.h"
 
@@ -12,25 +9,15 @@ namespace taclink {
 namespace {
 
 constexpr double kLeastSeenFraction = 0.5;  // in each picture
-// The skin moved if more than this part of the markers scatter by more than this; noise is a fraction of it.
-constexpr double kMovedFraction = 0.03, kMovedPx = 1;
 
 }  // namespace
 
 RestPose::RestPose(const LinkModel& model, const std::optional<StereoRig>& rig, int frames)
-    : model_(model), rig_(rig), frames_(frames) {
-  StartAgain();
-}
+    : model_(model), rig_(rig), frames_(frames), mean_(model.markers.count()) {}
 
 void RestPose::StartAgain() {
-  taken_ = 0;
   tracker_.reset();
-  const auto count = static_cast<size_t>(model_.markers.count());
-  for (size_t c = 0; c < kCameraCount; ++c) {
-    mean_.cameras[c].assign(count, {});
-    squares_[c].assign(count, 0.0);
-    counts_[c].assign(count, 0);
-  }
+  mean_.Clear();
 }
 
 Result<bool> RestPose::Add(const std::array<Detections, kCameraCount>& detections) {
@@ -45,8 +32,8 @@ Result<bool> RestPose::Add(const std::array<Detections, kCameraCount>& detection
     StartAgain();
     return good.error();
   }
-  Accumulate();
-  if (++taken_ < frames_) return false;
+  mean_.Add(labels_);
+  if (taken() < frames_) return false;
   return Finish();
 }
 
@@ -94,36 +81,10 @@ Result<void> RestPose::CheckCount() const {
   return {};
 }
 
-void RestPose::Accumulate() {
-  for (size_t c = 0; c < kCameraCount; ++c) {
-    for (size_t m = 0; m < labels_.cameras[c].size(); ++m) {
-      const MarkerObservation& one = labels_.cameras[c][m];
-      if (!one.seen) continue;
-      mean_.cameras[c][m].center_px += one.center_px;
-      mean_.cameras[c][m].covariance_px2 += one.covariance_px2;
-      squares_[c][m] += one.center_px.squaredNorm();
-      ++counts_[c][m];
-    }
-  }
-}
-
 Result<bool> RestPose::Finish() {
-  std::vector<double> variances;
-  for (size_t c = 0; c < kCameraCount; ++c) {
-    for (size_t m = 0; m < counts_[c].size(); ++m) {
-      MarkerObservation& mean = mean_.cameras[c][m];
-      const int n = counts_[c][m];
-      mean.seen = 2 * n > taken_;
-      if (!mean.seen) continue;
-      mean.center_px /= n;
-      mean.covariance_px2 /= n * n;
-      if (n > 1) variances.push_back((squares_[c][m] - n * mean.center_px.squaredNorm()) / (2.0 * (n - 1)));
-    }
-  }
-  noise_px_ = std::sqrt(std::max(0.0, Median(variances)));
-  const auto moved = std::count_if(variances.begin(), variances.end(),
-                                   [](double variance) { return variance > kMovedPx * kMovedPx; });
-  if (static_cast<double>(moved) > kMovedFraction * static_cast<double>(variances.size())) {
+  mean_.Finish();
+  noise_px_ = mean_.noise_px();
+  if (mean_.moved()) {
     StartAgain();
     return Error{ErrorCode::kFailedPrecondition,
                  "the skin moved while its rest shape was taken; do not touch it"};
@@ -132,14 +93,14 @@ Result<bool> RestPose::Finish() {
     calibration_.emplace().rig = *rig_;
     return true;
   }
-  auto calibrated = CalibrateFromRest(model_, mean_);
+  auto calibrated = CalibrateFromRest(model_, mean_.markers());
   if (!calibrated) {
     StartAgain();
     return calibrated.error();
   }
   calibration_ = *calibrated;
-  calibration_->pairs = taken_;
-  if (variances.empty()) noise_px_ = calibrated->rms_px;
+  calibration_->pairs = taken();
+  if (mean_.variances_px2().empty()) noise_px_ = calibrated->rms_px;
   return true;
 }
 

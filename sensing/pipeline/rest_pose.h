@@ -9,6 +9,7 @@
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
 #include "sensing/markers/path_tracker.h"
+#include "sensing/pipeline/marker_mean.h"
 
 namespace taclink {
 
@@ -23,11 +24,11 @@ class RestPose {
   Result<bool> Add(const std::array<Detections, kCameraCount>& detections);
 
   /// Pairs so far.
-  int taken() const { return taken_; }
+  int taken() const { return mean_.frames(); }
   /// Set once complete.
   const std::optional<CalibrationSummary>& calibration() const { return calibration_; }
   /// The mean over the pairs. Valid once complete.
-  const LabelledMarkers& markers() const { return mean_; }
+  const LabelledMarkers& markers() const { return mean_.markers(); }
   /// How much a marker's place in a picture scatters from frame to frame, each axis; with a single pair, the
   /// calibration's residual stands in. Valid once complete.
   double noise_px() const { return noise_px_; }
@@ -35,20 +36,16 @@ class RestPose {
  private:
   Result<void> Begin(const std::array<Detections, kCameraCount>& detections);
   Result<void> CheckCount() const;
-  void Accumulate();
   Result<bool> Finish();
   void StartAgain();
 
   const LinkModel model_;
   const std::optional<StereoRig> rig_;
   const int frames_;
-  int taken_ = 0;
 
-  std::optional<PathTracker> tracker_;                     // from the first pair on
-  LabelledMarkers labels_;                                 // of the newest pair
-  LabelledMarkers mean_;                                   // sums until complete
-  std::array<std::vector<double>, kCameraCount> squares_;  // sums of the squared positions
-  std::array<std::vector<int>, kCameraCount> counts_;      // how often each marker was seen
+  std::optional<PathTracker> tracker_;  // from the first pair on
+  LabelledMarkers labels_;              // of the newest pair
+  MarkerMean mean_;
   std::optional<CalibrationSummary> calibration_;
   double noise_px_ = 0;
 };

@@ -60,7 +60,7 @@ double CameraEvidence::UpdateLooks(const Eigen::VectorXd& u) {
   return changed_mm;
 }
 
-void CameraEvidence::SetBaseline(const LabelledMarkers& rest, const Eigen::VectorXd& u) {
+void CameraEvidence::SetBaseline(const LabelledMarkers& rest, const Eigen::VectorXd& u, bool keep_unseen) {
   looks_.Update(u);
   for (size_t i = 0; i < observations_.size(); ++i) {
     Observation& o = observations_[i];
@@ -68,14 +68,14 @@ void CameraEvidence::SetBaseline(const LabelledMarkers& rest, const Eigen::Vecto
     o.dropped = false;
     Linearise(o, camera, static_cast<int>(marker), u.segment<3>(3 * static_cast<Eigen::Index>(marker)));
     o.rest_px = o.projected;
-    o.has_baseline = false;
+    o.has_baseline = keep_unseen && o.has_baseline;
     if (marker >= rest.cameras[camera].size() || !IsUsable(rest.cameras[camera][marker]) || !o.linear)
       continue;
     const MarkerObservation& seen = rest.cameras[camera][marker];
     o.residual = seen.center_px - o.projected;
     o.residual_covariance =
         seen.covariance_px2 + options_.rest_sigma_px * options_.rest_sigma_px * Mat2::Identity();
-    o.has_baseline = o.residual.norm() <= options_.max_residual_px;
+    o.has_baseline = keep_unseen || o.residual.norm() <= options_.max_residual_px;
   }
   FillUnknownResiduals();
 }

@@ -40,8 +40,9 @@ class CameraEvidence : public Evidence {
 
   /// Takes the markers at rest, where they are displaced by `u` from the model. What their pixels are off the
   /// model's projection is systematic (the lens, a marker's place in the mould), and is subtracted from later
-  /// observations, whose variance its noise joins.
-  void SetBaseline(const LabelledMarkers& rest, const Eigen::VectorXd& u);
+  /// observations, whose variance its noise joins. `keep_unseen`: what `rest` does not show keeps its fixed
+  /// residual, and a large one is believed, as the labels are those of a skin that is followed.
+  void SetBaseline(const LabelledMarkers& rest, const Eigen::VectorXd& u, bool keep_unseen = false);
 
   /// Takes the walls' tilts from displacements `u`: the last estimate. Returns the longest change of a seen
   /// point against its marker's centre, mm; if it is large, the estimate is worth repeating.

@@ -36,10 +36,23 @@ ShapeReconstructor::ShapeReconstructor(const LinkModel& model, const StereoRig& 
       evidence_(model, rig, estimator_.basis(), options.cameras),
       rest_u_(Eigen::VectorXd::Zero(3 * model.markers.count())) {}
 
-void ShapeReconstructor::SetBaseline(const LabelledMarkers& rest, double pressure_mpa) {
+void ShapeReconstructor::SetBaseline(const LabelledMarkers& rest, double pressure_mpa, bool keep_unseen) {
   rest_u_ = pressure_mpa * estimator_.basis().per_pressure();
-  evidence_.SetBaseline(rest, rest_u_);
+  evidence_.SetBaseline(rest, rest_u_, keep_unseen);
   estimator_.Reset();
+}
+
+void ShapeReconstructor::SetBaseline(const LabelledMarkers& rest, double pressure_mpa) {
+  SetBaseline(rest, pressure_mpa, false);
+}
+
+void ShapeReconstructor::Tare(const LabelledMarkers& now, double pressure_mpa) {
+  SetBaseline(now, pressure_mpa, true);
+}
+
+Vec3 ShapeReconstructor::PressureDisplacement(int marker, double change_mpa) const {
+  const SkinBasis& basis = estimator_.basis();
+  return basis.Frame(marker) * (change_mpa * basis.per_pressure().segment<3>(3 * marker));
 }
 
 void ShapeReconstructor::Reconstruct(const LabelledMarkers& markers, std::optional<double> pressure_mpa,

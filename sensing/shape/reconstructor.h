@@ -29,6 +29,10 @@ class ShapeReconstructor {
   /// Takes the markers of the untouched skin (means over frames, with the means' covariances), under a gauge
   /// pressure. Before the first call they are expected where the model's projection has them.
   void SetBaseline(const LabelledMarkers& rest, double pressure_mpa = 0);
+  /// Takes what is seen now as the untouched skin; markers that `now` does not show keep their baseline.
+  void Tare(const LabelledMarkers& now, double pressure_mpa);
+  /// How a change of the gauge pressure displaces a marker; link frame, mm.
+  Vec3 PressureDisplacement(int marker, double change_mpa) const;
 
   /// `pressure_mpa`: gauge pressure; none: not known, and estimated.
   void Reconstruct(const LabelledMarkers& markers, std::optional<double> pressure_mpa, SkinShape& shape);
@@ -39,6 +43,7 @@ class ShapeReconstructor {
   const SkinBasis& basis() const { return estimator_.basis(); }
 
  private:
+  void SetBaseline(const LabelledMarkers& rest, double pressure_mpa, bool keep_unseen);
   void Write(SkinShape& shape) const;
 
   const std::vector<Vec3> model_rest_mm_;

@@ -8,9 +8,12 @@ namespace taclink {
 namespace {
 
 constexpr int kMaxSteps = 5, kMaxReadmissions = 2, kMaxOpenings = 4;
-constexpr double kOpenedKept = 0.7;   // of the slack that opened, to the next frame
-constexpr double kLonely = 40;        // an outlier's chi^2 against that per number around it
-constexpr double kConvergedMm = 0.1;  // a step leaves less than a tenth of itself
+constexpr double kFirstStray2 = 1;
+constexpr int kLearnEvery = 4;                      // frames
+constexpr double kLearnUp = 0.7, kLearnDown = 0.4;  // of the way, each time
+constexpr double kOpenedKept = 0.7;                 // of the slack that opened, to the next frame
+constexpr double kLonely = 40;                      // an outlier's chi^2 against that per number around it
+constexpr double kConvergedMm = 0.1;                // a step leaves less than a tenth of itself
 constexpr double kMostOpenedMm2 =
     400;  // slack as good as unlimited; more would only grow from frame to frame
 
@@ -22,7 +25,8 @@ ShapeEstimator::ShapeEstimator(const LinkModel& model, const ShapeEstimatorOptio
       solver_(basis_, options.solver),
       markers_(static_cast<size_t>(basis_.markers())),
       opened_mm2_(markers_.size(), 0.0),
-      covariances_(markers_.size(), Mat3::Zero()) {
+      covariances_(markers_.size(), Mat3::Zero()),
+      stray2_(kFirstStray2) {
   slack_.setZero(3 * basis_.markers());
   u_ = slack_;
 }
@@ -30,6 +34,8 @@ ShapeEstimator::ShapeEstimator(const LinkModel& model, const ShapeEstimatorOptio
 void ShapeEstimator::Reset() {
   solver_.Reset();
   u_.setZero();
+  stray2_ = kFirstStray2;
+  frames_since_stray_ = 0;
   std::fill(opened_mm2_.begin(), opened_mm2_.end(), 0.0);
 }
 
@@ -37,19 +43,33 @@ void ShapeEstimator::SetPrior(const KnownPressure& pressure) {
   const double sigma =
       pressure.is_measured ? options_.pressure_sigma_mpa : options_.unknown_pressure_sigma_mpa;
   const double part = options_.pressure_part * pressure.mpa;
-  const double moved = solver_.displacements().cwiseAbs().maxCoeff();
-  solver_.SetPrior(pressure.mpa, std::hypot(sigma, part), std::abs(part),
-                   1 + moved / options_.stray_doubles_at_mm);
+  solver_.SetPrior(pressure.mpa, std::hypot(sigma, part), std::abs(part), std::sqrt(stray2_) * StrayGrowth());
+}
+
+double ShapeEstimator::StrayGrowth() const {
+  return 1 + solver_.displacements().cwiseAbs().maxCoeff() / options_.stray_doubles_at_mm;
+}
+
+// Quickly up, slowly down.
+void ShapeEstimator::LearnStray() {
+  if (++frames_since_stray_ < kLearnEvery) return;
+  frames_since_stray_ = 0;
+  const ShapeSolver::StrayEvidence seen = solver_.Stray();
+  const double growth = StrayGrowth(), least2 = options_.least_stray * options_.least_stray;
+  const double shown2 =
+      std::clamp(seen.square / std::max(seen.numbers, 1.0) / (growth * growth), least2, 1.0);
+  stray2_ += (shown2 > stray2_ ? kLearnUp : kLearnDown) * (shown2 - stray2_);
 }
 
 // Of the loads at a marker, only the one that moves it most counts.
 void ShapeEstimator::SetSlack() {
   const Eigen::VectorXd& u = solver_.displacements();
   const double least2 = options_.least_slack_mm * options_.least_slack_mm;
+  const double growth = StrayGrowth(), stray2 = stray2_ * growth * growth;
   for (int m = 0; m < basis_.markers(); ++m) {
     const double part = options_.slack_part * u.segment<3>(3 * m).norm();
-    slack_.segment<3>(3 * m) =
-        basis_.Remainder(m).diagonal().array() + (part * part + least2 + opened_mm2_[static_cast<size_t>(m)]);
+    slack_.segment<3>(3 * m) = stray2 * basis_.Remainder(m).diagonal().array() +
+                               (part * part + least2 + opened_mm2_[static_cast<size_t>(m)]);
   }
   for (size_t i = 0; i < solver_.fields().size(); ++i) {
     const int field = solver_.fields()[i], center = basis_.MarkerOf(field), paths = basis_.paths();
@@ -180,6 +200,7 @@ void ShapeEstimator::Estimate(Evidence& evidence, const KnownPressure& pressure)
     solver_.Step(markers_);
   }
   if (removed) Converge(evidence);
+  LearnStray();
   Finish();
 }
 

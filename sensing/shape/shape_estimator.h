@@ -32,6 +32,8 @@ struct ShapeEstimatorOptions {
   double misfit_allowed = 2;
   /// Stray loads grow with the largest displacement: by their rest value every so many mm.
   double stray_doubles_at_mm = 20;
+  /// They are taken to be what the last frames show, down to this part of what `basis` says.
+  double least_stray = 0.1;
   /// Errors of a known pressure, and of what the linear shell makes of it, as a part of it.
   double pressure_sigma_mpa = 1e-4;
   double pressure_part = 0.1;
@@ -66,6 +68,8 @@ class ShapeEstimator {
 
  private:
   void SetPrior(const KnownPressure& pressure);
+  double StrayGrowth() const;
+  void LearnStray();
   void Converge(Evidence& evidence);
   void Pursue(Evidence& evidence);
   void SetSlack();
@@ -82,6 +86,8 @@ class ShapeEstimator {
   Eigen::VectorXd slack_, u_;
   std::vector<double> opened_mm2_;  // by marker, slack that OpenSlack added
   std::vector<Mat3> covariances_;
+  double stray2_;  // variance of the stray loads, of that in the options
+  int frames_since_stray_ = 0;
   int rounds_ = 0;
   size_t turn_ = 0;      // whose place is looked at next
   bool looked_ = false;  // in this frame

@@ -342,6 +342,17 @@ std::span<const Mat3> ShapeSolver::Covariances() {
   return covariances_;
 }
 
+ShapeSolver::StrayEvidence ShapeSolver::Stray() {
+  if (factor_is_stale_) Factorise();
+  auto inverse = inverse_.topLeftCorner(count_, modes_);
+  inverse.setIdentity();
+  factor_.topLeftCorner(count_, count_).triangularView<Eigen::Lower>().solveInPlace(inverse);
+  StrayEvidence found;
+  found.square = x_.head(modes_).squaredNorm();
+  for (Eigen::Index k = 0; k < modes_; ++k) found.numbers += 1 - precision_[k] * inverse.col(k).squaredNorm();
+  return found;
+}
+
 void ShapeSolver::SolveCovariances(size_t gathered) {
   auto parts = inverse_.topLeftCorner(count_, 3 * static_cast<Eigen::Index>(gathered));
   factor_.topLeftCorner(count_, count_).triangularView<Eigen::Lower>().solveInPlace(parts);

@@ -66,6 +66,14 @@ class ShapeSolver {
   /// Estimated pressure, MPa.
   double pressure_mpa() const { return pressure_mpa_ + x_[pressure_at_]; }
 
+  struct StrayEvidence {
+    double square = 0;   ///< sum of the modes' squared amplitudes
+    double numbers = 0;  ///< of the modes that the evidence determines, not the prior
+  };
+  /// What the estimate says of the stray loads' size: their variance against SetPrior's scale of 1 is near
+  /// square / numbers (MacKay, Bayesian interpolation, Neural Computation 4, 1992).
+  StrayEvidence Stray();
+
   /// Of the displacement of each marker, without slack. Up to date for all if fields or prior have changed,
   /// else for the markers whose own information has; the others' turn comes within a few frames.
   std::span<const Mat3> Covariances();

@@ -6,6 +6,7 @@
 
 #include "sensing/model/model_file.h"
 #include "server/assembly/encoder.h"
+#include "server/assembly/pressure_factory.h"
 #include "server/assembly/processor_factory.h"
 #include "server/assembly/source_factory.h"
 
@@ -15,35 +16,77 @@ namespace {
 Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
   auto model = LoadLinkModel(link.model);
   if (!model) return model.error();
-  auto source = MakeSource(link, *model, clock);
+  if (const auto good = CheckRules(link.rules, model->markers); !good) return good.error();
+  const LinkFactories factories = {
+      .source = [link, model = *model, &clock] { return MakeSource(link, model, clock); },
+      .processor = [link, model = *model] { return MakeProcessor(link, model); }};
+  auto source = factories.source();
   if (!source) return source.error();
-  auto processor = MakeProcessor(link, *model);
+  auto processor = factories.processor();
   if (!processor) return processor.error();
   return LinkParts{.description = {.name = link.name,
                                    .model = std::move(*model),
-                                   .base_from_link = link.BaseFromLink(),
-                                   .source = static_cast<SourceKind>(link.source.index())},
+                                   .base_from_link = link.FrameFromLink(),
+                                   .frame = link.frame,
+                                   .source = static_cast<SourceKind>(link.source.index()),
+                                   .rules = link.rules},
                    .source = std::move(*source),
-                   .processor = std::move(*processor)};
+                   .processor = std::move(*processor),
+                   .pressure = MakePressure(link, clock),
+                   .factories = factories,
+                   .realtime = link.realtime};
+}
+
+// Null without a URDF: then the links' own poses are relative to the base.
+Result<std::unique_ptr<ArmPoses>> BuildPoses(const Config& config) {
+  if (!config.kinematics.urdf) return std::unique_ptr<ArmPoses>();
+  auto kinematics = ArmKinematics::Load(*config.kinematics.urdf, config.kinematics.base);
+  if (!kinematics) return kinematics.error();
+  std::vector<LinkMount> mounts;
+  for (const LinkConfig& link : config.links) {
+    mounts.push_back({.frame = {}, .frame_from_link = link.FrameFromLink()});
+    if (link.frame.empty()) continue;
+    const auto frame = (*kinematics)->FindFrame(link.frame);
+    if (!frame) {
+      return Error{frame.error().code,
+                   "link '" + link.name + "': " + frame.error().message + "; correct its pose.frame"};
+    }
+    mounts.back().frame = *frame;
+  }
+  return std::make_unique<ArmPoses>(std::move(*kinematics), std::move(mounts),
+                                    config.kinematics.joint_states);
 }
 
 }  // namespace
 
-Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock) {
-  std::vector<LinkParts> links;
-  std::vector<std::string> names;
+std::vector<Result<LinkParts>> BuildLinks(const Config& config, Clock& clock) {
   // Simulated links solve their scenes first.
   std::vector<std::future<Result<LinkParts>>> built;
   for (const LinkConfig& link : config.links)
     built.push_back(std::async(std::launch::async, [&link, &clock] { return BuildLink(link, clock); }));
+  std::vector<Result<LinkParts>> links;
   for (size_t i = 0; i < built.size(); ++i) {
-    const LinkConfig& link = config.links[i];
-    auto parts = built[i].get();
-    if (!parts) return Error{parts.error().code, "link '" + link.name + "': " + parts.error().message};
-    links.push_back(std::move(*parts));
-    names.push_back(link.name);
+    links.push_back(built[i].get());
+    if (links[i]) continue;
+    const Error& error = links[i].error();
+    links[i] = Error{error.code, "link '" + config.links[i].name + "': " + error.message};
   }
-  return std::make_unique<Arm>(config.arm_name, std::move(links), MakeEncoder(names), clock);
+  return links;
+}
+
+Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock) {
+  auto poses = BuildPoses(config);
+  if (!poses) return poses.error();
+  std::vector<LinkParts> links;
+  std::vector<std::string> names;
+  for (auto& parts : BuildLinks(config, clock)) {
+    if (!parts) return parts.error();
+    names.push_back(parts->description.name);
+    links.push_back(std::move(*parts));
+  }
+  return std::make_unique<Arm>(config.arm_name, std::move(links), MakeEncoder(names), clock,
+                               ArmOptions{.watchdog = config.watchdog, .events = config.events},
+                               std::move(*poses));
 }
 
 }  // namespace taclink::server

@@ -1,12 +1,16 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "sensing/core/clock.h"
 #include "server/arm.h"
 #include "server/config.h"
 
 namespace taclink::server {
+
+/// What each configured link is made of, or why it can't be made. Errors name the link.
+std::vector<Result<LinkParts>> BuildLinks(const Config& config, Clock& clock);
 
 /// Builds the configured arm, not started. Errors name the link.
 Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock);

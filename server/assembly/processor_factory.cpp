@@ -29,6 +29,10 @@ class PipelineProcessor final : public LinkProcessor {
     touched_ = !state.contacts.empty();
   }
 
+  Result<void> BeginTare(const TareOptions& options) override { return pipeline_.BeginTare(options); }
+  std::optional<Result<TareSummary>> TakeTareEnd() override { return pipeline_.TakeTareEnd(); }
+  void CancelTare() override { pipeline_.CancelTare(); }
+
   Result<void> BeginCalibration(const CalibrationOrder& order) override {
     if (touched_ && !order.force)
       return Error{ErrorCode::kFailedPrecondition, "the skin is touched; let go of it, or ask with force"};
@@ -85,7 +89,11 @@ Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, con
   PipelineOptions options;
   options.force.model = link.force_model;
   options.force.refinement = link.force_refinement;
-  if (link.pressure_kpa) options.pressure_mpa = *link.pressure_kpa * kMpaPerKpa;
+  options.drift = link.drift;
+  if (link.pressure) {
+    if (const auto* constant = std::get_if<ConstantPressureConfig>(&link.pressure->source))
+      options.pressure_mpa = constant->kpa * kMpaPerKpa;
+  }
   if (link.calibration && IsMissing(*link.calibration)) {
     spdlog::warn(
         "link {}: {} does not exist yet; the first pictures calibrate the cameras instead. "

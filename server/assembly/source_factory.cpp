@@ -26,9 +26,13 @@ struct SourceMaker {
   }
 
   SourceResult operator()(const FileSourceConfig& config) const {
-    return MakeFileSource(
-        {.folder = config.folder, .frame_rate_hz = config.frame_rate_hz, .loop = config.loop, .paced = true},
-        clock);
+    return MakeFileSource({.folder = config.folder,
+                           .frame_rate_hz = config.frame_rate_hz,
+                           .loop = config.loop,
+                           .paced = true,
+                           .start_after_s = config.start_after_s,
+                           .in_memory = config.in_memory},
+                          clock);
   }
 
   SourceResult operator()(const SimulatedSourceConfig& config) const {

@@ -1,5 +1,8 @@
 #include "server/rpc/arm_message.h"
 
+#include "server/rpc/contacts_message.h"
+#include "server/rpc/event_message.h"
+#include "server/rpc/joint_state_call.h"
 #include "wire/convert.h"
 #include "wire/units.h"
 
@@ -35,11 +38,57 @@ void FillStatistics(const LinkStatistics& statistics, uint64_t restarts, v1::Lin
   out.set_source_restarts(restarts);
 }
 
+v1::Supervision ToWire(Supervision::State state) {
+  switch (state) {
+    case Supervision::State::kRunning:
+      return v1::SUPERVISION_RUNNING;
+    case Supervision::State::kOverdue:
+      return v1::SUPERVISION_OVERDUE;
+    case Supervision::State::kRestarting:
+      return v1::SUPERVISION_RESTARTING;
+    case Supervision::State::kResting:
+      return v1::SUPERVISION_RESTING;
+  }
+  return v1::SUPERVISION_UNSPECIFIED;
+}
+
+void FillSupervision(const Supervision& supervision, v1::Link& out) {
+  out.set_supervision(ToWire(supervision.state));
+  out.set_supervision_reason(supervision.reason);
+  v1::LinkStatistics& statistics = *out.mutable_statistics();
+  statistics.set_worker_restarts(supervision.restarts);
+  statistics.set_stage_overruns(supervision.overruns);
+  statistics.set_workers_abandoned(supervision.abandoned);
+  statistics.set_last_failure(supervision.last_failure);
+}
+
+void FillCameras(const SourceCondition& source, const LinkStatistics& statistics, v1::Link& out) {
+  const SourceCounters& counters = source.counters;
+  out.mutable_statistics()->set_pairs_skipped(counters.skipped_pairs);
+  for (size_t i = 0; i < source.info.cameras.size() && i < kCameraCount; ++i) {
+    const SourceCamera& camera = source.info.cameras[i];
+    v1::Camera& message = *out.add_cameras();
+    message.set_name(Name(kBothCameras[i]));
+    message.set_configured(camera.configured);
+    message.set_device(camera.device);
+    message.set_format(camera.format);
+    message.set_trouble(camera.trouble);
+    message.set_rate_hz(counters.rate_hz[i]);
+    message.set_pictures(counters.pictures[i]);
+    message.set_lost(counters.lost[i]);
+    message.set_damaged(counters.damaged[i]);
+    message.set_undecodable(statistics.bad_pictures[i]);
+    message.set_unpaired(counters.unpaired[i]);
+    message.set_stamped_on_arrival(counters.stamped_on_arrival[i]);
+  }
+}
+
 }  // namespace
 
 void Fill(const Arm& arm, v1::Arm& out) {
   out.set_name(arm.name());
   out.set_server_version(TACLINK_VERSION);
+  FillJoints(arm, out);
   for (size_t i = 0; i < arm.links().size(); ++i) {
     const LinkDescription& link = arm.links()[i];
     const SourceCondition source = arm.worker(i).source_condition();
@@ -47,12 +96,21 @@ void Fill(const Arm& arm, v1::Arm& out) {
     message.set_name(link.name);
     message.set_index(static_cast<uint32_t>(i));
     wire::Fill(link.model, *message.mutable_model());
-    wire::Fill(link.base_from_link, *message.mutable_base_from_link());
+    const LinkPose pose = arm.poses().At(i, arm.clock().MonotonicNs());
+    wire::Fill(pose.base_from_link, *message.mutable_base_from_link());
+    message.set_pose_validity(ToWire(pose.validity));
+    message.set_frame(link.frame);
     FillSource(link.source, source.info, *message.mutable_source());
-    FillStatistics(arm.worker(i).Statistics(), source.restarts, *message.mutable_statistics());
+    const LinkStatistics statistics = arm.worker(i).Statistics();
+    FillStatistics(statistics, source.restarts, *message.mutable_statistics());
+    FillSupervision(arm.worker(i).supervision(), message);
+    FillCameras(source, statistics, message);
+    for (const LevelReport& report : arm.events().Levels(i))
+      Fill(report, link.rules, *message.add_force_levels());
     message.set_status(v1::LINK_STATUS_STARTING);
     if (const auto latest = arm.hub().Latest(i)) {
       message.set_status(wire::ToWire(latest->state().status));
+      wire::Fill(latest->state().baseline, *message.mutable_baseline());
       message.set_status_reason(latest->state().status_reason);
       message.mutable_statistics()->set_contacts(static_cast<uint32_t>(latest->state().contacts.size()));
     }

@@ -33,7 +33,7 @@ std::shared_ptr<CalibrateStream> CalibrateStream::Make() {
   return stream;
 }
 
-void CalibrateStream::Refuse(const Error& error) {
+void CalibrateStream::End(const Error& error) {
   Tell({.end = error});
 }
 
@@ -41,6 +41,7 @@ bool CalibrateStream::Tell(const CalibrationProgress& progress) {
   {
     const std::lock_guard lock(mutex_);
     if (cancelled_ || finished_) return false;
+    if (waiting_ && waiting_->end) return false;  // the server ends the call: nothing may take that back
     waiting_ = progress;
   }
   Pump();

@@ -16,11 +16,11 @@ namespace taclink::server {
 class CalibrateStream final : public grpc::ServerWriteReactor<v1::CalibrateResponse>,
                               public std::enable_shared_from_this<CalibrateStream> {
  public:
-  /// Lives until gRPC is done with it and no worker holds it. `Refuse` or worker's calls to `Tell` follow.
+  /// Lives until gRPC is done with it and no worker holds it. `End` or the worker's calls to `Tell` follow.
   static std::shared_ptr<CalibrateStream> Make();
 
   /// Ends it with that error, unless it has ended.
-  void Refuse(const Error& error);
+  void End(const Error& error);
   /// From the worker's thread. False: the client has gone.
   bool Tell(const CalibrationProgress& progress);
 

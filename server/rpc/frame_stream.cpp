@@ -1,7 +1,6 @@
 #include "server/rpc/frame_stream.h"
 
 #include <array>
-#include <boost/asio/post.hpp>
 #include <utility>
 
 #include "taclink/v1/tactile.pb.h"
@@ -28,102 +27,29 @@ grpc::Slice SharedSlice(std::shared_ptr<const std::string> bytes) {
 
 FrameStream::FrameStream(FrameStreamOptions options, std::vector<std::string> link_names,
                          StreamRegistry& registry, std::shared_ptr<boost::asio::thread_pool> senders)
-    : options_(std::move(options)),
-      link_names_(std::move(link_names)),
-      registry_(registry),
-      senders_(std::move(senders)) {}
+    : PumpedStream(registry, std::move(senders)),
+      options_(std::move(options)),
+      link_names_(std::move(link_names)) {}
 
 void FrameStream::Begin(Hub& hub) {
-  auto notify = [weak = weak_from_this(), senders = senders_] {
-    boost::asio::post(*senders, [weak] {
-      if (const auto stream = weak.lock()) stream->Pump();
-    });
-  };
-  {
-    const std::lock_guard lock(mutex_);
-    subscription_ = hub.Subscribe(options_.subscriber, std::move(notify));
-  }
-  Pump();
+  subscription_ = hub.Subscribe(options_.subscriber, Notifier());
+  Open();
 }
 
-void FrameStream::End(const std::string& reason) {
-  {
-    const std::lock_guard lock(mutex_);
-    end_reason_ = reason;
-  }
-  Pump();
-}
-
-void FrameStream::OnWriteDone(bool ok) {
-  {
-    const std::lock_guard lock(mutex_);
-    writing_ = false;
-    cancelled_ = cancelled_ || !ok;
-  }
-  Pump();
-}
-
-void FrameStream::OnCancel() {
-  {
-    const std::lock_guard lock(mutex_);
-    cancelled_ = true;
-  }
-  Pump();
-}
-
-void FrameStream::OnDone() {
-  registry_.Remove(shared_from_this());
-}
-
-void FrameStream::Pump() {
-  Step step;
-  {
-    const std::lock_guard lock(mutex_);
-    step = Decide();
-  }
-  // Outside the lock: writing_ or finished_ now keep every other thread from coming here.
-  switch (step) {
-    case Step::kNothing:
-      break;
-    case Step::kWrite:
-      StartWrite(&message_);
-      break;
-    case Step::kWriteLast:
-      StartWriteAndFinish(&message_, grpc::WriteOptions(),
-                          grpc::Status(grpc::StatusCode::UNAVAILABLE, end_reason_));
-      break;
-    case Step::kFinishCancelled:
-      // Also where the server gave up on a client that does not read: it may still get to see the reason.
-      Finish(end_reason_.empty() ? grpc::Status::CANCELLED
-                                 : grpc::Status(grpc::StatusCode::UNAVAILABLE, end_reason_));
-      break;
-  }
-}
-
-FrameStream::Step FrameStream::Decide() {
-  if (writing_ || finished_ || !subscription_) return Step::kNothing;
-  if (cancelled_) {
-    finished_ = true;
-    return Step::kFinishCancelled;
-  }
-  if (!end_reason_.empty()) {
-    finished_ = true;
-    MakeStatus();
-    return Step::kWriteLast;
-  }
+std::optional<grpc::ByteBuffer> FrameStream::Next() {
   const bool news = subscription_->dropped() != dropped_told_;
-  if (!status_sent_ || (news && steady_clock::now() - status_time_ >= kStatusInterval)) {
-    MakeStatus();
-  } else if (const auto publication = subscription_->Take()) {
-    MakeFrame(*publication);
-  } else {
-    return Step::kNothing;
-  }
-  writing_ = true;
-  return Step::kWrite;
+  if (!status_sent_ || (news && steady_clock::now() - status_time_ >= kStatusInterval)) return Status("");
+  bool unchanged = false;
+  const auto publication = subscription_->Take(&unchanged);
+  if (!publication) return std::nullopt;
+  return Frame(*publication, unchanged);
 }
 
-void FrameStream::MakeStatus() {
+std::optional<grpc::ByteBuffer> FrameStream::Last(const std::string& reason) {
+  return Status(reason);
+}
+
+grpc::ByteBuffer FrameStream::Status(const std::string& end_reason) {
   v1::StreamFramesResponse response;
   v1::StreamStatus& status = *response.mutable_status();
   dropped_told_ = subscription_->dropped();
@@ -135,48 +61,26 @@ void FrameStream::MakeStatus() {
     entry.set_link(link_names_[link]);
     entry.set_frames_sent(counts[link].taken);
     entry.set_frames_dropped(counts[link].dropped);
+    entry.set_frames_dropped_for_bytes(counts[link].dropped_for_bytes);
+    entry.set_frames_unchanged(counts[link].unchanged);
   }
   status.set_queue_capacity(static_cast<uint32_t>(subscription_->capacity()));
-  status.set_end_reason(end_reason_);
+  status.set_queue_capacity_bytes(options_.subscriber.queue_bytes);
+  status.set_end_reason(end_reason);
   status_sent_ = true;
   status_time_ = steady_clock::now();
   grpc::Slice slice(response.SerializeAsString());
-  message_ = grpc::ByteBuffer(&slice, 1);
+  return {&slice, 1};
 }
 
-void FrameStream::MakeFrame(const Publication& publication) {
-  auto frame = publication.Encoded(options_.detail);
-  std::array<grpc::Slice, 2> slices = {grpc::Slice(wire::FrameResponsePrefix(frame->size())), {}};
+// A frame that tells nothing new is small, and marked by what stands after the shared bytes.
+grpc::ByteBuffer FrameStream::Frame(const Publication& publication, bool unchanged) const {
+  auto frame = publication.Encoded(unchanged ? Detail::kContacts : options_.detail);
+  const std::string mark = unchanged ? wire::UnchangedMark() : "";
+  std::array<grpc::Slice, 3> slices = {
+      grpc::Slice(wire::FrameResponsePrefix(frame->size() + mark.size())), {}, grpc::Slice(mark)};
   slices[1] = SharedSlice(std::move(frame));
-  message_ = grpc::ByteBuffer(slices.data(), slices.size());
-}
-
-StreamRegistry::Added StreamRegistry::Add(std::shared_ptr<FrameStream> stream) {
-  const std::lock_guard lock(mutex_);
-  if (closed_) return Added::kClosed;
-  if (streams_.size() >= max_streams_) return Added::kFull;
-  streams_.insert(std::move(stream));
-  return Added::kYes;
-}
-
-void StreamRegistry::Remove(const std::shared_ptr<FrameStream>& stream) {
-  const std::lock_guard lock(mutex_);
-  streams_.erase(stream);
-}
-
-void StreamRegistry::Close(const std::string& reason) {
-  std::set<std::shared_ptr<FrameStream>> streams;
-  {
-    const std::lock_guard lock(mutex_);
-    closed_ = true;
-    streams = streams_;
-  }
-  for (const auto& stream : streams) stream->End(reason);
-}
-
-size_t StreamRegistry::streams() const {
-  const std::lock_guard lock(mutex_);
-  return streams_.size();
+  return {slices.data(), unchanged ? 3U : 2U};
 }
 
 }  // namespace taclink::server

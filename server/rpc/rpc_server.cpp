@@ -1,31 +1,23 @@
 #include "server/rpc/rpc_server.h"
 
+#include <google/protobuf/stubs/logging.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
 
 #include <utility>
 
+#include "server/rpc/credentials.h"
+
 namespace taclink::server {
 namespace {
-
-constexpr int kMaxRequestBytes = 64 * 1024;
-// A client that vanished without a word is noticed after their sum; one that is only stopped for a minute or
-// two is kept.
-constexpr int kKeepaliveTimeMs = 60'000;
-constexpr int kKeepaliveTimeoutMs = 120'000;
-
-void SetUp(grpc::ServerBuilder& builder) {
-  builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // else two servers share a port without a word
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
-  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
-}
 
 // gRPC's plug-ins are global and must be set before the first builder.
 void EnablePlugins() {
   static const bool once = [] {
     grpc::EnableDefaultHealthCheckService(true);
+    // Every malformed request would write a line; the client is told.
+    google::protobuf::SetLogHandler(nullptr);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     return true;
   }();
@@ -39,18 +31,23 @@ std::string WithPort(const std::string& listen, int port) {
 
 }  // namespace
 
-RpcServer::RpcServer(Arm& arm, ServiceLimits limits)
-    : senders_(std::make_shared<boost::asio::thread_pool>(1)), service_(arm, limits, senders_) {}
+RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const Security>& security)
+    : senders_(std::make_shared<boost::asio::thread_pool>(1)),
+      service_(arm, limits, senders_, security),
+      operations_(arm, security) {}
 
-Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, Arm& arm,
-                                                    ServiceLimits limits) {
+Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, Arm& arm, ServiceLimits limits,
+                                                    std::shared_ptr<const Security> security) {
   EnablePlugins();
-  std::unique_ptr<RpcServer> out(new RpcServer(arm, limits));
+  if (!security) security = std::make_shared<const Security>();
+  std::unique_ptr<RpcServer> out(new RpcServer(arm, limits, security));
   int port = 0;
   grpc::ServerBuilder builder;
-  SetUp(builder);
-  builder.AddListeningPort(listen, grpc::InsecureServerCredentials(), &port);
+  Apply(limits, builder);
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // else two servers share a port without a word
+  builder.AddListeningPort(listen, MakeCredentials(listen, security), &port);
   builder.RegisterService(&out->service_);
+  builder.RegisterService(&out->operations_);
   out->server_ = builder.BuildAndStart();
   if (!out->server_ || port == 0) {
     return Error{ErrorCode::kUnavailable,
@@ -58,6 +55,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
   }
   out->address_ = WithPort(listen, port);
   out->server_->GetHealthCheckService()->SetServingStatus(v1::TactileService::service_full_name(), true);
+  out->server_->GetHealthCheckService()->SetServingStatus(v1::OperationsService::service_full_name(), true);
   return out;
 }
 
@@ -69,7 +67,10 @@ void RpcServer::Shutdown(const std::string& reason, std::chrono::milliseconds pa
   if (!server_) return;
   server_->GetHealthCheckService()->SetServingStatus(false);
   service_.EndStreams(reason);
-  server_->Shutdown(std::chrono::system_clock::now() + patience);
+  // Calls from within the process lose their last words once gRPC shuts down, so they get their time before.
+  const auto deadline = std::chrono::system_clock::now() + patience;
+  service_.WaitUntilNoStreams(patience);
+  server_->Shutdown(deadline);
   server_->Wait();
   senders_->join();
   server_.reset();

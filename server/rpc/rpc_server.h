@@ -9,15 +9,19 @@
 
 #include "sensing/core/result.h"
 #include "server/arm.h"
+#include "server/rpc/operations_service.h"
 #include "server/rpc/tactile_service.h"
+#include "server/security/security.h"
 
 namespace taclink::server {
 
 /// gRPC over one arm: TactileService, health, reflection. The arm must outlive it.
 class RpcServer {
  public:
-  /// Listens at once. Errors: kUnavailable (the address can't be had).
-  static Result<std::unique_ptr<RpcServer>> Start(const std::string& listen, Arm& arm, ServiceLimits limits);
+  /// Listens at once. `security` null: everybody may call, in the clear. Errors: kUnavailable (the address
+  /// can't be had).
+  static Result<std::unique_ptr<RpcServer>> Start(const std::string& listen, Arm& arm, ServiceLimits limits,
+                                                  std::shared_ptr<const Security> security = nullptr);
   ~RpcServer();
 
   /// Tells every stream why, then ends all calls by `patience` at the latest. May be called twice.
@@ -28,13 +32,15 @@ class RpcServer {
   /// For calls from within this process.
   std::shared_ptr<grpc::Channel> InProcessChannel() { return server_->InProcessChannel({}); }
   size_t streams() const { return service_.streams(); }
+  void SetLimits(ServiceLimits limits) { service_.SetLimits(limits); }
 
  private:
-  RpcServer(Arm& arm, ServiceLimits limits);
+  RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const Security>& security);
 
   // Constant after Start. The service outlives the server that calls it.
   const std::shared_ptr<boost::asio::thread_pool> senders_;
   TactileService service_;
+  OperationsService operations_;
   std::unique_ptr<grpc::Server> server_;
   std::string address_;
 };

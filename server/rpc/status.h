@@ -24,6 +24,10 @@ inline grpc::StatusCode GrpcCode(ErrorCode code) {
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case ErrorCode::kUnsupported:
       return grpc::StatusCode::UNIMPLEMENTED;
+    case ErrorCode::kUnauthenticated:
+      return grpc::StatusCode::UNAUTHENTICATED;
+    case ErrorCode::kPermissionDenied:
+      return grpc::StatusCode::PERMISSION_DENIED;
     case ErrorCode::kInternal:
       break;
   }

@@ -2,18 +2,20 @@
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "server/rpc/arm_message.h"
+#include "server/rpc/event_calls.h"
 #include "server/rpc/status.h"
-#include "wire/convert.h"
+#include "server/rpc/stream_request.h"
+#include "server/rpc/who.h"
 
 namespace taclink::server {
 namespace {
 
-constexpr uint32_t kDefaultPairs = 8, kMaxPairs = 300;
+// A robot has one source of joint states, a few at most.
+constexpr size_t kMaxUpdateCalls = 16;
+constexpr uint32_t kDefaultPairs = 8, kMaxPairs = 300, kDefaultTareFrames = 10;
 
 using StreamReactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
 
@@ -26,8 +28,8 @@ class RefusedStream final : public StreamReactor {
   void OnDone() override { delete this; }
 };
 
-StreamReactor* Refuse(const grpc::CallbackServerContext& context, const Error& error) {
-  spdlog::info("{}: StreamFrames refused: {}", context.peer(), error.message);
+StreamReactor* Refuse(const grpc::CallbackServerContext& context, const char* method, const Error& error) {
+  spdlog::info("{}: {} refused: {}", PeerOf(context), method, error.message);
   return new RefusedStream(error);  // deletes itself when gRPC is done with it
 }
 
@@ -35,24 +37,41 @@ Error Invalid(std::string message) {
   return {ErrorCode::kInvalidArgument, std::move(message)};
 }
 
+std::string CountRange(const char* field, uint32_t unset) {
+  return std::string(field) + " must be 1 to " + std::to_string(kMaxPairs) + ", or 0 for " +
+         std::to_string(unset);
+}
+
 }  // namespace
 
 TactileService::TactileService(Arm& arm, ServiceLimits limits,
-                               std::shared_ptr<boost::asio::thread_pool> senders)
+                               std::shared_ptr<boost::asio::thread_pool> senders,
+                               std::shared_ptr<const Security> security)
     : arm_(arm),
-      limits_(limits),
       senders_(std::move(senders)),
-      registry_(limits.max_streams),
-      calibrations_(arm.links().size()) {
+      security_(std::move(security)),
+      registry_(limits.max_streams, limits.max_streams_per_peer),
+      updates_(kMaxUpdateCalls),
+      limits_(limits) {
   for (const LinkDescription& link : arm.links()) link_names_.push_back(link.name);
 }
 
 void TactileService::EndStreams(const std::string& reason) {
   registry_.Close(reason);
-  const std::lock_guard lock(calibrations_mutex_);
-  for (const auto& calibration : calibrations_) {
-    if (const auto stream = calibration.lock()) stream->Refuse({ErrorCode::kUnavailable, reason});
-  }
+  updates_.Close(reason);
+  calibrations_.Close(reason);
+  tares_.Close(reason);
+}
+
+ServiceLimits TactileService::limits() const {
+  const std::lock_guard lock(limits_mutex_);
+  return limits_;
+}
+
+void TactileService::SetLimits(ServiceLimits limits) {
+  registry_.SetMaxStreams(limits.max_streams, limits.max_streams_per_peer);
+  const std::lock_guard lock(limits_mutex_);
+  limits_ = limits;
 }
 
 grpc::ServerUnaryReactor* TactileService::GetArm(grpc::CallbackServerContext* context,
@@ -65,88 +84,131 @@ grpc::ServerUnaryReactor* TactileService::GetArm(grpc::CallbackServerContext* co
 
 StreamReactor* TactileService::StreamFrames(grpc::CallbackServerContext* context,
                                             const grpc::ByteBuffer* request) {
-  auto options = ParseRequest(*request);
-  if (!options) return Refuse(*context, options.error());
+  auto options = ParseStreamRequest(*request, link_names_, limits());
+  if (!options) return Refuse(*context, "StreamFrames", options.error());
   auto stream = std::make_shared<FrameStream>(std::move(*options), link_names_, registry_, senders_);
-  switch (registry_.Add(stream)) {
-    case StreamRegistry::Added::kYes:
-      break;
-    case StreamRegistry::Added::kFull:
-      return Refuse(*context, {ErrorCode::kResourceExhausted,
-                               "all " + std::to_string(limits_.max_streams) +
-                                   " streams are in use; close one or raise limits.max_streams"});
-    case StreamRegistry::Added::kClosed:
-      return Refuse(*context, {ErrorCode::kUnavailable, "server is shutting down"});
-  }
+  if (auto* refused = AddOrRefuse(*context, "StreamFrames", stream)) return refused;
   stream->Begin(arm_.hub());
   return stream.get();  // the registry holds it until gRPC is done
+}
+
+StreamReactor* TactileService::StreamContacts(grpc::CallbackServerContext* context,
+                                              const grpc::ByteBuffer* request) {
+  const auto max_rate_hz = ContactStream::ParseRequest(*request);
+  if (!max_rate_hz) return Refuse(*context, "StreamContacts", max_rate_hz.error());
+  auto stream = std::make_shared<ContactStream>(arm_, *max_rate_hz, registry_, senders_);
+  if (auto* refused = AddOrRefuse(*context, "StreamContacts", stream)) return refused;
+  stream->Begin();
+  return stream.get();  // the registry holds it until gRPC is done
+}
+
+StreamReactor* TactileService::StreamEvents(grpc::CallbackServerContext* context,
+                                            const grpc::ByteBuffer* bytes) {
+  constexpr const char* kCall = "StreamEvents";
+  v1::StreamEventsRequest request;
+  grpc::ByteBuffer copy(*bytes);  // parsing empties it
+  if (!grpc::SerializationTraits<v1::StreamEventsRequest>::Deserialize(&copy, &request).ok())
+    return Refuse(*context, kCall, Invalid("the request is no StreamEventsRequest message"));
+  const auto links = FindLinks(link_names_, request.links());
+  if (!links) return Refuse(*context, kCall, links.error());
+  const auto options = server::ParseRequest(request, *links, arm_.events().history());
+  if (!options) return Refuse(*context, kCall, options.error());
+  auto stream = std::make_shared<EventStream>(link_names_, arm_.clock(), registry_, senders_);
+  if (auto* refused = AddOrRefuse(*context, kCall, stream)) return refused;
+  stream->Begin(arm_.events().history(), options->start, options->filter);
+  return stream.get();
+}
+
+StreamReactor* TactileService::AddOrRefuse(const grpc::CallbackServerContext& context, const char* method,
+                                           std::shared_ptr<PumpedStream> stream) {
+  const auto admitted = registry_.Admit(std::move(stream), PeerOf(context));
+  return admitted ? nullptr : Refuse(context, method, admitted.error());
+}
+
+grpc::ServerReadReactor<v1::UpdateJointStatesRequest>* TactileService::UpdateJointStates(
+    grpc::CallbackServerContext*, v1::UpdateJointStatesResponse* response) {
+  return TakeJointStates(arm_, updates_, *response);
+}
+
+grpc::ServerReadReactor<v1::UpdatePressureRequest>* TactileService::UpdatePressure(
+    grpc::CallbackServerContext*, v1::UpdatePressureResponse* response) {
+  return TakePressure(arm_, updates_, *response);
+}
+
+grpc::ServerUnaryReactor* TactileService::SetThresholds(grpc::CallbackServerContext* context,
+                                                        const v1::SetThresholdsRequest* request,
+                                                        v1::SetThresholdsResponse* response) {
+  const auto link = arm_.FindLink(request->link());
+  const Result<void> set =
+      link ? server::SetThresholds(arm_, *link, *request, Who(*context, *security_), *response)
+           : link.error();
+  if (!set) spdlog::info("{}: SetThresholds refused: {}", PeerOf(*context), set.error().message);
+  auto* reactor = context->DefaultReactor();
+  reactor->Finish(set ? grpc::Status::OK : ToGrpc(set.error()));
+  return reactor;
+}
+
+Result<void> TactileService::OrderCalibration(const std::string& who, const v1::CalibrateRequest& request,
+                                              const std::shared_ptr<CalibrateStream>& stream) {
+  const uint32_t pairs = request.pairs() == 0 ? kDefaultPairs : request.pairs();
+  const auto link = arm_.FindLink(request.link());
+  if (!link) return link.error();
+  if (pairs > kMaxPairs) return Invalid(CountRange("pairs", kDefaultPairs));
+  return arm_.worker(*link).Calibrate(
+      {.pairs = static_cast<int>(pairs), .save = request.save(), .force = request.force()},
+      [stream, &arm = arm_, at = *link, who](const CalibrationProgress& progress) {
+        if (progress.end) arm.events().Post(EventKind::kCalibration, at, ToOperation(*progress.end, who));
+        return stream->Tell(progress);
+      });
 }
 
 grpc::ServerWriteReactor<v1::CalibrateResponse>* TactileService::Calibrate(
     grpc::CallbackServerContext* context, const v1::CalibrateRequest* request) {
   const auto stream = CalibrateStream::Make();
-  const uint32_t pairs = request->pairs() == 0 ? kDefaultPairs : request->pairs();
-  const auto link = FindLink(request->link());
-  Result<void> ordered;
-  if (!link) {
-    ordered = link.error();
-  } else if (pairs > kMaxPairs) {
-    ordered = Invalid("pairs must be 1 to " + std::to_string(kMaxPairs) + ", or 0 for " +
-                      std::to_string(kDefaultPairs));
-  } else {
-    ordered = arm_.worker(*link).Calibrate(
-        {.pairs = static_cast<int>(pairs), .save = request->save(), .force = request->force()},
-        [stream](const CalibrationProgress& progress) { return stream->Tell(progress); });
-  }
+  Result<void> ordered = calibrations_.Add(stream);
+  if (ordered) ordered = OrderCalibration(Who(*context, *security_), *request, stream);
   if (!ordered) {
-    spdlog::info("{}: Calibrate refused: {}", context->peer(), ordered.error().message);
-    stream->Refuse(ordered.error());
-  } else {
-    const std::lock_guard lock(calibrations_mutex_);
-    calibrations_[*link] = stream;
+    spdlog::info("{}: Calibrate refused: {}", PeerOf(*context), ordered.error().message);
+    stream->End(ordered.error());
   }
   return stream.get();  // holds itself until gRPC is done
 }
 
-Result<size_t> TactileService::FindLink(const std::string& name) const {
-  const auto at = std::find(link_names_.begin(), link_names_.end(), name);
-  if (at != link_names_.end()) return static_cast<size_t>(at - link_names_.begin());
-  std::string known;
-  for (const auto& link : link_names_) known += (known.empty() ? "" : ", ") + link;
-  return Error{ErrorCode::kNotFound, "no link '" + name + "'; this arm has " + known};
-}
-
-Result<std::vector<bool>> TactileService::FindLinks(const v1::StreamFramesRequest& request) const {
-  std::vector<bool> wanted;
-  if (request.links().empty()) return wanted;
-  wanted.assign(link_names_.size(), false);
-  for (const std::string& name : request.links()) {
-    const auto link = FindLink(name);
-    if (!link) return link.error();
-    wanted[*link] = true;
+grpc::ServerUnaryReactor* TactileService::Tare(grpc::CallbackServerContext* context,
+                                               const v1::TareRequest* request, v1::TareResponse* response) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  const auto wanted = FindLinks(link_names_, request->links());
+  const uint32_t frames = request->frames() == 0 ? kDefaultTareFrames : request->frames();
+  if (!wanted || frames > kMaxPairs) {
+    const Error error = !wanted ? wanted.error() : Invalid(CountRange("frames", kDefaultTareFrames));
+    spdlog::info("{}: Tare refused: {}", PeerOf(*context), error.message);
+    reactor->Finish(ToGrpc(error));
+    return reactor;
   }
-  return wanted;
-}
-
-Result<FrameStreamOptions> TactileService::ParseRequest(const grpc::ByteBuffer& bytes) const {
-  v1::StreamFramesRequest request;
-  grpc::ByteBuffer copy(bytes);  // parsing empties it
-  if (!grpc::SerializationTraits<v1::StreamFramesRequest>::Deserialize(&copy, &request).ok()) {
-    return Invalid("the request is no StreamFramesRequest message");
+  std::vector<size_t> links;
+  std::vector<std::string> names;
+  for (size_t link = 0; link < link_names_.size(); ++link) {
+    if (!wanted->empty() && !(*wanted)[link]) continue;
+    links.push_back(link);
+    names.push_back(link_names_[link]);
   }
-  if (!v1::Detail_IsValid(request.detail())) return Invalid("detail must be CONTACTS, GEOMETRY or FULL");
-  if (!v1::Delivery_IsValid(request.delivery())) return Invalid("delivery must be LATEST or EVERY");
-  if (!std::isfinite(request.max_rate_hz()) || request.max_rate_hz() < 0) {
-    return Invalid("max_rate_hz must be a positive number of Hz, or 0 for no limit");
+  const auto call = std::make_shared<TareCall>(names, response, reactor);
+  if (const auto added = tares_.Add(call); !added) {
+    call->End(added.error());
+    return reactor;
   }
-  auto links = FindLinks(request);
-  if (!links) return links.error();
-  const bool every = request.delivery() == v1::DELIVERY_EVERY;
-  return FrameStreamOptions{.subscriber = {.links = std::move(*links),
-                                           .delivery = every ? Delivery::kEvery : Delivery::kLatest,
-                                           .max_rate_hz = request.max_rate_hz(),
-                                           .queue_capacity = limits_.queue_messages},
-                            .detail = wire::FromWire(request.detail())};
+  const TareOptions options{.frames = static_cast<int>(frames), .force = request->force()};
+  for (size_t place = 0; place < links.size(); ++place) {
+    const auto observer = [call, place, &arm = arm_, link = links[place], name = names[place],
+                           who = Who(*context, *security_)](const Result<TareSummary>& end) {
+      spdlog::info("{}: tare of link {}: {}", who, name, end ? "done" : end.error().message);
+      arm.events().Post(EventKind::kTare, link, ToOperation(end, who));
+      call->Answer(place, end);
+    };
+    const auto ordered = arm_.worker(links[place]).Tare(options, observer);
+    if (!ordered) observer(ordered.error());
+  }
+  return reactor;
 }
 
 }  // namespace taclink::server

@@ -1,34 +1,49 @@
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "server/arm.h"
 #include "server/rpc/calibrate_stream.h"
+#include "server/rpc/contact_stream.h"
 #include "server/rpc/frame_stream.h"
+#include "server/rpc/joint_state_call.h"
+#include "server/rpc/open_calls.h"
+#include "server/rpc/pressure_call.h"
+#include "server/rpc/service_limits.h"
+#include "server/rpc/stream_registry.h"
+#include "server/rpc/tare_call.h"
+#include "server/security/security.h"
 #include "taclink/v1/tactile.grpc.pb.h"
 
 namespace taclink::server {
-
-struct ServiceLimits {
-  size_t max_streams = 64;
-  size_t queue_messages = 256;
-};
 
 /// taclink.v1.TactileService over a running arm. StreamFrames is raw: its frames are encoded by the hub, once
 /// for all streams.
 class TactileService final
     : public v1::TactileService::WithCallbackMethod_GetArm<
           v1::TactileService::WithRawCallbackMethod_StreamFrames<
-              v1::TactileService::WithCallbackMethod_Calibrate<v1::TactileService::Service>>> {
+              v1::TactileService::WithCallbackMethod_Calibrate<v1::TactileService::WithCallbackMethod_Tare<
+                  v1::TactileService::WithRawCallbackMethod_StreamContacts<
+                      v1::TactileService::WithCallbackMethod_UpdateJointStates<
+                          v1::TactileService::WithCallbackMethod_UpdatePressure<
+                              v1::TactileService::WithRawCallbackMethod_StreamEvents<
+                                  v1::TactileService::WithCallbackMethod_SetThresholds<
+                                      v1::TactileService::Service>>>>>>>>> {
  public:
-  TactileService(Arm& arm, ServiceLimits limits, std::shared_ptr<boost::asio::thread_pool> senders);
+  TactileService(Arm& arm, ServiceLimits limits, std::shared_ptr<boost::asio::thread_pool> senders,
+                 std::shared_ptr<const Security> security);
 
   /// Ends all streams with `reason` and refuses new ones.
   void EndStreams(const std::string& reason);
   size_t streams() const { return registry_.streams(); }
+  void WaitUntilNoStreams(std::chrono::milliseconds patience) const { registry_.WaitUntilEmpty(patience); }
+  /// Of streams that begin from now on.
+  void SetLimits(ServiceLimits limits);
 
  private:
   grpc::ServerUnaryReactor* GetArm(grpc::CallbackServerContext* context, const v1::GetArmRequest* request,
@@ -38,20 +53,41 @@ class TactileService final
   grpc::ServerWriteReactor<v1::CalibrateResponse>* Calibrate(grpc::CallbackServerContext* context,
                                                              const v1::CalibrateRequest* request) override;
 
-  Result<FrameStreamOptions> ParseRequest(const grpc::ByteBuffer& bytes) const;
-  Result<std::vector<bool>> FindLinks(const v1::StreamFramesRequest& request) const;
-  Result<size_t> FindLink(const std::string& name) const;
+  grpc::ServerUnaryReactor* Tare(grpc::CallbackServerContext* context, const v1::TareRequest* request,
+                                 v1::TareResponse* response) override;
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* StreamContacts(grpc::CallbackServerContext* context,
+                                                             const grpc::ByteBuffer* request) override;
+  grpc::ServerReadReactor<v1::UpdateJointStatesRequest>* UpdateJointStates(
+      grpc::CallbackServerContext* context, v1::UpdateJointStatesResponse* response) override;
+  grpc::ServerReadReactor<v1::UpdatePressureRequest>* UpdatePressure(
+      grpc::CallbackServerContext* context, v1::UpdatePressureResponse* response) override;
+
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* StreamEvents(grpc::CallbackServerContext* context,
+                                                           const grpc::ByteBuffer* request) override;
+  grpc::ServerUnaryReactor* SetThresholds(grpc::CallbackServerContext* context,
+                                          const v1::SetThresholdsRequest* request,
+                                          v1::SetThresholdsResponse* response) override;
+
+  Result<void> OrderCalibration(const std::string& who, const v1::CalibrateRequest& request,
+                                const std::shared_ptr<CalibrateStream>& stream);
+  ServiceLimits limits() const;
+  /// Null: added. Else the refused call.
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* AddOrRefuse(const grpc::CallbackServerContext& context,
+                                                          const char* method,
+                                                          std::shared_ptr<PumpedStream> stream);
 
   // Constant after construction.
   Arm& arm_;
-  const ServiceLimits limits_;
   const std::shared_ptr<boost::asio::thread_pool> senders_;
+  const std::shared_ptr<const Security> security_;
   std::vector<std::string> link_names_;
 
   StreamRegistry registry_;
-  std::mutex calibrations_mutex_;
-  // Guarded by calibrations_mutex_: the newest of each link.
-  std::vector<std::weak_ptr<CalibrateStream>> calibrations_;
+  UpdateRegistry updates_;
+  mutable std::mutex limits_mutex_;
+  ServiceLimits limits_;  // guarded by limits_mutex_
+  OpenCalls<CalibrateStream> calibrations_;
+  OpenCalls<TareCall> tares_;
 };
 
 }  // namespace taclink::server

@@ -29,9 +29,8 @@ class ServerTest : public ScratchFolder {
   void StartServer(const std::string& config) {
     server_ = std::make_unique<Process>(
         std::vector<std::string>{TACLINKD, "--config", Write("arm.yaml", config), "--listen", "127.0.0.1:0"});
-    const auto line = server_->ReadUntil("listening on ", seconds(60), true);
-    ASSERT_TRUE(line.has_value());
-    address_ = line->substr(line->find("listening on ") + 13);
+    address_ = AddressOf(*server_);
+    ASSERT_NE(address_, "");
   }
 
   void StartSteadyArm() {
@@ -207,6 +206,25 @@ TEST_F(ServerTest, StoppedClientHarmsNobody) {
   const auto gap = slow.ReadUntil("\"dropped\"", seconds(60));
   ASSERT_TRUE(gap.has_value());
   EXPECT_GT(json::parse(*gap).at("dropped").at("a").get<int>(), 100) << *gap;
+}
+
+TEST_F(ServerTest, TheBenchMeasuresAServerOfItsOwn) {
+  const Finished bench = Taclink({"bench", "server", "--links", "2", "--clients", "3", "--detail", "geometry",
+                                  "--seconds", "1", "--json", Path("bench.json")});
+  ASSERT_EQ(bench.exit_code, 0) << bench.err;
+  const json row = json::parse(std::ifstream(Path("bench.json"))).at(0);
+  EXPECT_EQ(row.at("links"), 2);
+  EXPECT_EQ(row.at("clients"), 3);
+  EXPECT_EQ(row.at("detail"), "geometry");
+  EXPECT_GT(row.at("received").get<int>(), 0);
+  EXPECT_GE(row.at("exposure_to_client_ms").at("p99"), row.at("exposure_to_client_ms").at("p50"));
+  EXPECT_GE(row.at("exposure_to_client_ms").at("p50"), row.at("memory_to_client_ms").at("p50"));
+  EXPECT_GT(row.at("memory_to_client_ms").at("p50").get<double>(), 0);
+  EXPECT_GT(row.at("server_cores").get<double>(), 0);
+  EXPECT_GT(row.at("server_mb").get<double>(), 0);
+  const Finished refused = Taclink({"bench", "server", "--links", "1", "--taclinkd", "/no/such/program"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("/no/such/program"));
 }
 
 TEST_F(ServerTest, BadConfigurationIsRefusedWithFileAndLine) {

@@ -22,6 +22,14 @@ inline Finished Taclink(const std::vector<std::string>& arguments) {
   return RunToEnd(command);
 }
 
+/// Where a server that was just started listens; empty: it does not.
+inline std::string AddressOf(Process& server) {
+  const std::string mark = "listening on ";
+  const auto line = server.ReadUntil(mark, std::chrono::seconds(60), true);
+  EXPECT_TRUE(line.has_value()) << "the server does not listen";
+  return line ? line->substr(line->find(mark) + mark.size()) : "";
+}
+
 inline Vec3 ToVec3(const json& list) {
   return {list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>()};
 }

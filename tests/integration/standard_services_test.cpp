@@ -63,7 +63,7 @@ std::string HealthRequest(const std::string& service) {
 TEST(StandardServices, HealthIsServingForEachService) {
   TestServer server;
   const std::string serving("\x08\x01", 2);
-  for (const char* service : {"", "taclink.v1.TactileService"}) {
+  for (const char* service : {"", "taclink.v1.TactileService", "taclink.v1.OperationsService"}) {
     const Reply reply = Ask(server.server().address(), kHealthCheck, HealthRequest(service));
     EXPECT_TRUE(reply.status.ok()) << reply.status.error_message();
     EXPECT_EQ(reply.text, serving);

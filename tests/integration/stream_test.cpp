@@ -15,12 +15,6 @@ using client::Frame;
 using std::chrono::milliseconds;
 using testing::HasSubstr;
 
-Frame NextOf(client::FrameReader& reader) {
-  auto frame = reader.Next(kForever);
-  EXPECT_TRUE(frame.ok()) << frame.error().message;
-  return frame.ok() ? std::move(*frame) : Frame{};
-}
-
 TEST(Stream, FramesOfTwoLinksReachTwoClientsInOrder) {
   TestServer server;
   auto a = server.Connect(), b = server.Connect();
@@ -85,6 +79,45 @@ TEST(Stream, GetArmTellsAllThereIsToDrawIt) {
   EXPECT_EQ(model.rest_positions_m.size(), static_cast<size_t>(model.paths * model.rings));
   EXPECT_EQ(model.ring_z_m.size(), static_cast<size_t>(model.rings));
   EXPECT_EQ(model.profile_z_m.size(), model.profile_radius_m.size());
+}
+
+TEST(Stream, GetArmTellsHowTheCamerasDo) {
+  TestServer server;
+  server.script(1).Describe(
+      {"pair", 640, 480, 30, {{"usb:1", "/dev/video0", "YUYV 640x480", ""}, {"usb:2", "", "", "unplugged"}}},
+      {.pictures = {11, 12},
+       .rate_hz = {29.5, 0},
+       .lost = {1, 2},
+       .damaged = {3, 4},
+       .unpaired = {5, 6},
+       .stamped_on_arrival = {7, 8},
+       .skipped_pairs = 9,
+       .info_changes = 1});
+  auto client = server.Connect();
+  const auto reader = Stream(client, Every());
+  server.arm().Start();
+  server.script(1).Push(1, server.clock().MonotonicNs());
+  while (NextOf(*reader).times.exposure_ns == 0) {
+  }
+  const auto arm = client.GetArm();
+  ASSERT_TRUE(arm.ok()) << arm.error().message;
+  EXPECT_TRUE(arm->links[0].cameras.empty());
+  EXPECT_EQ(arm->links[1].pairs_skipped, 9u);
+  ASSERT_EQ(arm->links[1].cameras.size(), 2u);
+  const client::Camera& top = arm->links[1].cameras[0];
+  const client::Camera& bottom = arm->links[1].cameras[1];
+  EXPECT_EQ(top.name, "top");
+  EXPECT_EQ(top.configured, "usb:1");
+  EXPECT_EQ(top.device, "/dev/video0");
+  EXPECT_EQ(top.format, "YUYV 640x480");
+  EXPECT_EQ(top.rate_hz, 29.5);
+  EXPECT_EQ(bottom.name, "bottom");
+  EXPECT_EQ(bottom.trouble, "unplugged");
+  EXPECT_EQ(bottom.pictures, 12u);
+  EXPECT_EQ(bottom.lost, 2u);
+  EXPECT_EQ(bottom.damaged, 4u);
+  EXPECT_EQ(bottom.unpaired, 6u);
+  EXPECT_EQ(bottom.stamped_on_arrival, 8u);
 }
 
 TEST(Stream, EachLevelOfDetailHoldsWhatItPromises) {
@@ -241,7 +274,7 @@ TEST(Stream, ShutdownIsToldToEveryStream) {
     auto frame = reader->Next(kForever);
     while (frame.ok()) frame = reader->Next(kForever);
     EXPECT_EQ(frame.error().code, ErrorCode::kUnavailable);
-    EXPECT_THAT(frame.error().message, HasSubstr("server is shutting down"));
+    EXPECT_THAT(frame.error().message, HasSubstr("the server ended the stream: server is shutting down"));
   }
   stop.join();
 }

@@ -13,47 +13,32 @@
 #include "server/assembly/encoder.h"
 #include "server/rpc/rpc_server.h"
 #include "tests/server/support.h"
+#include "tests/server/test_state.h"
 
 namespace taclink::server {
 
 inline constexpr size_t kQueueMessages = 32;
 inline constexpr size_t kMaxStreams = 4;
 
-/// A state whose every number follows from link and sequence.
-inline void FillTestState(size_t link, uint64_t sequence, LinkState& state) {
-  constexpr size_t kMarkers = 256;
-  const auto number = static_cast<double>(sequence);
-  state.sequence = sequence;
-  state.status = LinkStatus::kOk;
-  state.status_reason.clear();
-  state.pressure_mpa = 0.001 * number;
-  state.shape.positions_mm.assign(kMarkers, Vec3(number, static_cast<double>(link), 3));
-  state.shape.displacements_mm.assign(kMarkers, Vec3(0, 0, number));
-  state.shape.covariances_mm2.assign(kMarkers, Mat3::Identity());
-  state.shape.sources.assign(kMarkers, MarkerSource::kBoth);
-  state.forces.forces_n.assign(kMarkers, Vec3(0.5, 0, 0));
-  state.forces.sigmas_n.assign(kMarkers, 0.25);
-  Contact contact;
-  contact.id = 7;
-  contact.center_mm = Vec3(36.5, 0, number);
-  contact.normal = Vec3::UnitX();
-  contact.force_n = Vec3(-0.1 * number, 0, 0);
-  contact.normal_force_n = 0.1 * number;
-  contact.area_mm2 = 100;
-  state.contacts.assign(1, contact);
-  state.total_force_n = contact.force_n;
+inline ServiceLimits TestLimits() {
+  return {.max_streams = kMaxStreams, .queue_messages = kQueueMessages};
 }
 
 /// A server of two links, "upper" and "lower", on a free port. Frames come either through fake sources and
 /// the workers (after arm().Start()) or straight into the hub.
 class TestServer {
  public:
-  TestServer() {
-    for (size_t link = 0; link < 2; ++link) links_.push_back(MakeLink(link));
-    arm_ = std::make_unique<Arm>("test", std::move(links_), MakeEncoder({"upper", "lower"}), clock_,
-                                 LinkWorkerOptions{.poll = std::chrono::milliseconds(5)});
-    auto server = RpcServer::Start("127.0.0.1:0", *arm_,
-                                   {.max_streams = kMaxStreams, .queue_messages = kQueueMessages});
+  using MakePressure = std::function<std::unique_ptr<PressureSource>(size_t link, Clock& clock)>;
+  explicit TestServer(ServiceLimits limits = TestLimits(), std::unique_ptr<ArmPoses> poses = nullptr,
+                      const MakePressure& pressure = {}) {
+    for (size_t link = 0; link < 2; ++link) {
+      links_.push_back(MakeLink(link));
+      if (pressure) links_.back().pressure = pressure(link, clock_);
+    }
+    arm_ =
+        std::make_unique<Arm>("test", std::move(links_), CountingEncoder(), clock_,
+                              ArmOptions{.worker = {.poll = std::chrono::milliseconds(5)}}, std::move(poses));
+    auto server = RpcServer::Start("127.0.0.1:0", *arm_, limits);
     EXPECT_TRUE(server.ok()) << server.error().message;
     server_ = std::move(*server);
   }
@@ -70,10 +55,24 @@ class TestServer {
     return std::move(*client);
   }
 
-  void Publish(size_t link, uint64_t sequence, int64_t published_ns = 0) {
+  /// Encodings so far, by level of detail.
+  std::array<int, kDetailCount> encoded() const {
+    std::array<int, kDetailCount> out{};
+    for (size_t i = 0; i < kDetailCount; ++i) out[i] = (*encoded_)[i];
+    return out;
+  }
+
+  void Publish(size_t link, uint64_t sequence, int64_t published_ns = 0, int64_t exposure_ns = 0) {
+    PublishNumbered(link, sequence, sequence, published_ns, exposure_ns);
+  }
+  /// With the numbers of the state `number`.
+  void PublishNumbered(size_t link, uint64_t sequence, uint64_t number, int64_t published_ns,
+                       int64_t exposure_ns = 0) {
     auto* state = new LinkState;
-    FillTestState(link, sequence, *state);
+    FillTestState(link, number, *state);
+    state->sequence = sequence;
     state->times.published_ns = published_ns;
+    state->times.exposure_monotonic_ns = exposure_ns;
     ++*alive_;
     arm_->hub().Publish(link, {state, [alive = alive_](const LinkState* done) {
                                  --*alive;
@@ -84,6 +83,13 @@ class TestServer {
   void Stop() { server_->Shutdown("server is shutting down", kForever); }
 
  private:
+  FrameEncoder CountingEncoder() const {
+    return [encode = MakeEncoder({"upper", "lower"}), encoded = encoded_](size_t link, const LinkState& state,
+                                                                          Detail detail) {
+      ++(*encoded)[Index(detail)];
+      return encode(link, state, detail);
+    };
+  }
   LinkParts MakeLink(size_t link) {
     auto model = LoadLinkModel(link == 0 ? "cylinder" : "barrel");
     EXPECT_TRUE(model.ok());
@@ -97,11 +103,15 @@ class TestServer {
         .processor = std::make_unique<FakeProcessor>([link](const StereoFrame& frame, LinkState& state) {
           FillTestState(link, frame.sequence, state);
           state.times = frame.times;
+          state.pressure = frame.pressure;
+          if (frame.pressure.origin != PressureOrigin::kNone) state.pressure_mpa = frame.pressure_mpa;
         })};
   }
 
   ManualClock clock_;
   const std::shared_ptr<std::atomic<int>> alive_ = std::make_shared<std::atomic<int>>(0);
+  const std::shared_ptr<std::array<std::atomic<int>, kDetailCount>> encoded_ =
+      std::make_shared<std::array<std::atomic<int>, kDetailCount>>();
   std::vector<std::shared_ptr<SourceScript>> scripts_;
   std::vector<LinkParts> links_;
   std::unique_ptr<Arm> arm_;
@@ -113,6 +123,12 @@ inline std::unique_ptr<client::FrameReader> Stream(client::Client& client,
   auto reader = client.StreamFrames(options);
   EXPECT_TRUE(reader.ok()) << reader.error().message;
   return reader.ok() ? std::move(*reader) : nullptr;
+}
+
+inline client::Frame NextOf(client::FrameReader& reader) {
+  auto frame = reader.Next(kForever);
+  EXPECT_TRUE(frame.ok()) << frame.error().message;
+  return frame.ok() ? std::move(*frame) : client::Frame{};
 }
 
 inline client::StreamOptions Every(client::Detail detail = client::Detail::kContacts) {

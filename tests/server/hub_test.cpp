@@ -69,11 +69,11 @@ TEST(Hub, OnlyWantedLinksArrive) {
 }
 
 TEST(Hub, StoppedSubscribersHoldABoundedNumberOfStates) {
+  std::atomic<int> alive = 0;  // outlives the hub, which holds the newest
   Hub hub(2, Encode);
   const auto every = hub.Subscribe({.delivery = Delivery::kEvery, .queue_capacity = 16}, [] {});
   const auto other = hub.Subscribe({.delivery = Delivery::kEvery, .queue_capacity = 16}, [] {});
   const auto latest = hub.Subscribe({.delivery = Delivery::kLatest}, [] {});
-  std::atomic<int> alive = 0;
   int most_alive = 0;
   for (uint64_t i = 0; i < 5000; ++i) {
     ++alive;
@@ -86,6 +86,64 @@ TEST(Hub, StoppedSubscribersHoldABoundedNumberOfStates) {
   EXPECT_LE(most_alive, 16 + 2 + 1);  // those who stopped hold the same newest ones
   EXPECT_EQ(every->dropped(), 5000u - 16);
   EXPECT_EQ(latest->dropped(), 5000u - 2);
+}
+
+// States of `markers` markers that are encoded to `encoded_bytes`.
+size_t MostWaitingBytes(size_t markers, size_t encoded_bytes, size_t queue_bytes, Subscription& reader,
+                        Hub& hub) {
+  size_t most = 0;
+  for (uint64_t i = 1; i <= 100; ++i) {
+    auto state = std::make_shared<LinkState>();
+    state->sequence = i;
+    state->shape.positions_mm.resize(markers);
+    hub.Publish(0, state);
+    const auto taken = reader.Take();
+    EXPECT_EQ(taken->Encoded(Detail::kFull)->size(), encoded_bytes);
+    most = std::max(most, reader.waiting_bytes());
+    EXPECT_LE(most, queue_bytes);
+  }
+  return most;
+}
+
+TEST(Hub, EveryIsBoundedInBytesToo) {
+  constexpr size_t kMarkers = 1000, kEncoded = 10'000, kBytes = 400'000;
+  Hub hub(1, [](size_t, const LinkState&, Detail) { return std::string(kEncoded, 'x'); });
+  const SubscriberOptions options{
+      .delivery = Delivery::kEvery, .queue_capacity = 64, .queue_bytes = kBytes, .detail = Detail::kFull};
+  const auto stopped = hub.Subscribe(options, [] {}), reader = hub.Subscribe(options, [] {});
+  MostWaitingBytes(kMarkers, kEncoded, kBytes, *reader, hub);
+  const size_t each = sizeof(LinkState) + kMarkers * sizeof(Vec3) + kEncoded;
+  EXPECT_LE(stopped->waiting_bytes(), kBytes);
+  EXPECT_NEAR(static_cast<double>(stopped->waiting()), static_cast<double>(kBytes / each), 1);
+  const auto counts = stopped->Counts();
+  EXPECT_EQ(counts[0].dropped + stopped->waiting(), 100u);
+  EXPECT_EQ(counts[0].dropped_for_bytes, counts[0].dropped);
+  EXPECT_EQ(reader->dropped(), 0u);
+  const size_t waiting = stopped->waiting();
+  EXPECT_EQ(TakeAll(*stopped).size(), waiting);
+  EXPECT_EQ(stopped->waiting_bytes(), 0u);
+}
+
+TEST(Hub, TheNewestStateWaitsHoweverLargeItIs) {
+  Hub hub(1, Encode);
+  const auto subscription = hub.Subscribe({.delivery = Delivery::kEvery, .queue_bytes = 1}, [] {});
+  for (uint64_t i = 1; i <= 3; ++i) hub.Publish(0, MakeState(i));
+  EXPECT_EQ(TakeAll(*subscription), (std::vector<uint64_t>{3}));
+  EXPECT_EQ(subscription->Counts()[0].dropped_for_bytes, 2u);
+}
+
+TEST(Hub, WhatNobodyTakesIsNotEncoded) {
+  std::atomic<int> encoded = 0;
+  Hub hub(1, [&](size_t, const LinkState&, Detail) { return ++encoded, std::string(); });
+  for (uint64_t i = 1; i <= 10; ++i) hub.Publish(0, MakeState(i));
+  const auto latest = hub.Subscribe({}, [] {});
+  const auto every = hub.Subscribe({.delivery = Delivery::kEvery, .queue_capacity = 2}, [] {});
+  for (uint64_t i = 11; i <= 20; ++i) hub.Publish(0, MakeState(i));
+  EXPECT_EQ(encoded, 0);
+  while (const auto publication = latest->Take()) publication->Encoded(Detail::kGeometry);
+  EXPECT_EQ(encoded, 1) << "the newest; the others were dropped";
+  while (const auto publication = every->Take()) publication->Encoded(Detail::kGeometry);
+  EXPECT_EQ(encoded, 2) << "two wait, one of them is encoded already";
 }
 
 TEST(Hub, EncodesOnceForAllAndOnlyWhatIsAsked) {

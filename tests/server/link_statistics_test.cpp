@@ -35,5 +35,15 @@ TEST(LinkStatistics, ASourceThatStoppedHasNoRate) {
   EXPECT_EQ(collector.Snapshot(10'000 * kMs).rate_hz, 0);
 }
 
+TEST(LinkStatistics, BadPicturesAreCountedByCamera) {
+  LinkStatisticsCollector collector;
+  std::array<CameraCounts, kCameraCount> cameras;
+  collector.RecordPictures(cameras);
+  cameras[1].bad_picture = true;
+  collector.RecordPictures(cameras);
+  collector.RecordPictures(cameras);
+  EXPECT_EQ(collector.Snapshot(0).bad_pictures, (std::array<uint64_t, kCameraCount>{0, 2}));
+}
+
 }  // namespace
 }  // namespace taclink::server

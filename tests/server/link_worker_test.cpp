@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "tests/server/gate.h"
 #include "tests/server/support.h"
 
 namespace taclink::server {
@@ -13,32 +14,6 @@ namespace {
 
 using std::chrono::milliseconds;
 using testing::HasSubstr;
-
-/// Lets a thread wait until the test opens it.
-class Gate {
- public:
-  void Open() {
-    const std::lock_guard lock(mutex_);
-    open_ = true;
-    changed_.notify_all();
-  }
-  void Pass() {
-    std::unique_lock lock(mutex_);
-    ++arrived_;
-    changed_.notify_all();
-    changed_.wait(lock, [this] { return open_; });
-  }
-  void WaitForArrival() {
-    std::unique_lock lock(mutex_);
-    ASSERT_TRUE(changed_.wait_for(lock, kForever, [this] { return arrived_ > 0; }));
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool open_ = false;
-  int arrived_ = 0;
-};
 
 void Copy(const StereoFrame& frame, LinkState& state) {
   state.times = frame.times;
@@ -267,6 +242,74 @@ TEST_F(LinkWorkerTest, StoppingEndsACalibration) {
   ASSERT_TRUE(worker_->Calibrate({}, log.Observer()).ok());
   worker_->Stop();
   EXPECT_EQ(log.Wait(1).end->error().code, ErrorCode::kUnavailable);
+}
+
+/// The one answer that a tare gives.
+struct TareAnswer {
+  TareObserver Observer() {
+    return [this](const Result<TareSummary>& end) {
+      const std::lock_guard lock(mutex);
+      answers.push_back(end);
+      changed.notify_all();
+    };
+  }
+  Result<TareSummary> Wait() {
+    std::unique_lock lock(mutex);
+    EXPECT_TRUE(changed.wait_for(lock, kForever, [&] { return !answers.empty(); }));
+    return answers.front();
+  }
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<Result<TareSummary>> answers;
+};
+
+TEST_F(LinkWorkerTest, ATareTakesTheNextFramesAndEnds) {
+  Run(Copy);
+  TareAnswer answer, second;
+  ASSERT_TRUE(worker_->Tare({.frames = 2, .force = true}, answer.Observer()).ok());
+  EXPECT_EQ(worker_->Tare({}, second.Observer()).error().code, ErrorCode::kFailedPrecondition);
+  for (uint64_t i = 1; i <= 4; ++i) {
+    script_->Push(i);
+    ASSERT_EQ(NextFrame()->state().status, LinkStatus::kOk) << "frames go on";
+  }
+  const auto end = answer.Wait();
+  ASSERT_TRUE(end.ok());
+  EXPECT_EQ(end->frames, 2);
+  EXPECT_TRUE(end->forced);
+  EXPECT_TRUE(worker_->Tare({}, second.Observer()).ok()) << "room for the next";
+  worker_->Stop();
+}
+
+TEST_F(LinkWorkerTest, ATareMayBeRefused) {
+  Run(Copy, Error{ErrorCode::kFailedPrecondition, "touched"});
+  TareAnswer answer;
+  ASSERT_TRUE(worker_->Tare({}, answer.Observer()).ok());
+  EXPECT_EQ(answer.Wait().error().message, "touched");
+}
+
+TEST_F(LinkWorkerTest, ATareWithoutFramesEnds) {
+  Run(Copy);
+  TareAnswer answer;
+  ASSERT_TRUE(worker_->Tare({.frames = 300}, answer.Observer()).ok());
+  std::thread time([&] {
+    while (true) {
+      const std::lock_guard lock(answer.mutex);
+      if (!answer.answers.empty()) return;
+      clock_.Advance(std::chrono::seconds(1));
+    }
+  });
+  const auto end = answer.Wait();
+  time.join();
+  EXPECT_EQ(end.error().code, ErrorCode::kUnavailable);
+}
+
+TEST_F(LinkWorkerTest, StoppingEndsATare) {
+  Run(Copy);
+  TareAnswer answer;
+  ASSERT_TRUE(worker_->Tare({.frames = 300}, answer.Observer()).ok());
+  worker_->Stop();
+  EXPECT_THAT(answer.Wait().error().message, HasSubstr("stopping"));
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ TEST_F(SupervisorTest, StartsAndDelivers) {
 TEST_F(SupervisorTest, PausesGrowToTheLongest) {
   script_->FailStarts(-1);
   EXPECT_EQ(UntilNextStart(), milliseconds(0));
-  for (const int pause : {100, 200, 400, 800, 1600, 2000, 2000})
+  for (const int pause : {100, 200, 400, 500, 500, 500, 500})
     EXPECT_EQ(UntilNextStart(), milliseconds(pause));
   EXPECT_EQ(supervisor_.condition().state, State::kLost);
   EXPECT_THAT(supervisor_.condition().reason, HasSubstr("no camera"));
@@ -63,7 +63,7 @@ TEST_F(SupervisorTest, OnlyAFrameEndsTheBackoff) {
     script_->PushError(ErrorCode::kUnavailable, "unplugged");
     EXPECT_FALSE(Step());
   }
-  EXPECT_EQ(UntilNextStart(), milliseconds(800));
+  EXPECT_EQ(UntilNextStart(), milliseconds(500));
   script_->Push(1);
   EXPECT_TRUE(Step());
   script_->PushError(ErrorCode::kUnavailable, "unplugged");
@@ -82,6 +82,35 @@ TEST_F(SupervisorTest, ASilentSourceIsStartedAgain) {
   EXPECT_EQ(supervisor_.condition().state, State::kLost);
   EXPECT_THAT(supervisor_.condition().reason, HasSubstr("no frame for 2 s"));
   EXPECT_EQ(UntilNextStart(), milliseconds(100));
+}
+
+TEST_F(SupervisorTest, ASourceThatFallsSilentIsLostBeforeItIsStartedAgain) {
+  EXPECT_FALSE(Step());
+  script_->Push(1);
+  EXPECT_TRUE(Step());
+  clock_.Advance(milliseconds(400));
+  EXPECT_FALSE(Step());
+  EXPECT_EQ(supervisor_.condition().state, State::kRunning);
+  clock_.Advance(milliseconds(150));
+  EXPECT_FALSE(Step());
+  EXPECT_EQ(supervisor_.condition().state, State::kLost);
+  EXPECT_THAT(supervisor_.condition().reason, HasSubstr("silent; waiting"));
+  script_->Push(2);
+  EXPECT_TRUE(Step());
+  EXPECT_EQ(supervisor_.condition().state, State::kRunning);
+  EXPECT_EQ(script_->starts(), 1);
+}
+
+TEST_F(SupervisorTest, WhatTheSourceSaysOfItselfIsPassedOn) {
+  EXPECT_FALSE(Step());
+  script_->Describe({"fake", 640, 480, 30, {{"usb:1", "", "", "usb:1: unplugged"}, {"usb:2", "", "", ""}}},
+                    {.pictures = {7, 8}, .info_changes = 1});
+  script_->Push(1);
+  EXPECT_TRUE(Step());
+  const auto condition = supervisor_.condition();
+  ASSERT_EQ(condition.info.cameras.size(), 2u);
+  EXPECT_EQ(condition.info.cameras[0].trouble, "usb:1: unplugged");
+  EXPECT_EQ(condition.counters.pictures[1], 8u);
 }
 
 TEST_F(SupervisorTest, AnEndIsNotAFailure) {

@@ -75,6 +75,12 @@ class SourceScript {
     steps_.push_back(std::move(step));
     changed_.notify_all();
   }
+  /// What the source says of itself from now on.
+  void Describe(SourceInfo info, SourceCounters counters) {
+    const std::lock_guard lock(mutex_);
+    info_ = std::move(info);
+    counters_ = counters;
+  }
   void FailStarts(int count, ErrorCode code = ErrorCode::kUnavailable) {
     const std::lock_guard lock(mutex_);
     failing_starts_ = count;
@@ -114,8 +120,19 @@ class SourceScript {
     return step(frame);
   }
 
+  SourceInfo Info() const {
+    const std::lock_guard lock(mutex_);
+    return info_;
+  }
+  SourceCounters Counters() const {
+    const std::lock_guard lock(mutex_);
+    return counters_;
+  }
+
   mutable std::mutex mutex_;
   std::condition_variable changed_;
+  SourceInfo info_{"fake", 640, 480, 30};
+  SourceCounters counters_;
   std::deque<std::function<Result<void>(StereoFrame&)>> steps_;
   bool waiting_ = false;
   int starts_ = 0;
@@ -130,7 +147,8 @@ class FakeSource final : public FrameSource {
   Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override {
     return script_->Next(frame, timeout);
   }
-  SourceInfo Info() const override { return {"fake", 640, 480, 30}; }
+  SourceInfo Info() const override { return script_->Info(); }
+  SourceCounters Counters() const override { return script_->Counters(); }
 
  private:
   const std::shared_ptr<SourceScript> script_;
@@ -164,11 +182,26 @@ class FakeProcessor final : public LinkProcessor {
   }
   void CancelCalibration() override { calibrating_ = false; }
 
+  Result<void> BeginTare(const TareOptions& options) override {
+    if (refusal_) return *refusal_;
+    tare_ = options;
+    tare_taken_ = 0;
+    return {};
+  }
+  std::optional<Result<TareSummary>> TakeTareEnd() override {
+    if (!tare_ || ++tare_taken_ < tare_->frames) return {};
+    const TareOptions done = *std::exchange(tare_, std::nullopt);
+    return TareSummary{.frames = done.frames, .forced = done.force, .shift_mm = 0.125, .previous_age_s = 60};
+  }
+  void CancelTare() override { tare_.reset(); }
+
  private:
   const Function process_;
   const std::optional<Error> refusal_;
   bool calibrating_ = false;
   int taken_ = 0, wanted_ = 0;
+  std::optional<TareOptions> tare_;
+  int tare_taken_ = 0;
 };
 
 /// Takes a subscription's states one by one, waiting for them.

@@ -37,6 +37,7 @@ constexpr double kMaxOffsetNs = (0.5 + FramePairer::kHysteresisFrames) * kInterv
 // Vivid's own controls; their numbers are in the kernel's vivid-ctrls.c.
 constexpr uint32_t kTimestampSource = 0x00f0f018;
 constexpr uint32_t kWrapSequence = 0x00f0f026;
+constexpr uint32_t kWrapTimestamp = 0x00f0f027;
 constexpr uint32_t kPercentDropped = 0x00f0f040;
 constexpr uint32_t kDisconnect = 0x00f0f041;
 constexpr uint32_t kInjectBufferError = 0x00f0f042;
@@ -80,6 +81,7 @@ class Vivid : public testing::Test {
     for (const char* path : {kTopPath, kBottomPath}) {
       SetVivid(path, kTimestampSource, 1);  // the start of exposure, not when the picture was drawn at last
       SetVivid(path, kWrapSequence, 0);
+      SetVivid(path, kWrapTimestamp, 0);
       SetVivid(path, kPercentDropped, 0);
     }
   }
@@ -214,12 +216,13 @@ TEST_F(Vivid, ControlsThatItLacksOrCanNotDoAreNamed) {
 
 TEST_F(Vivid, WrongDevicesAreNamed) {
   V4l2Options options = SmallCameras();
-  options.devices[1] = "/dev/video7";
+  options.devices = {"/dev/video6", "/dev/video7"};
   const auto started = MakeV4l2Source(options, SystemClock())->Start();
   ASSERT_FALSE(started);
   EXPECT_EQ(started.error().code, ErrorCode::kUnavailable);
   EXPECT_THAT(started.error().message,
-              AllOf(HasSubstr("bottom camera /dev/video7"), HasSubstr("plugged in")));
+              AllOf(HasSubstr("top camera /dev/video6"), HasSubstr("plugged in"),
+                    HasSubstr("bottom camera /dev/video7"), HasSubstr("There are /dev/video0 'vivid-000")));
   for (const char* path : {"/etc/passwd", "/dev/null"}) {
     EXPECT_EQ(OpenError(SmallCamera(path)).code, ErrorCode::kInvalidArgument);
     EXPECT_THAT(OpenError(SmallCamera(path)).message, AllOf(HasSubstr(path), HasSubstr("is not a camera")));
@@ -240,6 +243,23 @@ TEST_F(Vivid, FormatsThatItLacksAreNamedWithWhatItOffers) {
   options.frame_rate_hz = 17;
   EXPECT_EQ(OpenError(options).code, ErrorCode::kUnsupported);
   EXPECT_THAT(OpenError(options).message, AllOf(HasSubstr("17 frames"), HasSubstr("10, 12.5, 15, 25")));
+}
+
+TEST_F(Vivid, WithoutAFormatTheCameraChooses) {
+  V4l2DeviceOptions options = SmallCamera();
+  options.format = std::nullopt;
+  {
+    const auto camera = V4l2Device::Open(options);
+    ASSERT_TRUE(camera) << camera.error().message;
+    EXPECT_EQ(camera->format(), PixelFormat::kYuyv);
+  }
+  options.width_px = 333;
+  EXPECT_THAT(OpenError(options).message,
+              AllOf(HasSubstr("does not give 333x180"), HasSubstr("YUYV 320x180")));
+  options = SmallCamera();
+  options.format = std::nullopt;
+  options.frame_rate_hz = 17;
+  EXPECT_THAT(OpenError(options).message, HasSubstr("17 frames"));
 }
 
 TEST_F(Vivid, ABusyDeviceIsNamed) {
@@ -297,34 +317,58 @@ TEST_F(Vivid, SequenceRisesAcrossTheDriversWrap) {
   EXPECT_NEAR(static_cast<double>(last - first.sequence), elapsed_frames, 2);
 }
 
-/// Next until it fails; what it says then.
-Error UntilLost(FrameSource& source, StereoFrame& frame) {
-  for (int i = 0; i < 100; ++i) {
-    if (const auto got = source.Next(frame, kLongEnough); !got) return got.error();
-  }
-  return {ErrorCode::kInternal, "it goes on"};
-}
-
-class Loss : public Vivid, public testing::WithParamInterface<uint32_t> {};
-
-TEST_P(Loss, IsReportedAndStartTakesTheCameraBack) {
+TEST_F(Vivid, TimestampsThatWrapAreReplacedByTheTimeOfArrival) {
+  for (const char* path : {kTopPath, kBottomPath}) SetVivid(path, kWrapTimestamp, 1);  // in 16 s
   const auto source = MakeV4l2Source(SmallCameras(), SystemClock());
   ASSERT_TRUE(source->Start());
   StereoFrame frame;
   ASSERT_TRUE(source->Next(frame, kLongEnough));
-  SetVivid(kBottomPath, GetParam(), 1);
-  const Error lost = UntilLost(*source, frame);
-  EXPECT_EQ(lost.code, ErrorCode::kUnavailable) << lost.message;
-  EXPECT_THAT(lost.message, HasSubstr("bottom camera /dev/video1"));
-  EXPECT_EQ(source->Next(frame, kLongEnough).error().code, ErrorCode::kUnavailable);
-  const uint64_t before = frame.sequence;
-
-  const auto restarted = source->Start();  // vivid plugs itself in again when its last user has gone
-  ASSERT_TRUE(restarted) << restarted.error().message;
-  for (int i = 0; i < 5; ++i) {
+  const int64_t first_ns = frame.times.exposure_monotonic_ns;
+  StereoFrame last = frame;
+  while (frame.times.exposure_monotonic_ns - first_ns < int64_t{18'000'000'000}) {
     const auto got = source->Next(frame, kLongEnough);
     ASSERT_TRUE(got) << got.error().message;
-    EXPECT_GT(frame.sequence, before);
+    ASSERT_TRUE(frame.images[0].valid && frame.images[1].valid);
+    ASSERT_GT(frame.times.exposure_monotonic_ns, last.times.exposure_monotonic_ns);
+    ASSERT_LE(frame.times.exposure_monotonic_ns, frame.times.received_ns);
+    ASSERT_GT(frame.sequence, last.sequence);
+    last = frame;
+  }
+  EXPECT_GT(source->Counters().stamped_on_arrival[0], 150u);
+}
+
+class Loss : public Vivid, public testing::WithParamInterface<uint32_t> {};
+
+TEST_P(Loss, LeavesTheOtherCameraAndIsMended) {
+  const auto source = MakeV4l2Source(SmallCameras(), SystemClock());
+  ASSERT_TRUE(source->Start());
+  StereoFrame frame;
+  ASSERT_TRUE(source->Next(frame, kLongEnough));
+  // Takes frames, none of which lacks the top camera, until then; how long it took.
+  const auto until = [&](const auto& then) {
+    const int64_t before_ns = SystemClock().MonotonicNs();
+    for (int i = 0; i < 100; ++i) {
+      const uint64_t last = frame.sequence;
+      const auto got = source->Next(frame, kLongEnough);
+      EXPECT_TRUE(got) << got.error().message;
+      if (!got) break;
+      EXPECT_TRUE(frame.images[Index(CameraId::kTop)].valid);
+      EXPECT_GT(frame.sequence, last);
+      if (then()) return 1e-9 * static_cast<double>(SystemClock().MonotonicNs() - before_ns);
+    }
+    return 1e9;
+  };
+  const uint64_t changes = source->Counters().info_changes;
+  SetVivid(kBottomPath, GetParam(), 1);
+  const double to_notice_s = until([&] { return source->Counters().info_changes > changes; });
+  // Vivid plugs itself in again when its last user has gone.
+  const double to_mend_s = until([&] { return frame.images[Index(CameraId::kBottom)].valid; });
+  std::printf("noticed after %.2f s, mended after %.2f s\n", to_notice_s, to_mend_s);
+  EXPECT_LE(to_notice_s, 1);
+  EXPECT_LE(to_mend_s, 2);
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(source->Next(frame, kLongEnough));
+    EXPECT_TRUE(frame.images[0].valid && frame.images[1].valid);
   }
 }
 

@@ -27,6 +27,11 @@ LinkState MakeState(int markers) {
   state.status = LinkStatus::kDegraded;
   state.status_reason = "bottom camera lost; check its cable";
   state.pressure_mpa = 0.002;
+  state.pressure = {.origin = PressureOrigin::kSerial,
+                    .stale = true,
+                    .mpa = 0.002,
+                    .age_ns = 1'500'000'000,
+                    .trouble = "unplugged"};
   state.cameras = {{{240, 230}, {239, 228}}};
   state.tracking = {.mode = TrackingMode::kTracked,
                     .reason = AcquireReason::kLoss,
@@ -55,6 +60,10 @@ LinkState MakeState(int markers) {
   state.contacts = {contact, Contact{}};
   state.total_force_n = contact.force_n;
   state.baseline_age_s = 61.5;
+  state.baseline = {.origin = BaselineOrigin::kForcedTare,
+                    .taken_utc_ns = 1700000000000000001,
+                    .drift_mm = 0.25,
+                    .drift_state = DriftState::kHeld};
   state.stage_ms = {.decode = 1, .detect = 2, .register_ = 3, .reconstruct = 4, .force = 5};
   return state;
 }
@@ -84,6 +93,15 @@ TEST(FrameCodec, FullComesBack) {
   EXPECT_EQ(back.status, state.status);
   EXPECT_EQ(back.status_reason, state.status_reason);
   EXPECT_DOUBLE_EQ(back.pressure_mpa.value(), 0.002);
+  EXPECT_EQ(back.baseline.origin, BaselineOrigin::kForcedTare);
+  EXPECT_EQ(back.baseline.taken_utc_ns, state.baseline.taken_utc_ns);
+  EXPECT_DOUBLE_EQ(back.baseline.drift_mm, 0.25);
+  EXPECT_EQ(back.baseline.drift_state, DriftState::kHeld);
+  EXPECT_EQ(back.pressure.origin, PressureOrigin::kSerial);
+  EXPECT_TRUE(back.pressure.stale);
+  EXPECT_DOUBLE_EQ(back.pressure.mpa, 0.002);
+  EXPECT_EQ(back.pressure.age_ns, 1'500'000'000);
+  EXPECT_EQ(back.pressure.trouble, "unplugged");
   EXPECT_EQ(back.cameras[1].labelled, 228);
   EXPECT_EQ(back.tracking.mode, TrackingMode::kTracked);
   EXPECT_EQ(back.tracking.reason, AcquireReason::kLoss);
@@ -170,6 +188,15 @@ TEST(FrameCodec, BadBytesAreRefused) {
   Fill(kLink, MakeState(4), Detail::kFull, frame);
   frame.add_displacements_m(1);
   EXPECT_FALSE(FromWire(frame).ok());
+}
+
+TEST(FrameCodec, TheMarkTellsThatNothingChanged) {
+  v1::LinkFrame frame;
+  ASSERT_TRUE(frame.ParseFromString(EncodeFrame({"a", 1}, LinkState{}, Detail::kContacts)));
+  EXPECT_FALSE(frame.unchanged());
+  ASSERT_TRUE(frame.ParseFromString(EncodeFrame({"a", 1}, LinkState{}, Detail::kContacts) + UnchangedMark()));
+  EXPECT_TRUE(frame.unchanged());
+  EXPECT_EQ(frame.link(), "a");
 }
 
 }  // namespace

@@ -62,6 +62,18 @@ class FileSourceTest : public testing::Test {
   StereoFrame frame_;
 };
 
+TEST_F(FileSourceTest, PicturesInMemoryOutliveTheirFiles) {
+  WritePairs(2);
+  const auto source = MakeFileSource({.folder = folder_.path(), .paced = false, .in_memory = true}, clock_);
+  ASSERT_TRUE(source->Start().ok());
+  std::filesystem::remove_all(folder_.path());
+  for (const int expected : {1, 2, 1}) {
+    ASSERT_TRUE(source->Next(frame_, milliseconds(0)).ok());
+    EXPECT_EQ(Seed(CameraId::kTop), expected);
+    EXPECT_EQ(Seed(CameraId::kBottom), 100 + expected);
+  }
+}
+
 TEST_F(FileSourceTest, GivesPairsInTheOrderOfTheirNumbers) {
   // As text, 10 comes before 9; digits need not be as many.
   for (const int number : {10, 9, 100}) {
@@ -140,6 +152,19 @@ TEST_F(FileSourceTest, KeepsTheFrameRate) {
     EXPECT_EQ(frame_.times.tracked_ns, 0);
     clock_.AdvanceMs(30);
   }
+}
+
+TEST_F(FileSourceTest, BeginsSoLongAfterAFullSecond) {
+  WritePairs(2);
+  const auto source =
+      MakeFileSource({.folder = folder_.path(), .frame_rate_hz = 10, .start_after_s = 0.3}, clock_);
+  clock_.AdvanceMs(123);
+  ASSERT_TRUE(source->Start());
+  const int64_t first_ns = (clock_.MonotonicNs() / (1000 * kMs) + 1) * 1000 * kMs + 300 * kMs;
+  ASSERT_TRUE(source->Next(frame_, milliseconds(3000)));
+  EXPECT_EQ(frame_.times.exposure_monotonic_ns, first_ns);
+  ASSERT_TRUE(source->Next(frame_, milliseconds(3000)));
+  EXPECT_EQ(frame_.times.exposure_monotonic_ns, first_ns + 100 * kMs);
 }
 
 TEST_F(FileSourceTest, WaitsNoLongerThanItsTimeout) {

@@ -243,5 +243,36 @@ TEST(FramePairer, TimeThatGoesBackStartsAnew) {
   EXPECT_GT(pair->sequence, before);
 }
 
+TEST(FramePairer, WithoutALostCameraEveryPictureIsAFrame) {
+  FramePairer pairer(kRateHz);
+  const uint64_t before = Pairs(pairer, Simulate({}, {}, 10)).back().sequence;
+  EXPECT_FALSE(pairer.Add(kBottom, {10, 1100 * kMs, 3}));
+  pairer.Lose(kBottom);
+  ASSERT_EQ(pairer.dropped().size(), 1u);
+  EXPECT_EQ(pairer.dropped()[0].picture.handle, 3);
+  for (uint32_t i = 0; i < 5; ++i) {
+    const auto alone = pairer.Add(kTop, {10 + i, (1100 + 10 * i) * kMs, 0});
+    ASSERT_TRUE(alone);
+    EXPECT_TRUE(alone->has(kTop));
+    EXPECT_FALSE(alone->has(kBottom));
+    EXPECT_EQ(alone->exposure_ns(), (1100 + 10 * i) * kMs);
+    EXPECT_EQ(alone->sequence, before + 1 + i);
+  }
+  EXPECT_FALSE(pairer.Add(kBottom, {0, 1150 * kMs, 0})) << "it is back, and waits for its partner";
+  const auto pair = pairer.Add(kTop, {15, 1150 * kMs, 0});
+  ASSERT_TRUE(pair);
+  EXPECT_TRUE(pair->is_whole());
+  EXPECT_EQ(pair->sequence, before + 6);
+}
+
+TEST(FramePairer, TheBottomCameraAloneCountsToo) {
+  FramePairer pairer(kRateHz);
+  const uint64_t before = Pairs(pairer, Simulate({}, {.first_sequence = 500}, 10)).back().sequence;
+  pairer.Lose(kTop);
+  EXPECT_EQ(pairer.Add(kBottom, {510, 1100 * kMs, 0})->sequence, before + 1);
+  EXPECT_EQ(pairer.Add(kBottom, {513, 1130 * kMs, 0})->sequence, before + 4);
+  EXPECT_EQ(pairer.Add(kBottom, {0, 1200 * kMs, 0})->sequence, before + 11) << "counted by time";
+}
+
 }  // namespace
 }  // namespace taclink

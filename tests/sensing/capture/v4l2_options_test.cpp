@@ -42,7 +42,7 @@ TEST(V4l2Options, ImpossibleOptionsAreNamed) {
     return StartError(options).message;
   };
   EXPECT_THAT(message([](V4l2Options& o) { o.devices[1] = o.devices[0]; }), HasSubstr("must be two devices"));
-  EXPECT_THAT(message([](V4l2Options& o) { o.devices[0] = ""; }), HasSubstr("path is empty"));
+  EXPECT_THAT(message([](V4l2Options& o) { o.devices[0] = ""; }), HasSubstr("names no camera"));
   EXPECT_THAT(message([](V4l2Options& o) { o.buffers = 3; }), HasSubstr("at least 4 buffers"));
   EXPECT_THAT(message([](V4l2Options& o) { o.buffers = 33; }), HasSubstr("buffers"));
   EXPECT_THAT(message([](V4l2Options& o) { o.width_px = 0; }), HasSubstr("size 0x480"));

@@ -104,6 +104,20 @@ TEST_F(ForceModelsTest, NonlinearAgreesWithTheForwardSolver) {
   }
 }
 
+// 18 mm from one frame to the next, which is more than a frame's iterations reach.
+TEST_F(ForceModelsTest, AHitTooDeepForOneFrameIsFoundInTheNext) {
+  const Push push(Cylinder(), 0, 18);
+  const auto estimator = MakeForceEstimator(Cylinder(), {.model = ForceModel::kNonlinear});
+  const NodalForces first = EstimateOf(*estimator, push, 1).forces;
+  EXPECT_FALSE(first.converged);
+  EXPECT_EQ(first.model, ForceModel::kPressurised);
+  const Estimate next = EstimateOf(*estimator, push, 2);
+  EXPECT_TRUE(next.forces.converged);
+  EXPECT_EQ(next.forces.model, ForceModel::kNonlinear);
+  ASSERT_EQ(next.contacts.size(), 1u);
+  EXPECT_NEAR(next.contacts[0].force_n.norm() / push.contact.force_n.norm(), 1, 0.05);
+}
+
 TEST_F(ForceModelsTest, PressurisedIsNear) {
   const auto estimator = MakeForceEstimator(Cylinder(), {.model = ForceModel::kPressurised});
   const Estimate found = EstimateOf(*estimator, Pressed());

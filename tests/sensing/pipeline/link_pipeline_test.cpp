@@ -66,6 +66,32 @@ TEST_F(LinkPipelineTest, CalibratesThenMeasures) {
   EXPECT_GE(state_.times.solved_ns, state_.times.tracked_ns);
 }
 
+// A pressure sensor that fell silent: measured on, but said so; no baseline is taken without it.
+TEST_F(LinkPipelineTest, AStalePressureIsStated) {
+  LinkPipeline pipeline(model_, options_);
+  const auto with = [this](double time_s, bool stale) {
+    StereoFrame frame = Frame(time_s);
+    frame.pressure = {.origin = PressureOrigin::kSerial, .stale = stale, .mpa = 0, .age_ns = 0};
+    if (stale) frame.pressure.trouble = "no reading for 9 s";
+    if (!stale) frame.pressure_mpa = 0;
+    return frame;
+  };
+  for (int k = 0; k < 2 * options_.rest_frames; ++k) pipeline.Process(with(k / 30.0, true), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_THAT(state_.status_reason, HasSubstr("waits for the pressure sensor: no reading for 9 s"));
+  for (int k = 0; k < options_.rest_frames; ++k) pipeline.Process(with(k / 30.0, false), state_);
+  pipeline.Process(with(kTouchedS, false), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  ASSERT_EQ(state_.contacts.size(), 1u);
+  const double fresh_n = state_.contacts[0].normal_force_n;
+  pipeline.Process(with(kTouchedS + 1.0 / 30, true), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  EXPECT_EQ(state_.status_reason, "the pressure is not known: no reading for 9 s");
+  EXPECT_TRUE(state_.pressure.stale);
+  ASSERT_EQ(state_.contacts.size(), 1u);
+  EXPECT_NEAR(state_.contacts[0].normal_force_n, fresh_n, 0.3 * fresh_n);
+}
+
 TEST_F(LinkPipelineTest, RestIsTakenAgainOnDemand) {
   LinkPipeline pipeline(model_, options_);
   TakeRest(pipeline);
@@ -111,6 +137,29 @@ TEST_F(LinkPipelineTest, LostCameraIsDegradedAndSaysWhich) {
   EXPECT_TRUE(state_.contacts.empty());
 }
 
+TEST_F(LinkPipelineTest, WithOneCameraThePositionsAreKnownWorseAndTheReasonIsPassedOn) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  const auto mean_variance_mm2 = [this] {
+    double sum = 0;
+    for (const Mat3& covariance : state_.shape.covariances_mm2) sum += covariance.trace();
+    return sum / static_cast<double>(state_.shape.covariances_mm2.size());
+  };
+  pipeline.Process(Frame(0.5), state_);
+  const double both_mm2 = mean_variance_mm2();
+  StereoFrame frame = Frame(0.6);
+  RawImage& bottom = frame.images[Index(CameraId::kBottom)];
+  bottom.valid = false;
+  bottom.why_missing = "usb:1-2: lost";
+  pipeline.Process(frame, state_);
+  EXPECT_THAT(state_.status_reason, HasSubstr("no picture from the bottom camera: usb:1-2: lost"));
+  EXPECT_GT(mean_variance_mm2(), 1.2 * both_mm2);
+  EXPECT_FALSE(state_.cameras[Index(CameraId::kBottom)].bad_picture) << "there was none";
+  pipeline.Process(Frame(0.7), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  EXPECT_LT(mean_variance_mm2(), 1.1 * both_mm2);
+}
+
 TEST_F(LinkPipelineTest, DarkPicturesAreLostNotZero) {
   LinkPipeline pipeline(model_, options_);
   TakeRest(pipeline);
@@ -132,6 +181,8 @@ TEST_F(LinkPipelineTest, ShortFrameIsNamed) {
   pipeline.Process(frame, state_);
   EXPECT_EQ(state_.status, LinkStatus::kDegraded);
   EXPECT_THAT(state_.status_reason, HasSubstr("top"));
+  EXPECT_TRUE(state_.cameras[Index(CameraId::kTop)].bad_picture);
+  EXPECT_FALSE(state_.cameras[Index(CameraId::kBottom)].bad_picture);
 }
 
 TEST_F(LinkPipelineTest, TouchedSkinIsNoBaseline) {

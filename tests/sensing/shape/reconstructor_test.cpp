@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 
 #include "sensing/model/model_file.h"
 #include "tests/sensing/shape/support.h"
@@ -71,6 +72,47 @@ TEST_P(ReconstructorTest, AtRestNoiseMovesNothing) {
   EXPECT_GT(score.raw_rmse(), 0.3);
   EXPECT_LT(score.rmse(), 0.05);
   EXPECT_LT(score.worst, 0.4);
+}
+
+// What the prior allows for without contact is learnt from frames without one.
+TEST_P(ReconstructorTest, WhatKeepsStillIsKnownBetterAfterAWhile) {
+  const std::vector<Vec3> rest = model_.RestMarkers();
+  const auto frames = [&](int count) {
+    Score score;
+    for (int i = 0; i < count; ++i) {
+      reconstructor_->Reconstruct(eyes_.See(rest, kNoisePx), 0, shape_);
+      Rate(rest, score);
+    }
+    return score;
+  };
+  TakeRest();
+  const Score first = frames(4);
+  frames(40);
+  const Score later = frames(40);
+  EXPECT_LT(later.rmse(), 0.8 * first.rmse());
+  EXPECT_LT(later.nees(), 1.25);
+}
+
+TEST_P(ReconstructorTest, LoadsThatAreNoContactAreAllowedForAgainAtOnce) {
+  TakeRest();
+  for (int i = 0; i < 40; ++i)
+    reconstructor_->Reconstruct(eyes_.See(model_.RestMarkers(), kNoisePx), 0, shape_);
+  // As the prior has them before it learns.
+  const SkinBasis basis(model_);
+  std::mt19937 random(3);
+  std::normal_distribution<double> amplitude(0, 1);
+  const Eigen::VectorXd u =
+      basis.modes() * Eigen::VectorXd::NullaryExpr(basis.modes().cols(), [&] { return amplitude(random); });
+  std::vector<Vec3> truth = model_.RestMarkers();
+  for (size_t m = 0; m < truth.size(); ++m)
+    truth[m] += basis.Frame(static_cast<int>(m)) * u.segment<3>(3 * static_cast<Eigen::Index>(m));
+  Score score;
+  for (int i = 0; i < 20; ++i) {
+    reconstructor_->Reconstruct(eyes_.See(truth, kNoisePx), 0, shape_);
+    if (i >= 8) Rate(truth, score);
+  }
+  EXPECT_LT(score.nees(), 1.5);
+  EXPECT_LT(score.rmse(), 0.15);
 }
 
 TEST_P(ReconstructorTest, PushesAnywhere) {

@@ -1,0 +1,97 @@
+#include "client/channel.h"
+
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+#include <grpcpp/support/client_interceptor.h>
+
+#include <fstream>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+namespace taclink::client {
+namespace {
+
+// gRPC's own call credentials refuse to go without TLS, also to this machine itself.
+class TokenInterceptor final : public grpc::experimental::Interceptor {
+ public:
+  explicit TokenInterceptor(std::string authorization) : authorization_(std::move(authorization)) {}
+
+  void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
+    using grpc::experimental::InterceptionHookPoints;
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA))
+      methods->GetSendInitialMetadata()->emplace("authorization", authorization_);
+    methods->Proceed();
+  }
+
+ private:
+  const std::string authorization_;
+};
+
+class TokenInterceptorFactory final : public grpc::experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit TokenInterceptorFactory(const std::string& token) : authorization_("Bearer " + token) {}
+  grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
+    return new TokenInterceptor(authorization_);  // gRPC deletes it
+  }
+
+ private:
+  const std::string authorization_;
+};
+
+bool StaysHere(const std::string& address) {
+  for (const char* here : {"unix:", "localhost:", "127.", "[::1]:"}) {
+    if (address.starts_with(here)) return true;
+  }
+  return false;
+}
+
+Result<std::string> ReadFile(const std::string& path) {
+  if (path.empty()) return std::string();
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  if (in) text << in.rdbuf();
+  if (!in || !text) return Error{ErrorCode::kNotFound, path + " cannot be read; check the path"};
+  return text.str();
+}
+
+Result<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const Credentials& credentials) {
+  if (credentials.certificate_file.empty() != credentials.key_file.empty())
+    return Error{ErrorCode::kInvalidArgument, "a client's certificate and its key need each other"};
+  if (credentials.ca_file.empty()) {
+    if (credentials.key_file.empty()) return grpc::InsecureChannelCredentials();
+    return Error{ErrorCode::kInvalidArgument,
+                 "a client's certificate needs TLS: say with --tls-ca whom to trust as the server"};
+  }
+  grpc::SslCredentialsOptions options;
+  for (const auto& [file, text] : {std::pair(&credentials.ca_file, &options.pem_root_certs),
+                                   std::pair(&credentials.certificate_file, &options.pem_cert_chain),
+                                   std::pair(&credentials.key_file, &options.pem_private_key)}) {
+    auto read = ReadFile(*file);
+    if (!read) return read.error();
+    *text = std::move(*read);
+  }
+  return grpc::SslCredentials(options);
+}
+
+}  // namespace
+
+Result<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
+                                                   const Credentials& credentials) {
+  auto secrets = MakeCredentials(credentials);
+  if (!secrets) return secrets.error();
+  if (!credentials.token.empty() && credentials.ca_file.empty() && !StaysHere(address))
+    return Error{ErrorCode::kInvalidArgument,
+                 "the token would go to " + address + " in the clear; use TLS (--tls-ca)"};
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);  // robots are on the local network
+  // A connection of its own: on a shared one, a stream that is not read would hold up the others.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
+  if (!credentials.token.empty())
+    interceptors.push_back(std::make_unique<TokenInterceptorFactory>(credentials.token));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, *secrets, arguments,
+                                                                 std::move(interceptors));
+}
+
+}  // namespace taclink::client

@@ -1,0 +1,75 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+
+#include "client/command/commands.h"
+#include "client/command/connect.h"
+#include "client/command/contacts_view.h"
+#include "client/taclink/arm_contacts.h"
+
+namespace taclink::command {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPoll{100};       // how soon Ctrl-C is noticed
+constexpr milliseconds kPatience{5000};  // the server says something once a second
+constexpr const char* kHomeAndClear = "\x1b[H\x1b[2J";
+
+struct Options {
+  std::string server = "127.0.0.1:50051";
+  double rate_hz = 10;
+  bool json = false;
+  uint64_t count = 0;
+};
+
+std::atomic<bool> interrupted = false;
+
+Result<void> Run(const Options& options) {
+  auto connection = ConnectTo(options.server);
+  if (!connection) return connection.error();
+  auto reader = connection->StreamContacts(options.rate_hz);
+  if (!reader) return reader.error();
+  std::signal(SIGINT, [](int) { interrupted = true; });
+  std::signal(SIGTERM, [](int) { interrupted = true; });
+  const bool live = !options.json && isatty(STDOUT_FILENO) == 1;
+  milliseconds silence{0};
+  for (uint64_t taken = 0; !interrupted && (options.count == 0 || taken < options.count);) {
+    const auto arm = (*reader)->Next(kPoll);
+    if (!arm) {
+      if (arm.error().code != ErrorCode::kTimeout) return arm.error();
+      if ((silence += kPoll) > kPatience + milliseconds(static_cast<int64_t>(3e3 / options.rate_hz)))
+        return Error{ErrorCode::kUnavailable, "nothing from the server at " + options.server +
+                                                  " for some seconds; check server and network"};
+      continue;
+    }
+    silence = milliseconds(0);
+    ++taken;
+    fmt::print("{}{}", live ? kHomeAndClear : "",
+               options.json ? ContactsJson(*arm) + "\n" : ContactsTable(*arm));
+    std::fflush(stdout);
+    if (std::ferror(stdout) != 0) break;  // main reports it
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddContacts(CLI::App& app, Selected& selected) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("contacts", "Show all contacts of the arm in its base frame, and joint torques");
+  AddServerOption(*command, options->server);
+  command->add_option("--rate", options->rate_hz, "At most so many a second")
+      ->check(Within(0.001, 1000))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "One JSON object a line");
+  command->add_option("--count", options->count, "End after so many")->check(CLI::PositiveNumber);
+  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+}
+
+}  // namespace taclink::command

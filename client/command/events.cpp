@@ -1,0 +1,104 @@
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+
+#include "client/command/commands.h"
+#include "client/command/connect.h"
+#include "client/command/event_text.h"
+#include "client/command/json.h"
+#include "client/taclink/client.h"
+
+namespace taclink::command {
+namespace {
+
+constexpr std::chrono::milliseconds kPoll{100};  // how soon Ctrl-C is noticed
+
+struct Options {
+  std::string server = "127.0.0.1:50051";
+  client::EventOptions stream;
+  std::vector<std::string> kinds;
+  std::string run_id;
+  std::optional<uint64_t> after;
+  bool all = false;
+  bool json = false;
+  uint64_t count = 0;
+};
+
+std::atomic<bool> interrupted = false;
+
+void PrintLost(bool json, const client::EventReader& reader, uint64_t& told) {
+  if (reader.events_lost() == told) return;
+  told = reader.events_lost();
+  if (json) {
+    fmt::print("{}\n", Json({{"lost", told}}).dump());
+  } else {
+    fmt::print("-- {} events are lost: they had left the server's history --\n", told);
+  }
+}
+
+void PrintStart(bool json, const client::EventReader& reader) {
+  if (reader.run_changed()) {
+    fmt::print("{}\n", json ? Json({{"run_changed", true}, {"run_id", reader.place().run_id}}).dump()
+                            : "-- the server was started anew: the end of its former run is unknown --");
+  }
+  std::fflush(stdout);
+}
+
+Result<void> Run(const Options& options) {
+  client::EventOptions stream = options.stream;
+  for (const std::string& name : options.kinds) stream.kinds.push_back(*client::EventKindOf(name));
+  if (options.all) stream.resume.emplace();
+  if (options.after) stream.resume = client::EventPlace{options.run_id, *options.after};
+  auto connection = ConnectTo(options.server);
+  if (!connection) return connection.error();
+  auto reader = connection->StreamEvents(stream);
+  if (!reader) return reader.error();
+  std::signal(SIGINT, [](int) { interrupted = true; });
+  std::signal(SIGTERM, [](int) { interrupted = true; });
+  PrintStart(options.json, **reader);
+  uint64_t lost_told = 0;
+  for (uint64_t taken = 0; !interrupted && (options.count == 0 || taken < options.count);) {
+    const auto event = (*reader)->Next(kPoll);
+    PrintLost(options.json, **reader, lost_told);
+    if (event) {
+      fmt::print("{}\n", options.json ? EventJson(*event, (*reader)->place().run_id) : EventText(*event));
+      ++taken;
+    } else if (event.error().code != ErrorCode::kTimeout) {
+      return event.error();
+    }
+    std::fflush(stdout);
+    if (std::ferror(stdout) != 0) break;  // main reports it
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddEvents(CLI::App& app, Selected& selected) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "events", "Show what happens to a server's links: contacts, force levels, status, tares, drift");
+  AddServerOption(*command, options->server);
+  command->add_option("--links", options->stream.links, "Names of links, separated by commas (all)")
+      ->delimiter(',');
+  const auto check = [](const std::string& name) {
+    return client::EventKindOf(name) ? std::string() : "'" + name + "' is no kind of event";
+  };
+  command
+      ->add_option("--kinds", options->kinds,
+                   "Kinds of events, separated by commas (all): contact_begin, ...")
+      ->delimiter(',')
+      ->check(check);
+  CLI::Option* run =
+      command->add_option("--run", options->run_id, "With --after: the run that the number belongs to");
+  command->add_option("--after", options->after, "Resume after this event's number")->needs(run);
+  command->add_flag("--all", options->all, "Begin with all that the server still has");
+  command->add_flag("--json", options->json, "One JSON object a line for each event");
+  command->add_option("--count", options->count, "End after so many events")->check(CLI::PositiveNumber);
+  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+}
+
+}  // namespace taclink::command

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sensing/core/result.h"
+
+namespace taclink::command {
+
+/// Joint positions of one line. Names always given; positions in rad, prismatic: m.
+struct JointLine {
+  std::optional<double> time_s;  ///< since any instant; none: the line's own
+  std::vector<std::string> names;
+  std::vector<double> positions;
+  std::vector<double> velocities;
+};
+
+/// Reads joint positions line by line: JSON objects ({"time_s": 0.1, "positions": {"elbow": 0.5}}, or
+/// "names", "positions" and "velocities" as lists), or CSV whose first line names the columns (a column
+/// time_s, if any, and the joints). Which of them the first line tells.
+class JointLineReader {
+ public:
+  /// None: an empty line, a comment (#), or CSV's first line. Errors: kInvalidArgument, with the line's
+  /// number.
+  Result<std::optional<JointLine>> Read(const std::string& line);
+
+ private:
+  Result<std::optional<JointLine>> ReadJson(const std::string& line);
+  Result<std::optional<JointLine>> ReadCsv(const std::string& line);
+  Error Wrong(const std::string& what) const;
+
+  int number_ = 0;
+  std::optional<bool> json_;
+  std::vector<std::string> columns_;
+};
+
+}  // namespace taclink::command

@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <thread>
+#include <utility>
+
+#include "client/command/commands.h"
+#include "client/command/connect.h"
+#include "client/command/joint_lines.h"
+#include "client/taclink/arm_contacts.h"
+
+namespace taclink::command {
+namespace {
+
+using std::chrono::nanoseconds;
+using std::chrono::system_clock;
+
+struct Options {
+  std::string server = "127.0.0.1:50051";
+  std::string file;
+  bool loop = false;
+};
+
+int64_t UtcNs(system_clock::time_point time) {
+  return std::chrono::duration_cast<nanoseconds>(time.time_since_epoch()).count();
+}
+
+/// Sends lines at their times: the first one's is now, the others follow as they say.
+class Player {
+ public:
+  explicit Player(client::JointStateWriter& writer) : writer_(writer) {}
+
+  Result<void> Play(std::istream& in) {
+    JointLineReader reader;
+    begun_ = false;
+    for (std::string line; std::getline(in, line);) {
+      const auto read = reader.Read(line);
+      if (!read) return read.error();
+      if (!*read) continue;
+      if (const auto sent = Send(**read); !sent) return sent.error();
+    }
+    return {};
+  }
+
+ private:
+  Result<void> Send(const JointLine& line) {
+    auto time = system_clock::now();
+    if (line.time_s) {
+      if (!std::exchange(begun_, true)) begin_ = time - Duration(*line.time_s);
+      time = begin_ + Duration(*line.time_s);
+      std::this_thread::sleep_until(time);
+    }
+    return writer_.Write({line.names, line.positions, line.velocities, UtcNs(time)});
+  }
+  static system_clock::duration Duration(double seconds) {
+    return std::chrono::duration_cast<system_clock::duration>(std::chrono::duration<double>(seconds));
+  }
+
+  client::JointStateWriter& writer_;
+  system_clock::time_point begin_;  // of the lines' times, once begun_
+  bool begun_ = false;
+};
+
+Result<void> Run(const Options& options) {
+  auto connection = ConnectTo(options.server);
+  if (!connection) return connection.error();
+  const auto writer = connection->UpdateJointStates();
+  Player player(*writer);
+  do {
+    std::ifstream file;
+    if (options.file != "-") file.open(options.file);
+    if (!file) return Error{ErrorCode::kNotFound, options.file + ": cannot be opened; check the path"};
+    const auto played = player.Play(options.file == "-" ? std::cin : file);
+    if (!played) return Error{played.error().code, options.file + ": " + played.error().message};
+  } while (options.loop && options.file != "-");
+  const auto summary = writer->Finish();
+  if (!summary) return summary.error();
+  fmt::print("{} joint states accepted, {} refused{}\n", summary->accepted, summary->refused,
+             summary->first_refusal.empty() ? "" : ": " + summary->first_refusal);
+  return {};
+}
+
+}  // namespace
+
+void AddJoints(CLI::App& app, Selected& selected) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("joints", "Tell a server where the arm's joints are");
+  AddServerOption(*command, options->server);
+  command
+      ->add_option(
+          "file", options->file,
+          "Lines of joint positions, '-' for the standard input: CSV with a first line "
+          "'time_s,JOINT,...', or JSON {\"time_s\": 0.1, \"positions\": {\"JOINT\": 0.5}}, or \"names\" and "
+          "\"positions\" as two lists. rad, m; "
+          "without time_s each line is of the moment it is read")
+      ->required();
+  command->add_flag("--loop", options->loop, "Begin again at the file's end");
+  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+}
+
+}  // namespace taclink::command

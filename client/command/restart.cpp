@@ -1,0 +1,36 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "client/command/commands.h"
+#include "client/command/connect.h"
+#include "client/taclink/client.h"
+
+namespace taclink::command {
+namespace {
+
+struct Options {
+  std::string server = "127.0.0.1:50051";
+  std::string link;
+};
+
+Result<void> Run(const Options& options) {
+  auto connection = ConnectTo(options.server);
+  if (!connection) return connection.error();
+  const auto ordered = connection->RestartLink(options.link);
+  if (!ordered) return ordered.error();
+  fmt::print("link {} is started again; 'taclink list' shows how it does\n", options.link);
+  return {};
+}
+
+}  // namespace
+
+void AddRestart(CLI::App& app, Selected& selected) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("restart", "Give a link of a server a fresh source and processor");
+  AddServerOption(*command, options->server);
+  command->add_option("--link", options->link, "Name of the link")->required();
+  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+}
+
+}  // namespace taclink::command

@@ -1,0 +1,118 @@
+#include "sensing/pipeline/baseline_keeper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace taclink {
+namespace {
+
+// Further from the baseline's own pressure, the error of what pressure does would be taken for drift.
+constexpr double kSamePressureMpa = 1e-4;
+
+double StrongestLoad(const LinkState& state) {
+  double strongest = 0;
+  for (const Contact& contact : state.contacts) strongest = std::max(strongest, contact.force_n.norm());
+  for (const Vec3& force : state.forces.forces_n) strongest = std::max(strongest, force.norm());
+  return strongest;
+}
+
+}  // namespace
+
+BaselineKeeper::BaselineKeeper(const LinkModel& model, const std::optional<DriftOptions>& drift)
+    : model_(model), drift_(drift), follower_(model.markers.count(), drift.value_or(DriftOptions{})) {
+  off_mm_.reserve(static_cast<size_t>(model.markers.count()));
+}
+
+void BaselineKeeper::Take(BaselineOrigin origin, double pressure_mpa, Clock& clock) {
+  baseline_ = {.origin = origin, .taken_utc_ns = clock.UtcNs()};
+  taken_ns_ = clock.MonotonicNs();
+  pressure_mpa_ = pressure_mpa;
+  follower_.Reset();
+}
+
+Result<void> BaselineKeeper::BeginTare(const TareOptions& options) {
+  if (tare_) return Error{ErrorCode::kFailedPrecondition, "a tare is under way; wait for its end"};
+  tare_.emplace(model_, options);
+  tare_end_.reset();
+  return {};
+}
+
+void BaselineKeeper::CancelTare() {
+  tare_.reset();
+  tare_end_.reset();
+}
+
+void BaselineKeeper::AbortTare(const std::string& why) {
+  if (tare_) tare_end_ = Error{ErrorCode::kFailedPrecondition, why};
+  tare_.reset();
+}
+
+std::optional<Result<TareSummary>> BaselineKeeper::TakeTareEnd() {
+  return std::exchange(tare_end_, std::nullopt);
+}
+
+void BaselineKeeper::Apply(const ShapeReconstructor& reconstructor, double pressure_mpa, SkinShape& shape) {
+  frame_pressure_mpa_ = pressure_mpa;
+  off_mm_ = shape.displacements_mm;
+  const double change_mpa = PressureChange(pressure_mpa);
+  for (size_t m = 0; m < off_mm_.size() && change_mpa != 0; ++m)
+    off_mm_[m] -= reconstructor.PressureDisplacement(static_cast<int>(m), change_mpa);
+  if (!drift_) return;
+  for (size_t m = 0; m < off_mm_.size(); ++m) {
+    shape.displacements_mm[m] -= follower_.drift_mm()[m];
+    shape.measured[m].displacement_mm -= follower_.drift_mm()[m];
+  }
+}
+
+void BaselineKeeper::Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels,
+                           ShapeReconstructor& reconstructor, Clock& clock) {
+  if (drift_) FollowDrift(times, state, clock);
+  state.baseline = baseline_;
+  state.baseline.drift_mm = follower_.largest_mm();
+  if (drift_) state.baseline.drift_state = follower_.following() ? DriftState::kFollowing : DriftState::kHeld;
+  state.baseline_age_s = AgeS(clock);
+  if (tare_) TakeTareFrame(state, labels, reconstructor, clock);
+}
+
+void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock) {
+  // Degraded by nothing but the drift itself.
+  const bool good = state.status == LinkStatus::kOk ||
+                    (state.measured() && HasDriftedFar() && state.status_reason == DriftAdvice());
+  const bool sure = good && std::abs(PressureChange(frame_pressure_mpa_)) <= kSamePressureMpa;
+  const int64_t now_ns = times.exposure_monotonic_ns != 0 ? times.exposure_monotonic_ns : clock.MonotonicNs();
+  follower_.Update(now_ns, sure ? std::optional(StrongestLoad(state)) : std::nullopt, off_mm_);
+}
+
+void BaselineKeeper::TakeTareFrame(const LinkState& state, const LabelledMarkers& labels,
+                                   ShapeReconstructor& reconstructor, Clock& clock) {
+  const Result<bool> complete = tare_->Add(state, labels, off_mm_);
+  if (complete && !*complete) return;
+  if (!complete) {
+    tare_end_ = complete.error();
+  } else {
+    tare_end_ = TareSummary{.frames = tare_->frames(),
+                            .forced = tare_->forced(),
+                            .shift_mm = tare_->shift_mm(),
+                            .previous_age_s = AgeS(clock)};
+    reconstructor.Tare(tare_->markers(), frame_pressure_mpa_);
+    Take(tare_->forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, frame_pressure_mpa_, clock);
+  }
+  tare_.reset();
+}
+
+double BaselineKeeper::AgeS(const Clock& clock) const {
+  return static_cast<double>(clock.MonotonicNs() - taken_ns_) * 1e-9;
+}
+
+std::string BaselineKeeper::DriftAdvice() const {
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "the baseline has drifted by %.2f mm since it was taken; tare the link while nothing touches it",
+      follower_.largest_mm());
+  return text;
+}
+
+}  // namespace taclink

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sensing/core/baseline.h"
+#include "sensing/core/clock.h"
+#include "sensing/core/frame.h"
+#include "sensing/core/link_model.h"
+#include "sensing/core/link_state.h"
+#include "sensing/core/markers.h"
+#include "sensing/pipeline/drift_follower.h"
+#include "sensing/pipeline/tare.h"
+#include "sensing/shape/reconstructor.h"
+
+namespace taclink {
+
+/// Knows what displacements are measured against: when and how it was taken, how far it has followed the skin
+/// since, and a tare under way. Used frame by frame: Apply before the forces, Learn after them.
+class BaselineKeeper {
+ public:
+  BaselineKeeper(const LinkModel& model, const std::optional<DriftOptions>& drift);
+
+  /// A baseline was taken, under this gauge pressure.
+  void Take(BaselineOrigin origin, double pressure_mpa, Clock& clock);
+  double PressureChange(double pressure_mpa) const { return pressure_mpa - pressure_mpa_; }
+
+  /// Errors: kFailedPrecondition (one is under way).
+  Result<void> BeginTare(const TareOptions& options);
+  void CancelTare();
+  /// Its end will say why.
+  void AbortTare(const std::string& why);
+  std::optional<Result<TareSummary>> TakeTareEnd();
+
+  /// Takes the drift off a frame's displacements.
+  void Apply(const ShapeReconstructor& reconstructor, double pressure_mpa, SkinShape& shape);
+  /// Follows drift and takes a tare's frame, which may be its last; fills what the state says of the
+  /// baseline.
+  void Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels,
+             ShapeReconstructor& reconstructor, Clock& clock);
+
+  bool HasDriftedFar() const { return drift_ && follower_.largest_mm() > drift_->limit_mm; }
+  std::string DriftAdvice() const;
+
+ private:
+  void FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock);
+  void TakeTareFrame(const LinkState& state, const LabelledMarkers& labels, ShapeReconstructor& reconstructor,
+                     Clock& clock);
+  double AgeS(const Clock& clock) const;
+
+  const LinkModel model_;
+  const std::optional<DriftOptions> drift_;
+  Baseline baseline_;
+  int64_t taken_ns_ = 0;  // monotonic
+  double pressure_mpa_ = 0;
+  DriftFollower follower_;
+
+  double frame_pressure_mpa_ = 0;  // of the frame in work
+  std::vector<Vec3> off_mm_;       // likewise: against the baseline as it was taken, without pressure's part
+
+  std::optional<TareCollector> tare_;
+  std::optional<Result<TareSummary>> tare_end_;
+};
+
+}  // namespace taclink

@@ -1,0 +1,53 @@
+#include "server/events/force_watch.h"
+
+namespace taclink::server {
+
+std::vector<bool> MarkersOf(const Region& region, const MarkerGrid& grid) {
+  std::vector<bool> markers;
+  for (int m = 0; m < grid.count(); ++m) markers.push_back(region.Holds(m % grid.paths, m / grid.paths));
+  return markers;
+}
+
+double ForceWatch::ForceOf(const Contact& contact, const LinkState& state) const {
+  if (markers_.empty()) return contact.force_n.norm();
+  Vec3 within = Vec3::Zero();
+  for (const int marker : contact.markers) {
+    const auto m = static_cast<size_t>(marker);
+    if (m < markers_.size() && markers_[m] && m < state.forces.forces_n.size())
+      within += state.forces.forces_n[m];
+  }
+  return within.norm();
+}
+
+ForceLevel ForceWatch::LevelAt(double force_n) const {
+  const auto reaches = [&](ForceLevel level, double threshold_n) {
+    return threshold_n > 0 && force_n >= threshold_n - (level_ >= level ? thresholds_.hysteresis_n : 0);
+  };
+  if (reaches(ForceLevel::kAlarm, thresholds_.alarm_n)) return ForceLevel::kAlarm;
+  if (reaches(ForceLevel::kWarning, thresholds_.warning_n)) return ForceLevel::kWarning;
+  return ForceLevel::kNormal;
+}
+
+void ForceWatch::Take(const LinkState& state, std::vector<ForceLevelDetail>& told) {
+  if (!state.measured()) return;
+  const Contact* strongest = nullptr;
+  force_n_ = 0;
+  for (const Contact& contact : state.contacts) {
+    const double force_n = ForceOf(contact, state);
+    if (force_n <= force_n_) continue;
+    force_n_ = force_n;
+    strongest = &contact;
+  }
+  const ForceLevel level = LevelAt(force_n_);
+  if (level == level_) return;
+  told.push_back({.region = name_,
+                  .level = level,
+                  .previous = level_,
+                  .force_n = force_n_,
+                  .thresholds = thresholds_,
+                  .contact_id = strongest != nullptr ? strongest->id : 0,
+                  .center_mm = strongest != nullptr ? strongest->center_mm : Vec3::Zero()});
+  level_ = level;
+}
+
+}  // namespace taclink::server

@@ -1,0 +1,126 @@
+#include "server/gateway/http_message.h"
+
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/status.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <cstdio>
+
+namespace taclink::server {
+namespace {
+
+namespace http = boost::beast::http;
+
+std::string Lower(std::string_view text) {
+  std::string out(text);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return out;
+}
+
+HttpFailure FailureOf(const boost::system::error_code& error, const HttpLimits& limits) {
+  if (error == http::error::header_limit)
+    return {431, "the request's headers are longer than " + std::to_string(limits.header_bytes) + " bytes"};
+  if (error == http::error::body_limit)
+    return {413, "the request's body is longer than " + std::to_string(limits.body_bytes) + " bytes"};
+  if (error == http::error::bad_version) return {505, "only HTTP/1.0 and HTTP/1.1 are spoken here"};
+  return {400, "this is no HTTP request: " + error.message()};
+}
+
+}  // namespace
+
+struct HttpRequestParser::Parser {
+  http::request_parser<http::string_body> beast;
+};
+
+std::string_view HttpRequest::Header(std::string_view lower_name) const {
+  const auto at = std::find_if(headers.begin(), headers.end(),
+                               [&](const auto& header) { return header.first == lower_name; });
+  return at == headers.end() ? std::string_view() : std::string_view(at->second);
+}
+
+HttpRequestParser::HttpRequestParser(HttpLimits limits) : limits_(limits) {
+  Reset();
+}
+
+HttpRequestParser::~HttpRequestParser() = default;
+
+void HttpRequestParser::Reset() {
+  parser_ = std::make_unique<Parser>();
+  parser_->beast.header_limit(static_cast<std::uint32_t>(limits_.header_bytes));
+  parser_->beast.body_limit(limits_.body_bytes);
+  parser_->beast.eager(true);
+  begun_ = head_seen_ = wants_continue_ = false;
+}
+
+size_t HttpRequestParser::Feed(std::string_view bytes) {
+  if (failure_ || Done() || bytes.empty()) return 0;
+  boost::system::error_code error;
+  begun_ = true;
+  const size_t used = parser_->beast.put(boost::asio::const_buffer(bytes.data(), bytes.size()), error);
+  if (error && error != http::error::need_more) {
+    failure_ = FailureOf(error, limits_);
+  } else if (!parser_->beast.is_header_done() && bytes.size() - used > limits_.header_bytes) {
+    failure_ = FailureOf(http::error::header_limit, limits_);  // one line of that length
+  } else if (parser_->beast.is_header_done() && !head_seen_) {
+    head_seen_ = true;
+    CheckHead();
+  }
+  return used;
+}
+
+void HttpRequestParser::CheckHead() {
+  const auto& head = parser_->beast.get();
+  for (const http::field once : {http::field::host, http::field::authorization, http::field::content_type}) {
+    if (head.count(once) > 1)
+      failure_ = {400, "the request has two '" + Lower(http::to_string(once)) + "' headers"};
+  }
+  if (head.version() == 11 && head.count(http::field::host) == 0)
+    failure_ = {400, "the request has no 'host' header"};
+  if (const auto expect = head[http::field::expect]; !expect.empty() && !Done()) {
+    wants_continue_ = Lower(expect) == "100-continue";
+    if (!wants_continue_) failure_ = {417, "what the request expects is not offered here"};
+  }
+}
+
+bool HttpRequestParser::TakeWantsContinue() {
+  return std::exchange(wants_continue_, false);
+}
+
+bool HttpRequestParser::Done() const {
+  return parser_->beast.is_done();
+}
+
+HttpRequest HttpRequestParser::Take() {
+  auto message = parser_->beast.release();
+  HttpRequest out{.method = std::string(message.method_string()),
+                  .target = std::string(message.target()),
+                  .http_1_0 = message.version() == 10,
+                  .keep_alive = message.keep_alive(),
+                  .headers = {},
+                  .body = std::move(message.body())};
+  for (const auto& field : message) out.headers.emplace_back(Lower(field.name_string()), field.value());
+  Reset();
+  return out;
+}
+
+std::string ResponseHead(int status, const HttpHeaders& headers, std::optional<size_t> length,
+                         bool keep_alive) {
+  const auto reason = http::obsolete_reason(http::int_to_status(static_cast<unsigned>(status)));
+  std::string out = "HTTP/1.1 " + std::to_string(status) + " " + std::string(reason) + "\r\n";
+  for (const auto& [name, value] : headers) out.append(name).append(": ").append(value).append("\r\n");
+  out += length ? "Content-Length: " + std::to_string(*length) + "\r\n"
+                : std::string("Transfer-Encoding: chunked\r\n");
+  out += keep_alive ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
+  return out;
+}
+
+std::string Chunk(std::string_view bytes) {
+  char head[24];
+  const int size = std::snprintf(head, sizeof head, "%zx\r\n", bytes.size());
+  std::string out(head, static_cast<size_t>(size));
+  return out.append(bytes).append("\r\n");
+}
+
+}  // namespace taclink::server

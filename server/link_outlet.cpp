@@ -1,0 +1,63 @@
+#include "server/link_outlet.h"
+
+#include <utility>
+
+namespace taclink::server {
+
+void ResetTo(LinkState& state, LinkStatus status, std::string reason) {
+  state.times = {};
+  state.status = status;
+  state.status_reason = std::move(reason);
+  state.pressure_mpa.reset();
+  state.pressure = {};
+  state.cameras = {};
+  state.tracking = {};
+  state.ClearMeasurement();
+  state.baseline_age_s = 0;
+  state.baseline = {};
+  state.stage_ms = {};
+}
+
+void LinkOutlet::Close() {
+  ++life_;
+  const std::lock_guard lock(mutex_);
+  hub_ = nullptr;
+}
+
+bool LinkOutlet::PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, int64_t exposure_ns) {
+  const std::lock_guard lock(mutex_);
+  if (life != life_ || hub_ == nullptr) return false;
+  // Before anyone can see it.
+  state->times.published_ns = clock_.MonotonicNs();
+  statistics_.RecordPictures(state->cameras);
+  statistics_.Record(state->sequence, exposure_ns, state->times.published_ns);
+  histograms_.Record(*state);
+  Send(std::move(state));
+  return true;
+}
+
+bool LinkOutlet::PublishReport(uint64_t life, std::unique_ptr<LinkState> state) {
+  const std::lock_guard lock(mutex_);
+  if (life != life_ || hub_ == nullptr) return false;
+  state->sequence = last_sequence_;
+  Send(std::move(state));
+  return true;
+}
+
+bool LinkOutlet::PublishStatus(LinkStatus status, const std::string& reason) {
+  const std::unique_lock lock(mutex_, std::try_to_lock);  // the watchdog must not hang with a worker
+  if (!lock || hub_ == nullptr) return false;
+  auto state = pool_.Acquire();
+  ResetTo(*state, status, reason);
+  state->sequence = last_sequence_;
+  Send(std::move(state));
+  return true;
+}
+
+void LinkOutlet::Send(std::unique_ptr<LinkState> state) {
+  last_sequence_ = state->sequence;
+  last_published_ns_ = state->times.published_ns = clock_.MonotonicNs();
+  hub_->Publish(link_, pool_.Share(std::move(state)));
+}
+
+}  // namespace taclink::server

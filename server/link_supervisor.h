@@ -1,0 +1,152 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "sensing/capture/frame_source.h"
+#include "sensing/core/clock.h"
+#include "sensing/core/result.h"
+#include "server/link_outlet.h"
+#include "server/link_worker.h"
+
+namespace taclink::server {
+
+/// Limits that the watchdog holds workers to, and what it does about those that break them.
+struct WatchdogOptions {
+  std::chrono::milliseconds interval{100};  ///< between two looks
+  // Longest stay in a stage before it is reported.
+  std::chrono::milliseconds source_start{5000};
+  std::chrono::milliseconds source_next{1000};    ///< beyond the time that the source was given
+  std::chrono::milliseconds first_frames{20000};  ///< a frame, while the link calibrates
+  std::chrono::milliseconds frame{1000};
+  std::chrono::milliseconds other{1000};     ///< publishing, and waiting beyond the poll
+  std::chrono::milliseconds abandon{30000};  ///< a thread that stays longer in one stage is given up
+  std::chrono::milliseconds build{120000};   ///< longest making of a fresh source and processor
+  int deaths = 3;                            ///< so many in a row and the link rests
+  std::chrono::milliseconds proven{60000};   ///< a worker that lived so long begins a new row
+  std::chrono::milliseconds first_backoff{500};
+  std::chrono::milliseconds longest_backoff{10000};
+  std::chrono::milliseconds heartbeat{1000};  ///< of the status, while the watchdog publishes it
+  std::chrono::milliseconds stop{3000};       ///< at shutdown, before a thread is given up; real time
+};
+
+/// Make a link's parts anew, after its worker died. May throw and may take long.
+struct LinkFactories {
+  std::function<Result<std::unique_ptr<FrameSource>>()> source = {};
+  std::function<Result<std::unique_ptr<LinkProcessor>>()> processor = {};
+};
+
+/// How a link's worker does, for those who report it.
+struct Supervision {
+  enum class State {
+    kRunning,
+    kOverdue,     ///< a stage takes longer than it may
+    kRestarting,  ///< the worker died or was given up; the next one comes
+    kResting,     ///< it died too often; waits for Restart
+  };
+  State state = State::kRunning;
+  std::string reason;        ///< what is wrong and what happens next; empty while running
+  std::string last_failure;  ///< why the last worker died; empty: none did
+  uint64_t restarts = 0;     ///< workers after the first
+  uint64_t overruns = 0;     ///< stages that took longer than they may
+  uint64_t abandoned = 0;    ///< workers given up since the start; each keeps its memory until it returns
+};
+
+/// One link for as long as the server runs: its worker, and a fresh one when that dies or hangs.
+class LinkSupervisor {
+ public:
+  LinkSupervisor(size_t link, std::string name, std::unique_ptr<FrameSource> source,
+                 std::unique_ptr<LinkProcessor> processor, LinkFactories factories, Hub& hub, Clock& clock,
+                 LinkWorkerOptions options, WatchdogOptions watchdog);
+  ~LinkSupervisor();
+
+  void Start();
+  /// Stop waits for WatchdogOptions::stop at most. No Check may follow. Both may be called twice.
+  void RequestStop();
+  void Stop();
+
+  /// Looks after the worker, and publishes the link's status in its place where it can't. Never waits. One
+  /// thread.
+  void Check();
+
+  /// A fresh worker, also for a resting link. It is there some time after. Any thread.
+  void Restart() { order_ = Order::kRestart; }
+  /// The same, only if it rests.
+  void Wake();
+
+  // Any thread.
+  /// Whether threads may still run after Stop that could not be waited for: the process must not destroy what
+  /// is global.
+  bool LeavesThreads() const { return *builds_ > 0 || supervision().abandoned > 0; }
+  Supervision supervision() const;
+  LinkStatistics Statistics() const { return outlet_->Statistics(); }
+  const LinkHistograms& histograms() const { return outlet_->histograms(); }
+  SourceCondition source_condition() const;
+  /// Null between two workers.
+  std::shared_ptr<LinkWorker> current() const;
+  /// As LinkWorker::Calibrate. Errors: kUnavailable (no worker now).
+  Result<void> Calibrate(const CalibrationOrder& order, CalibrationObserver observer);
+  /// Likewise.
+  Result<void> Tare(const TareOptions& options, TareObserver observer);
+
+ private:
+  enum class Phase { kRunning, kEnding, kBackoff, kBuilding, kResting };
+  enum class Order { kNone, kRestart, kWake };
+  struct Build;
+
+  void TakeOrder(int64_t now_ns);
+  void Judge(int64_t now_ns);
+  bool JudgeThread(size_t thread, const StageMark& mark, int64_t now_ns);
+  int64_t DeadlineNs(WorkStage stage) const;
+  void Died(const std::string& reason, int64_t now_ns);
+  void End(int64_t now_ns);
+  void AwaitEnd(int64_t now_ns);
+  void GiveUp(const std::string& reason, int64_t now_ns);
+  void Abandon(LinkWorker& worker);
+  void DropWorker();
+  void AfterWorker(int64_t now_ns);
+  void BeginBuild(int64_t now_ns);
+  void AwaitBuild(int64_t now_ns);
+  void Enter(Phase phase, Supervision::State state, std::string reason, int64_t now_ns);
+  void Report(int64_t now_ns);
+  Error NoWorker() const;
+
+  // Constant after construction.
+  const std::string name_;
+  const LinkFactories factories_;
+  Clock& clock_;
+  const LinkWorkerOptions options_;
+  const WatchdogOptions limits_;
+  const std::shared_ptr<LinkOutlet> outlet_;
+  const std::shared_ptr<std::atomic<int>> builds_ = std::make_shared<std::atomic<int>>(0);  // threads
+
+  std::atomic<Order> order_ = Order::kNone;
+
+  // Used by Check's thread only.
+  Phase phase_ = Phase::kRunning;
+  bool restart_at_once_ = false;  // the worker ends by order
+  int64_t phase_since_ns_ = 0;
+  int64_t started_ns_ = 0;  // the worker
+  int64_t retry_at_ns_ = 0;
+  int64_t last_check_ns_ = 0;
+  int64_t judged_from_ns_ = 0;                 // before that nobody looked
+  int deaths_ = 0;                             // in a row
+  bool news_ = false;                          // the reason is to be published at once
+  std::array<int64_t, 2> counted_since_ns_{};  // of each thread's last overrun
+  std::shared_ptr<Build> build_;
+
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  std::shared_ptr<LinkWorker> worker_;
+  Supervision supervision_;
+  SourceCondition past_;  // of the last worker, with all restarts before the current one's
+};
+
+}  // namespace taclink::server

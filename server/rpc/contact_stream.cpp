@@ -1,0 +1,63 @@
+#include "server/rpc/contact_stream.h"
+
+#include <grpcpp/impl/codegen/proto_utils.h>
+
+#include <cmath>
+#include <utility>
+
+#include "server/rpc/contacts_message.h"
+
+namespace taclink::server {
+Result<double> ContactStream::ParseRequest(const grpc::ByteBuffer& bytes) {
+  v1::StreamContactsRequest request;
+  grpc::ByteBuffer copy(bytes);  // parsing empties it
+  if (!grpc::SerializationTraits<v1::StreamContactsRequest>::Deserialize(&copy, &request).ok())
+    return Error{ErrorCode::kInvalidArgument, "the request is no StreamContactsRequest message"};
+  if (!std::isfinite(request.max_rate_hz()) || request.max_rate_hz() < 0) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "max_rate_hz must be a positive number of Hz, or 0 for no limit"};
+  }
+  return request.max_rate_hz();
+}
+
+ContactStream::ContactStream(Arm& arm, double max_rate_hz, StreamRegistry& registry,
+                             std::shared_ptr<boost::asio::thread_pool> senders)
+    : PumpedStream(registry, std::move(senders)),
+      arm_(arm),
+      joints_(arm.poses().joints().joints()),
+      newest_(arm.links().size()),
+      rate_(max_rate_hz) {
+  for (const LinkDescription& link : arm.links()) link_names_.push_back(link.name);
+}
+
+void ContactStream::Begin() {
+  subscription_ = arm_.hub().Subscribe({.delivery = Delivery::kLatest}, Notifier());
+  Open();
+}
+
+// What is not due waits for the next link's news, which come at least once a second.
+bool ContactStream::TakeNews() {
+  bool due = false;
+  while (const auto publication = subscription_->Take()) {
+    newest_[publication->link()] = arm_.contacts().Of(*publication);
+    unsent_ = true;
+    due = rate_.Due(publication->state().times.published_ns) || due;
+  }
+  return sent_ == 0 || (unsent_ && due);
+}
+
+std::optional<grpc::ByteBuffer> ContactStream::Next() {
+  if (!TakeNews()) return std::nullopt;
+  Fill(newest_, link_names_, joints_, message_);
+  message_.set_sequence(++sent_);
+  message_.set_utc_ns(arm_.clock().UtcNs());
+  unsent_ = false;
+  grpc::Slice slice(message_.SerializeAsString());
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+std::optional<grpc::ByteBuffer> ContactStream::Last(const std::string&) {
+  return std::nullopt;
+}
+
+}  // namespace taclink::server

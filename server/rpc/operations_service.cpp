@@ -1,0 +1,25 @@
+#include "server/rpc/operations_service.h"
+
+#include <spdlog/spdlog.h>
+
+#include "server/rpc/status.h"
+#include "server/rpc/who.h"
+
+namespace taclink::server {
+
+grpc::ServerUnaryReactor* OperationsService::RestartLink(grpc::CallbackServerContext* context,
+                                                         const v1::RestartLinkRequest* request,
+                                                         v1::RestartLinkResponse*) {
+  auto* reactor = context->DefaultReactor();
+  const auto link = arm_.FindLink(request->link());
+  if (!link) {
+    reactor->Finish(ToGrpc(link.error()));
+    return reactor;
+  }
+  spdlog::info("link {}: restart ordered by {}", request->link(), Who(*context, *security_));
+  arm_.worker(*link).Restart();
+  reactor->Finish(grpc::Status::OK);
+  return reactor;
+}
+
+}  // namespace taclink::server

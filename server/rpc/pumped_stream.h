@@ -1,0 +1,68 @@
+#pragma once
+
+#include <grpcpp/support/byte_buffer.h>
+#include <grpcpp/support/server_callback.h>
+
+#include <atomic>
+#include <boost/asio/thread_pool.hpp>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+namespace taclink::server {
+
+class StreamRegistry;
+
+/// One client's server-streaming call with one message under way at a time: while the client does not read,
+/// gRPC's flow control keeps that message, and who makes the messages decides what it misses. Heirs make the
+/// messages (Next, Last) and call the notifier when there may be one.
+class PumpedStream : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
+                     public std::enable_shared_from_this<PumpedStream> {
+ public:
+  ~PumpedStream() override = default;
+
+  /// The server ends the stream and tells why. Any thread.
+  void End(const std::string& reason);
+
+ protected:
+  /// Sending goes on in `senders`, so that those who notify are not kept by gRPC.
+  PumpedStream(StreamRegistry& registry, std::shared_ptr<boost::asio::thread_pool> senders);
+
+  /// Begins to send. Only once the registry holds the stream and Next may be called.
+  void Open();
+  /// To be called, by any thread, when Next may have something again. Outlives the stream.
+  std::function<void()> Notifier();
+
+  /// The next message, or none yet: then a notification will follow when there is one. One thread at a time.
+  virtual std::optional<grpc::ByteBuffer> Next() = 0;
+  /// The message before the server ends the stream; none: only the status tells. One thread at a time.
+  virtual std::optional<grpc::ByteBuffer> Last(const std::string& reason) = 0;
+
+ private:
+  void OnWriteDone(bool ok) final;
+  void OnCancel() final;
+  void OnDone() final;
+
+  /// Starts the next write if none is under way and there is something to send.
+  void Pump();
+  enum class Step { kNothing, kWrite, kWriteLast, kFinish };
+  Step Decide();
+
+  // Constant after construction.
+  StreamRegistry& registry_;
+  const std::shared_ptr<boost::asio::thread_pool> senders_;
+
+  std::mutex mutex_;
+  // Guarded by mutex_.
+  bool open_ = false;
+  bool writing_ = false;
+  bool cancelled_ = false;
+  bool finished_ = false;
+  std::string end_reason_;  // not empty: the server ends the stream
+
+  grpc::ByteBuffer message_;  // under way while writing_ or finished_
+};
+
+}  // namespace taclink::server

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <grpcpp/support/server_callback.h>
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "server/rpc/status.h"
+
+namespace taclink::server {
+
+/// A client-streaming call that the server can end.
+class UpdateCall {
+ public:
+  virtual ~UpdateCall() = default;
+  virtual void End(const grpc::Status& status) = 0;
+};
+
+/// The client-streaming calls of a server; bounds their number. Holds each until gRPC is done with it.
+class UpdateRegistry {
+ public:
+  explicit UpdateRegistry(size_t max_calls) : max_calls_(max_calls) {}
+
+  /// Errors: kResourceExhausted, kUnavailable (closed).
+  Result<void> Add(std::shared_ptr<UpdateCall> call) {
+    const std::lock_guard lock(mutex_);
+    if (closed_) return Error{ErrorCode::kUnavailable, "server is shutting down"};
+    if (calls_.size() >= max_calls_) {
+      return Error{ErrorCode::kResourceExhausted,
+                   "all " + std::to_string(max_calls_) + " calls that feed the server are in use; end one"};
+    }
+    calls_.insert(std::move(call));
+    return {};
+  }
+  void Remove(const std::shared_ptr<UpdateCall>& call) {
+    const std::lock_guard lock(mutex_);
+    calls_.erase(call);
+  }
+  /// Ends all and takes no more.
+  void Close(const std::string& reason) {
+    std::set<std::shared_ptr<UpdateCall>> calls;
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+      calls = calls_;
+    }
+    for (const auto& call : calls) call->End({grpc::StatusCode::UNAVAILABLE, reason});
+  }
+  size_t calls() const {
+    const std::lock_guard lock(mutex_);
+    return calls_.size();
+  }
+
+ private:
+  // Constant after construction.
+  const size_t max_calls_;
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  std::set<std::shared_ptr<UpdateCall>> calls_;
+  bool closed_ = false;
+};
+
+/// Takes a client's messages one by one; the next is read when one was taken, so that a fast client waits.
+template <typename Request>
+class UpdateStream final : public grpc::ServerReadReactor<Request>,
+                           public UpdateCall,
+                           public std::enable_shared_from_this<UpdateStream<Request>> {
+ public:
+  /// `take`: each message; an error ends the call with it. `finish`: fills the response at the client's end.
+  UpdateStream(UpdateRegistry& registry, std::function<Result<void>(const Request&)> take,
+               std::function<void()> finish)
+      : registry_(registry), take_(std::move(take)), finish_(std::move(finish)) {}
+
+  /// Only once the registry was asked; `accepted`: what it said.
+  void Begin(const Result<void>& accepted) {
+    if (!accepted) {
+      self_ = this->shared_from_this();
+      return End(ToGrpc(accepted.error()));
+    }
+    this->StartRead(&message_);
+  }
+
+  void End(const grpc::Status& status) override {
+    {
+      const std::lock_guard lock(mutex_);
+      if (std::exchange(finished_, true)) return;
+    }
+    this->Finish(status);
+  }
+
+ private:
+  void OnReadDone(bool ok) override {
+    if (!ok) {
+      finish_();
+      return End(grpc::Status::OK);  // for a client that has gone it is of no account
+    }
+    if (const auto taken = take_(message_); !taken) return End(ToGrpc(taken.error()));
+    const std::lock_guard lock(mutex_);
+    if (!finished_) this->StartRead(&message_);  // not after Finish
+  }
+  void OnCancel() override { End(grpc::Status::CANCELLED); }
+  void OnDone() override {
+    const auto last = this->shared_from_this();
+    self_.reset();
+    registry_.Remove(last);
+  }
+
+  // Constant after construction.
+  UpdateRegistry& registry_;
+  const std::function<Result<void>(const Request&)> take_;
+  const std::function<void()> finish_;
+
+  std::shared_ptr<UpdateStream> self_;  // of a refused call, until gRPC is done
+  Request message_;                     // being read, or taken
+  std::mutex mutex_;
+  // Guarded by mutex_.
+  bool finished_ = false;
+};
+
+}  // namespace taclink::server

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <grpcpp/server_context.h>
+
+#include <string>
+
+#include "server/security/security.h"
+
+namespace taclink::server {
+
+/// Where a call comes from, as gRPC tells a peer ("ipv4:192.168.1.5:41234"); of a call through the HTTP
+/// gateway its client's.
+std::string PeerOf(const grpc::ServerContextBase& context);
+
+/// Who calls, for logs and the audit: the name of the token or of the certificate, if there is any, with the
+/// peer.
+std::string Who(const grpc::ServerContextBase& context, const Security& security);
+
+}  // namespace taclink::server

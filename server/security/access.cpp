@@ -1,0 +1,39 @@
+#include "server/security/access.h"
+
+#include <algorithm>
+
+namespace taclink::server {
+namespace {
+
+constexpr AccessRule kTable[] = {
+    {"/taclink.v1.TactileService/GetArm", Role::kViewer},
+    {"/taclink.v1.TactileService/StreamFrames", Role::kViewer},
+    {"/taclink.v1.TactileService/StreamContacts", Role::kViewer},
+    {"/taclink.v1.TactileService/StreamEvents", Role::kViewer},
+    {"/taclink.v1.TactileService/SetThresholds", Role::kOperator},
+    {"/taclink.v1.TactileService/UpdateJointStates", Role::kOperator},
+    {"/taclink.v1.TactileService/UpdatePressure", Role::kOperator},
+    {"/taclink.v1.TactileService/Calibrate", Role::kOperator},
+    {"/taclink.v1.TactileService/Tare", Role::kOperator},
+    {"/taclink.v1.OperationsService/RestartLink", Role::kOperator},
+    {"/grpc.health.v1.Health/Check", Role::kNobody},
+    {"/grpc.health.v1.Health/Watch", Role::kNobody},
+    {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", Role::kViewer},
+    {"/healthz", Role::kNobody},
+    {"/readyz", Role::kNobody},
+    {"/metrics", Role::kViewer},
+};
+
+}  // namespace
+
+std::span<const AccessRule> AccessTable() {
+  return kTable;
+}
+
+Role NeededRole(std::string_view path) {
+  const auto* const rule =
+      std::find_if(std::begin(kTable), std::end(kTable), [&](const auto& each) { return each.path == path; });
+  return rule == std::end(kTable) ? Role::kOperator : rule->role;
+}
+
+}  // namespace taclink::server

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+
+#include "sensing/core/result.h"
+#include "server/config_security.h"
+
+namespace taclink::server {
+
+/// What TLS needs, as PEM texts that were checked: they parse, and the key is the certificate's.
+struct TlsMaterial {
+  std::string certificate;  ///< chain, the server's own first
+  std::string key;
+  std::string client_ca;  ///< empty: clients need no certificate
+
+  bool operator==(const TlsMaterial&) const = default;
+};
+
+/// Reads and checks the configured files. Errors: kNotFound, kInvalidArgument; they name the file.
+Result<TlsMaterial> ReadTlsFiles(const SecurityConfig& config);
+
+/// What is worth a warning but works: a key that others may read, a certificate out of its time. Empty: none.
+std::string TlsWarnings(const SecurityConfig& config, const TlsMaterial& material);
+
+/// Errors: kNotFound (`what` names its use).
+Result<std::string> ReadSecurityFile(const std::string& what, const std::string& path);
+
+}  // namespace taclink::server

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+namespace taclink::server {
+
+struct PemPair {
+  std::string certificate;
+  std::string key;
+};
+
+/// Makes certificates for tests.
+class TestAuthority {
+ public:
+  TestAuthority();
+  ~TestAuthority();
+
+  const std::string& pem() const { return pem_; }
+  /// For localhost and 127.0.0.1; `days` from now (less than 0: expired).
+  PemPair Issue(const std::string& name, int days = 2) const;
+
+ private:
+  struct Keys;
+  std::unique_ptr<Keys> keys_;
+  std::string pem_;
+};
+
+}  // namespace taclink::server

@@ -1,0 +1,101 @@
+// What `taclink joints` reads and `taclink contacts` prints.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/command/contacts_view.h"
+#include "client/command/joint_lines.h"
+#include "client/command/json.h"
+
+namespace taclink::command {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+JointLine LineOf(JointLineReader& reader, const std::string& text) {
+  const auto read = reader.Read(text);
+  EXPECT_TRUE(read.ok()) << read.error().message;
+  return read.ok() && *read ? **read : JointLine{};
+}
+
+std::string Complaint(const std::vector<std::string>& lines) {
+  JointLineReader reader;
+  for (const auto& line : lines) {
+    const auto read = reader.Read(line);
+    if (!read) return read.error().message;
+  }
+  return "accepted";
+}
+
+TEST(JointLines, Csv) {
+  JointLineReader reader;
+  EXPECT_FALSE(reader.Read("# a comment")->has_value());
+  EXPECT_FALSE(reader.Read("elbow, time_s ,lift\r")->has_value());
+  const auto line = LineOf(reader, "0.5, 1.25, -2e-1\r");
+  EXPECT_THAT(line.names, ElementsAre("elbow", "lift"));
+  EXPECT_THAT(line.positions, ElementsAre(0.5, -0.2));
+  EXPECT_EQ(line.time_s, 1.25);
+  EXPECT_FALSE(reader.Read("")->has_value());
+}
+
+TEST(JointLines, Json) {
+  JointLineReader reader;
+  auto line = LineOf(reader, R"({"positions": {"elbow": 0.5, "lift": 1}, "time_s": 2})");
+  EXPECT_THAT(line.names, ElementsAre("elbow", "lift"));
+  EXPECT_THAT(line.positions, ElementsAre(0.5, 1));
+  EXPECT_EQ(line.time_s, 2);
+  line = LineOf(reader, R"({"names": ["a"], "positions": [3], "velocities": [4]})");
+  EXPECT_THAT(line.names, ElementsAre("a"));
+  EXPECT_THAT(line.velocities, ElementsAre(4));
+  EXPECT_FALSE(line.time_s.has_value());
+}
+
+TEST(JointLines, MistakesAreNamedWithTheirLine) {
+  EXPECT_THAT(Complaint({"1,2"}), HasSubstr("line 1: CSV begins with a line that names"));
+  EXPECT_THAT(Complaint({"a,b", "1"}), HasSubstr("line 2: 1 cells for 2 columns"));
+  EXPECT_THAT(Complaint({"a,b", "1,x"}), HasSubstr("'x' in column 'b' is not a number"));
+  EXPECT_THAT(Complaint({"a", "nan"}), HasSubstr("not a number"));
+  EXPECT_THAT(Complaint({"{\"a\": 1}"}), HasSubstr("\"positions\""));
+  EXPECT_THAT(Complaint({"{"}), HasSubstr("no JSON object"));
+  EXPECT_THAT(Complaint({R"({"positions": ["x"]})"}), HasSubstr("must be"));
+}
+
+client::ArmContacts MakeArm() {
+  client::ArmContacts arm;
+  client::ArmContact contact;
+  contact.id = (uint64_t{1} << 40) + 3;
+  contact.link = "forearm";
+  contact.center_m = {0.1, 0.2, 0.3};
+  contact.force_n = {-1, 0, 0.5};
+  contact.force_covariance_n2 = {0.0625, 0, 0, 0.25, 0, 4};
+  contact.normal_force_n = 1;
+  contact.validity = client::PoseValidity::kStale;
+  arm.contacts = {contact};
+  arm.joints = {{.joint = "elbow", .torque_nm = -0.25, .sigma_nm = 0.125},
+                {.joint = "lift", .torque_nm = 2, .sigma_nm = {}}};
+  arm.validity = client::PoseValidity::kStale;
+  return arm;
+}
+
+TEST(ContactsView, JsonHasEverything) {
+  const Json json = Json::parse(ContactsJson(MakeArm()));
+  const Json& contact = json.at("contacts")[0];
+  EXPECT_EQ(contact.at("id"), 1099511627779);
+  EXPECT_EQ(contact.at("center_mm")[1], 200);
+  EXPECT_EQ(contact.at("force_sigma_n")[1], 0.5);
+  EXPECT_TRUE(contact.at("center_sigma_mm").is_null());
+  EXPECT_EQ(contact.at("pose"), "stale");
+  EXPECT_EQ(json.at("joints").at("elbow").at("torque_nm"), -0.25);
+  EXPECT_TRUE(json.at("joints").at("lift").at("sigma_nm").is_null());
+}
+
+TEST(ContactsView, TableNamesContactsAndTorques) {
+  const std::string table = ContactsTable(MakeArm());
+  EXPECT_THAT(table, HasSubstr("forearm"));
+  EXPECT_THAT(table, HasSubstr("stale"));
+  EXPECT_THAT(table, HasSubstr("elbow -0.250 ±0.125  lift 2.000"));
+  EXPECT_THAT(ContactsTable({}), HasSubstr("no contacts"));
+}
+
+}  // namespace
+}  // namespace taclink::command

@@ -1,0 +1,255 @@
+// Tares of a simulated link: a new baseline with the cameras as they are, and a baseline that follows creep.
+#include "sensing/pipeline/tare.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "sensing/pipeline/link_pipeline.h"
+#include "tests/support/moving_skin.h"
+
+namespace taclink {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kFrameS = 1 / 30.0;
+constexpr double kFreeS = 0.5, kTouchedS = 3;  // of the scene
+
+class FrameClock final : public Clock {
+ public:
+  int64_t MonotonicNs() const override { return now_ns; }
+  int64_t UtcNs() const override { return now_ns + 1'700'000'000'000'000'000; }
+  void SleepUntilMonotonicNs(int64_t) override {}
+  int64_t now_ns = 1'000'000'000;
+};
+
+class TareTest : public testing::Test {
+ protected:
+  static Scene TouchScene() {
+    Scene scene;
+    scene.skin = SkinKind::kLinear;
+    scene.model = "cylinder";
+    scene.duration_s = 40;
+    scene.pressure = {{0, 0}};
+    SceneContact contact;
+    contact.at = {.path = 7, .ring = 5};
+    contact.force_n = 0.2;
+    contact.begin_s = 1.5;
+    contact.end_s = 30;
+    contact.ramp_s = 0.5;
+    scene.contacts = {contact};
+    return scene;
+  }
+  static PipelineOptions Options() {
+    PipelineOptions options;
+    options.rest_frames = 4;
+    return options;
+  }
+
+  void Start(const Scene& scene, const PipelineOptions& options = Options()) {
+    skin_ = std::make_unique<MovingSkin>("cylinder", scene);
+    pipeline_ = std::make_unique<LinkPipeline>(skin_->model, options, clock_);
+    for (int k = 0; k <= options.rest_frames; ++k) Process(0);
+    ASSERT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  }
+  void Process(double time_s) {
+    clock_.now_ns += static_cast<int64_t>(kFrameS * 1e9);
+    skin_->Take(time_s, sequence_++);
+    skin_->frame.times.exposure_monotonic_ns = clock_.now_ns;
+    skin_->frame.pressure_mpa.reset();
+    pipeline_->Process(skin_->frame, state_);
+  }
+  Result<TareSummary> Tare(const TareOptions& options, double time_s) {
+    const auto begun = pipeline_->BeginTare(options);
+    if (!begun) return begun.error();
+    for (int k = 0; k < options.frames; ++k) {
+      Process(time_s + k * kFrameS);
+      if (auto end = pipeline_->TakeTareEnd()) return *std::move(end);
+    }
+    return Error{ErrorCode::kInternal, "no end"};
+  }
+  double TotalForce() const { return state_.total_force_n.norm(); }
+
+  FrameClock clock_;
+  std::unique_ptr<MovingSkin> skin_;
+  std::unique_ptr<LinkPipeline> pipeline_;
+  LinkState state_;
+  uint64_t sequence_ = 0;
+};
+
+TEST_F(TareTest, AFreeSkinIsTared) {
+  Start(TouchScene());
+  EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kStart);
+  const int64_t first_ns = state_.baseline.taken_utc_ns;
+  EXPECT_GT(first_ns, 0);
+  clock_.now_ns += 5'000'000'000;
+  const auto tare = Tare({.frames = 6}, kFreeS);
+  ASSERT_TRUE(tare.ok()) << tare.error().message;
+  EXPECT_EQ(tare->frames, 6);
+  EXPECT_FALSE(tare->forced);
+  EXPECT_NEAR(tare->previous_age_s, 5.2, 0.2);
+  EXPECT_LT(tare->shift_mm, 0.1) << "nothing has changed";
+  Process(kFreeS);
+  EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kTare);
+  EXPECT_GT(state_.baseline.taken_utc_ns, first_ns);
+  EXPECT_NEAR(state_.baseline_age_s, kFrameS, 1e-6);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  EXPECT_TRUE(state_.contacts.empty());
+  for (double t = 1.4; t < kTouchedS; t += kFrameS) Process(t);
+  ASSERT_EQ(state_.contacts.size(), 1u);
+  EXPECT_NEAR(TotalForce(), 0.2, 0.04);
+}
+
+TEST_F(TareTest, ATouchedSkinIsRefusedUnlessForced) {
+  Start(TouchScene());
+  for (double t = 1.4; t < kTouchedS; t += kFrameS) Process(t);
+  ASSERT_NEAR(TotalForce(), 0.2, 0.04);
+  const auto refused = Tare({.frames = 6}, kTouchedS);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::kFailedPrecondition);
+  EXPECT_THAT(refused.error().message, HasSubstr("touched: a contact of 0."));
+  Process(kTouchedS);
+  EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kStart);
+  EXPECT_NEAR(TotalForce(), 0.2, 0.04) << "all is as it was";
+
+  const auto forced = Tare({.frames = 6, .force = true}, kTouchedS);
+  ASSERT_TRUE(forced.ok()) << forced.error().message;
+  EXPECT_TRUE(forced->forced);
+  EXPECT_GT(forced->shift_mm, 0.5);
+  for (int k = 0; k < 10; ++k) Process(kTouchedS + k * kFrameS);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kForcedTare);
+  EXPECT_LT(TotalForce(), 0.03) << "the touch is the baseline now";
+  EXPECT_GT(state_.shape.seen(), 200);
+}
+
+TEST_F(TareTest, AHiddenCameraKeepsItsBaseline) {
+  Start(TouchScene());
+  ASSERT_TRUE(pipeline_->BeginTare({.frames = 3, .force = true}).ok());
+  std::optional<Result<TareSummary>> end;
+  for (int k = 0; k < 3; ++k) {
+    skin_->Take(kFreeS, sequence_++);
+    skin_->frame.images[Index(CameraId::kBottom)].valid = false;
+    pipeline_->Process(skin_->frame, state_);
+    end = pipeline_->TakeTareEnd();
+  }
+  skin_->frame.images[Index(CameraId::kBottom)].valid = true;
+  ASSERT_TRUE(end && *end) << (end ? end->error().message : "no end");
+  EXPECT_TRUE((*end)->forced);
+  for (double t = 1.4; t < kTouchedS; t += kFrameS) Process(t);
+  EXPECT_NEAR(TotalForce(), 0.2, 0.04);
+}
+
+TEST_F(TareTest, NeedsABaselineAndOneAtATime) {
+  skin_ = std::make_unique<MovingSkin>("cylinder", TouchScene());
+  pipeline_ = std::make_unique<LinkPipeline>(skin_->model, Options(), clock_);
+  EXPECT_FALSE(pipeline_->BeginTare({}).ok());
+  for (int k = 0; k <= 4; ++k) Process(0);
+  ASSERT_TRUE(pipeline_->BeginTare({}).ok());
+  EXPECT_FALSE(pipeline_->BeginTare({}).ok());
+  pipeline_->BeginRest(3);
+  const auto end = pipeline_->TakeTareEnd();
+  ASSERT_TRUE(end.has_value());
+  EXPECT_THAT(end->error().message, HasSubstr("anew"));
+}
+
+TEST_F(TareTest, CreepIsFollowedReportedAndTared) {
+  // Pressure that nobody measures blows the skin up slowly: a creep of the whole skin. Rates are those of a
+  // test that should not take hours.
+  Scene scene = TouchScene();
+  scene.contacts.clear();
+  scene.pressure = {{0.5, 0}, {8, 0.5}};
+  PipelineOptions options = Options();
+  Start(scene, options);
+  for (double t = 0; t < 10; t += kFrameS) Process(t);
+  const auto largest = [&] {
+    double most = 0;
+    for (const Vec3& u : state_.shape.displacements_mm) most = std::max(most, u.norm());
+    return most;
+  };
+  const double creep_mm = largest();
+  ASSERT_GT(creep_mm, 0.15);
+  EXPECT_EQ(state_.baseline.drift_state, DriftState::kOff);
+
+  options.drift = {.time_constant_s = 0.3, .rate_limit_mm_s = 1, .limit_mm = 0.5 * creep_mm, .quiet_s = 0.3};
+  Start(scene, options);
+  for (double t = 0; t < 10; t += kFrameS) Process(t);
+  EXPECT_LT(largest(), 0.3 * creep_mm);
+  EXPECT_TRUE(state_.contacts.empty());
+  EXPECT_NEAR(state_.baseline.drift_mm, creep_mm, 0.3 * creep_mm);
+  EXPECT_EQ(state_.baseline.drift_state, DriftState::kFollowing);
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  EXPECT_THAT(state_.status_reason, HasSubstr("tare the link"));
+
+  const auto tare = Tare({.frames = 6}, 10);
+  ASSERT_TRUE(tare.ok()) << tare.error().message;
+  EXPECT_NEAR(tare->shift_mm, creep_mm, 0.3 * creep_mm) << "against the baseline as it was taken";
+  Process(10);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  EXPECT_EQ(state_.baseline.drift_mm, 0);
+  EXPECT_LT(largest(), 0.1);
+}
+
+class TareCollectorTest : public testing::Test {
+ protected:
+  TareCollectorTest() {
+    const auto count = static_cast<size_t>(model_.markers.count());
+    state_.shape.positions_mm.resize(count);
+    state_.status_reason = "why";
+    off_mm_.assign(count, Vec3::Zero());
+    for (size_t c = 0; c < kCameraCount; ++c) {
+      labels_.cameras[c].assign(count, {.seen = true, .center_px = Vec2(100, 100)});
+      state_.cameras[c].labelled = model_.markers.count();
+    }
+  }
+  Result<bool> Take(TareCollector& tare, double off_mm) {
+    off_mm_[5] = Vec3(0, off_mm, 0);
+    return tare.Add(state_, labels_, off_mm_);
+  }
+
+  const LinkModel model_ = LoadLinkModel("cylinder").value();
+  LinkState state_;
+  LabelledMarkers labels_;
+  std::vector<Vec3> off_mm_;
+};
+
+TEST_F(TareCollectorTest, AMovingSkinIsRefusedUnlessForced) {
+  for (const bool force : {false, true}) {
+    TareCollector tare(model_, {.frames = 4, .force = force});
+    for (int k = 0; k < 3; ++k) ASSERT_FALSE(Take(tare, 0.2 * k).value());
+    const auto end = Take(tare, 0.6);
+    ASSERT_EQ(end.ok(), force);
+    EXPECT_EQ(tare.forced(), force);
+    if (force) {
+      EXPECT_NEAR(tare.shift_mm(), 0.3, 1e-9);
+    } else {
+      EXPECT_THAT(end.error().message, HasSubstr("moved by 0.40 mm"));
+    }
+  }
+}
+
+TEST_F(TareCollectorTest, FewMarkersAreRefusedUnlessForced) {
+  state_.cameras[1].labelled = 10;
+  TareCollector careful(model_, {.frames = 2}), forced(model_, {.frames = 2, .force = true});
+  EXPECT_THAT(Take(careful, 0).error().message, HasSubstr("bottom camera sees only 10 of 240"));
+  ASSERT_TRUE(Take(forced, 0).ok());
+  EXPECT_TRUE(forced.forced());
+}
+
+TEST_F(TareCollectorTest, WithoutAMeasurementNoForceHelps) {
+  state_.shape.positions_mm.clear();
+  TareCollector tare(model_, {.frames = 2, .force = true});
+  EXPECT_THAT(Take(tare, 0).error().message, HasSubstr("nothing is measured: why"));
+}
+
+TEST_F(TareCollectorTest, AForceThatWasNotNeededIsNotReported) {
+  TareCollector tare(model_, {.frames = 2, .force = true});
+  ASSERT_FALSE(Take(tare, 0.01).value());
+  ASSERT_TRUE(Take(tare, 0.01).value());
+  EXPECT_FALSE(tare.forced());
+}
+
+}  // namespace
+}  // namespace taclink

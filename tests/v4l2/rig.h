@@ -1,0 +1,68 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/taclink/client.h"
+#include "tests/support/process.h"
+#include "tests/v4l2/emulated_camera.h"
+#include "tests/v4l2/pictures.h"
+
+namespace taclink::testing {
+
+inline constexpr int kRigRateHz = 4;
+inline constexpr double kRigForever = 120;  // s; ends a test that hangs, nothing is judged by it
+
+int64_t MonotonicNs();
+
+/// A frame as a client got it.
+struct ReceivedFrame {
+  client::Frame frame;
+  int64_t received_ns = 0;  ///< monotonic
+};
+
+/// Two links, "a" (MJPEG) and "b" (any format: YUYV), each with two emulated cameras named by their serial
+/// numbers, a server that runs them, and a client that keeps every frame.
+class Rig {
+ public:
+  explicit Rig(const std::string& picture_folder);
+  ~Rig();
+
+  /// The camera's number is its port at first: a top, a bottom, b top, b bottom.
+  EmulatedCamera& camera(size_t number) { return *cameras_[number]; }
+  Pictures& pictures() { return pictures_; }
+  /// Empty: it runs; else what failed.
+  std::string StartServer();
+  client::Arm Arm();
+  void StopServer();
+
+  using Wanted = std::function<bool(const client::Frame&)>;
+  /// The first frame of the link, received after that time, that is wanted; waits for it. None: never came.
+  std::optional<ReceivedFrame> Await(const std::string& link, int64_t after_ns, const Wanted& wanted);
+  /// All of the link with a picture, received within.
+  std::vector<ReceivedFrame> Frames(const std::string& link, int64_t from_ns, int64_t to_ns);
+
+ private:
+  void Receive(const std::stop_token& stop);
+
+  Pictures pictures_;
+  std::vector<std::unique_ptr<EmulatedCamera>> cameras_;
+  std::unique_ptr<Process> server_;
+  std::optional<client::Client> client_;
+  std::unique_ptr<client::FrameReader> reader_;
+
+  std::mutex mutex_;
+  std::condition_variable received_;
+  // Guarded by mutex_.
+  std::vector<ReceivedFrame> frames_;
+
+  std::jthread receiver_;
+};
+
+}  // namespace taclink::testing

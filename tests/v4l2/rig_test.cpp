@@ -1,0 +1,290 @@
+// Runs as root in the machine of run-in-vm with vhci_hcd and uvcvideo: taclinkd with the emulated cameras,
+// which show what the simulation rendered. Prints the table of docs/faults.md.
+#include "tests/v4l2/rig.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "sensing/capture/camera_finder.h"
+#include "sensing/capture/v4l2_device.h"
+#include "sensing/capture/v4l2_source.h"
+#include "sensing/core/clock.h"
+#include "tests/sensing/capture/pictures.h"
+
+namespace taclink::testing {
+namespace {
+
+using client::LinkStatus;
+using ::testing::HasSubstr;
+
+constexpr double kToStatusS = 1, kToRecoveryS = 2;
+enum : size_t { kATop, kABottom, kBTop, kBBottom };
+
+bool Blames(const client::Frame& frame, const std::string& reason) {
+  return frame.status != LinkStatus::kOk && frame.status_reason.find(reason) != std::string::npos;
+}
+bool NamesNoCamera(const client::Frame& frame) {
+  return frame.times.exposure_ns != 0 && frame.status_reason.find("camera") == std::string::npos;
+}
+double Seconds(int64_t from_ns, int64_t to_ns) {
+  return 1e-9 * static_cast<double>(to_ns - from_ns);
+}
+int LostBetween(const std::vector<ReceivedFrame>& frames) {
+  int lost = 0;
+  for (size_t i = 1; i < frames.size(); ++i) {
+    if (frames[i].frame.sequence > frames[i - 1].frame.sequence + 1)
+      lost += static_cast<int>(frames[i].frame.sequence - frames[i - 1].frame.sequence - 1);
+  }
+  return lost;
+}
+
+struct Fault {
+  const char* what;
+  const char* how;
+  const char* reason;  ///< part of what the status says
+  std::function<void(Rig&)> inject, undo;
+};
+
+/// For the kernel to find what was plugged in: nothing tells of it.
+void LetTimePass() {
+  poll(nullptr, 0, 10);
+}
+
+std::optional<V4l2Device> HoldOpen(const std::string& name, int seconds) {
+  V4l2DeviceOptions options;
+  options.frame_rate_hz = kRigRateHz;
+  options.format = PixelFormat::kMjpeg;
+  for (const int64_t until = MonotonicNs() + seconds * int64_t{1'000'000'000}; MonotonicNs() < until;) {
+    const auto node = FindCamera(name);
+    if (!node) {
+      LetTimePass();
+      continue;
+    }
+    options.path = *node;
+    auto device = V4l2Device::Open(options);
+    if (device) return std::move(*device);
+  }
+  return std::nullopt;
+}
+
+class RigTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    rig_ = new Rig(std::getenv("RIG_PICTURES") ? std::getenv("RIG_PICTURES") : ".");
+    std::printf(
+        "| Fault | Injected by | Status | To status, s | To recovery, s | Lost on the other link |\n"
+        "|---|---|---|---|---|---|\n");
+  }
+  static void TearDownTestSuite() { delete rig_; }
+
+  static void PrintRow(const char* what, const char* how, const client::Frame& frame, double to_status_s,
+                       double to_recovery_s, const std::string& lost) {
+    std::string reason = frame.status_reason;  // without the list of cameras
+    for (size_t at = 0; (at = reason.find(" There are")) != std::string::npos;)
+      reason.erase(at, std::min(reason.find(';', at), reason.size()) - at);
+    std::printf("| %s | %s | %s: %s | %.2f | %.2f | %s |\n", what, how, client::Name(frame.status),
+                reason.c_str(), to_status_s, to_recovery_s, lost.c_str());
+    std::fflush(stdout);
+  }
+
+  static void Run(const Fault& fault) {
+    const int64_t injected_ns = MonotonicNs();
+    fault.inject(*rig_);
+    const auto noticed =
+        rig_->Await("a", injected_ns, [&](const auto& frame) { return Blames(frame, fault.reason); });
+    ASSERT_TRUE(noticed) << fault.what;
+    const int64_t undone_ns = MonotonicNs();
+    fault.undo(*rig_);
+    const auto recovered =
+        rig_->Await("a", undone_ns, [](const auto& frame) { return frame.status == LinkStatus::kOk; });
+    ASSERT_TRUE(recovered) << fault.what;
+    const auto others = rig_->Frames("b", injected_ns, recovered->received_ns);
+    const double to_status_s = Seconds(injected_ns, noticed->received_ns);
+    const double to_recovery_s = Seconds(undone_ns, recovered->received_ns);
+    const int lost = LostBetween(others);
+    PrintRow(fault.what, fault.how, noticed->frame, to_status_s, to_recovery_s,
+             std::to_string(lost) + " of " + std::to_string(others.size() + static_cast<size_t>(lost)));
+    EXPECT_LE(to_status_s, kToStatusS) << fault.what;
+    EXPECT_LE(to_recovery_s, kToRecoveryS) << fault.what;
+    EXPECT_EQ(lost, 0) << fault.what;
+    for (const ReceivedFrame& other : others)
+      EXPECT_EQ(other.frame.status, LinkStatus::kOk) << fault.what << ": " << other.frame.status_reason;
+  }
+
+  static Rig* rig_;
+};
+Rig* RigTest::rig_ = nullptr;
+
+// Link a's bottom camera is held by another program, link b's is not there yet; both links say so and begin
+// as soon as they can.
+TEST_F(RigTest, AStartsWithoutCameras) {
+  for (const size_t number : {kATop, kABottom, kBTop})
+    ASSERT_EQ(rig_->camera(number).Plug(static_cast<int>(number)), "");
+  auto held = HoldOpen("serial:a-bottom", 60);
+  ASSERT_TRUE(held);
+  for (const char* name : {"serial:a-top", "serial:b-top"}) {
+    while (!FindCamera(name)) LetTimePass();
+  }
+  ASSERT_EQ(rig_->StartServer(), "");
+  const int64_t started_ns = MonotonicNs();
+  const auto busy = rig_->Await("a", 0, [](const auto& frame) { return Blames(frame, "another program"); });
+  const auto absent =
+      rig_->Await("b", 0, [](const auto& frame) { return Blames(frame, "serial:b-bottom: no such camera"); });
+  ASSERT_TRUE(busy && absent);
+  EXPECT_THAT(busy->frame.status_reason, HasSubstr("bottom camera"));
+
+  const int64_t released_ns = MonotonicNs();
+  held.reset();
+  ASSERT_EQ(rig_->camera(kBBottom).Plug(kBBottom), "");
+  const auto a = rig_->Await("a", released_ns, NamesNoCamera);
+  const auto b = rig_->Await("b", released_ns, NamesNoCamera);
+  ASSERT_TRUE(a && b);
+  // Recovery is the first pair's exposure: the emulated processor labels its first rest pictures for seconds.
+  PrintRow("Held by another program at the start", "another process has it open with buffers", busy->frame,
+           Seconds(started_ns, busy->received_ns), Seconds(released_ns, a->frame.times.exposure_ns), "-");
+  PrintRow("Absent at the start", "not plugged in", absent->frame, Seconds(started_ns, absent->received_ns),
+           Seconds(released_ns, b->frame.times.exposure_ns), "-");
+  EXPECT_LE(Seconds(started_ns, busy->received_ns), kToStatusS);
+  EXPECT_LE(Seconds(started_ns, absent->received_ns), kToStatusS);
+  EXPECT_LE(Seconds(released_ns, a->frame.times.exposure_ns), kToRecoveryS);
+  EXPECT_LE(Seconds(released_ns, b->frame.times.exposure_ns), kToRecoveryS);
+  const auto is_ok = [](const auto& frame) { return frame.status == LinkStatus::kOk; };
+  ASSERT_TRUE(rig_->Await("a", released_ns, is_ok));
+  ASSERT_TRUE(rig_->Await("b", released_ns, is_ok));
+}
+
+TEST_F(RigTest, BForcesAreTheTruths) {
+  const int64_t begun_ns = MonotonicNs();
+  rig_->pictures().Play(begun_ns);
+  const double round_s = static_cast<double>(rig_->pictures().count()) / kRigRateHz;
+  const auto end = rig_->Await(
+      "a", begun_ns, [&](const auto& frame) { return Seconds(begun_ns, frame.times.exposure_ns) > round_s; });
+  ASSERT_TRUE(end);
+  for (const char* link : {"a", "b"}) {
+    const auto frames = rig_->Frames(link, begun_ns, MonotonicNs());
+    double worst_n = 0, largest_n = 0, largest_measured_n = 0;
+    for (const ReceivedFrame& each : frames) {
+      const Vec3& truth = rig_->pictures().ForceN(each.frame.times.exposure_ns);
+      const auto& force = each.frame.total_force_n;
+      const Vec3 measured(force[0], force[1], force[2]);
+      worst_n = std::max(worst_n, (measured - truth).norm());
+      largest_measured_n = std::max(largest_measured_n, measured.norm());
+      largest_n = std::max(largest_n, truth.norm());
+    }
+    std::printf(
+        "link %s: %zu frames of %zu pictures, lost %d; force up to %.4f N, measured up to %.4f N, largest "
+        "error %.4f N\n",
+        link, frames.size(), rig_->pictures().count(), LostBetween(frames), largest_n, largest_measured_n,
+        worst_n);
+    EXPECT_GE(frames.size(), rig_->pictures().count() - 1);
+    EXPECT_EQ(LostBetween(frames), 0);
+    EXPECT_GT(largest_n, 0.25);
+    EXPECT_GT(largest_measured_n, 0.25);
+    EXPECT_LE(worst_n, 0.05);
+  }
+}
+
+TEST_F(RigTest, CFaultsOfOneLinkAreSaidMendedAndNobodyElses) {
+  const auto nothing = [](Rig&) {};
+  Run({"One camera unplugged, plugged into another port", "USB/IP port closed, another one opened",
+       "bottom camera", [](Rig& rig) { rig.camera(kABottom).Unplug(); },
+       [](Rig& rig) { EXPECT_EQ(rig.camera(kABottom).Plug(5), ""); }});
+  Run({"Both cameras unplugged", "both USB/IP ports closed", "top camera",
+       [](Rig& rig) {
+         rig.camera(kATop).Unplug();
+         rig.camera(kABottom).Unplug();
+       },
+       [](Rig& rig) {
+         EXPECT_EQ(rig.camera(kATop).Plug(0), "");
+         EXPECT_EQ(rig.camera(kABottom).Plug(1), "");
+       }});
+  Run({"One camera stalled", "it answers, but sends no pictures", "serial:a-bottom",
+       [](Rig& rig) { rig.camera(kABottom).Stall(true); },
+       [](Rig& rig) { rig.camera(kABottom).Stall(false); }});
+  Run({"Both cameras stalled", "they answer, but send no pictures", "no pair of pictures",
+       [](Rig& rig) {
+         rig.camera(kATop).Stall(true);
+         rig.camera(kABottom).Stall(true);
+       },
+       [](Rig& rig) {
+         rig.camera(kATop).Stall(false);
+         rig.camera(kABottom).Stall(false);
+       }});
+  Run({"Corrupt pictures", "a quarter of the JPEG's bytes overwritten, 4 pictures", "top camera",
+       [](Rig& rig) { rig.camera(kATop).Spoil(Damage::kCorrupt, 4); }, nothing});
+  Run({"Short pictures", "the second half missing, 4 pictures", "top camera",
+       [](Rig& rig) { rig.camera(kATop).Spoil(Damage::kShort, 4); }, nothing});
+  Run({"Pictures with the error bit", "UVC's error bit, until lifted", "serial:a-top",
+       [](Rig& rig) { rig.camera(kATop).Spoil(Damage::kErrorBit, 1000); },
+       [](Rig& rig) { rig.camera(kATop).Spoil(Damage::kNone, 0); }});
+}
+
+TEST_F(RigTest, DWhatHappenedIsCounted) {
+  const client::Arm arm = rig_->Arm();
+  ASSERT_EQ(arm.links.size(), 2u);
+  ASSERT_EQ(arm.links[0].cameras.size(), 2u);
+  const client::Camera& top = arm.links[0].cameras[0];
+  const client::Camera& bottom = arm.links[0].cameras[1];
+  EXPECT_EQ(top.format, "MJPEG 640x480");
+  EXPECT_EQ(arm.links[1].cameras[0].format, "YUYV 640x480");
+  EXPECT_THAT(top.device, HasSubstr("serial:a-top"));
+  EXPECT_THAT(bottom.device, HasSubstr("usb:"));
+  EXPECT_EQ(bottom.trouble, "");
+  EXPECT_NEAR(top.rate_hz, kRigRateHz, 0.1 * kRigRateHz);
+  EXPECT_GE(top.undecodable, 6u);
+  EXPECT_GT(top.unpaired + bottom.unpaired + top.pictures, 0u);
+}
+
+TEST_F(RigTest, EHundredAndTwentyPairsASecond) {
+  rig_->StopServer();
+  const std::vector<uint8_t> picture = EncodeJpeg(SlopePicture(320, 240));
+  const auto show = [&picture](int64_t, uint8_t) { return std::span<const uint8_t>(picture); };
+  EmulatedCamera top("fast-top", show), bottom("fast-bottom", show);
+  ASSERT_EQ(top.Plug(6), "");
+  ASSERT_EQ(bottom.Plug(7), "");
+  for (const char* name : {"serial:fast-top", "serial:fast-bottom"}) {
+    while (!FindCamera(name)) LetTimePass();
+  }
+  const auto source = MakeV4l2Source({.devices = {"serial:fast-top", "serial:fast-bottom"},
+                                      .width_px = 320,
+                                      .height_px = 240,
+                                      .frame_rate_hz = 120,
+                                      .format = PixelFormat::kMjpeg},
+                                     SystemClock());
+  const auto started = source->Start();
+  ASSERT_TRUE(started) << started.error().message;
+  StereoFrame frame;
+  constexpr int kPairs = 240;
+  uint64_t first = 0;
+  for (int i = 0; i < kPairs; ++i) {
+    const auto got = source->Next(frame, std::chrono::seconds(10));
+    ASSERT_TRUE(got) << got.error().message;
+    EXPECT_TRUE(frame.images[0].valid && frame.images[1].valid);
+    if (i == 0) first = frame.sequence;
+  }
+  const SourceCounters counters = source->Counters();
+  std::printf("%d pairs over %llu exposures, %.2f and %.2f pictures a second\n", kPairs,
+              static_cast<unsigned long long>(frame.sequence - first + 1), counters.rate_hz[0],
+              counters.rate_hz[1]);
+  for (const double rate_hz : counters.rate_hz) EXPECT_NEAR(rate_hz, 120, 0.05 * 120);
+  EXPECT_LE(frame.sequence - first + 1, kPairs * 1.05);
+}
+
+TEST_F(RigTest, FCamerasAreListed) {
+  EmulatedCamera camera("listed", [](int64_t, uint8_t) { return std::span<const uint8_t>(); });
+  ASSERT_EQ(camera.Plug(7), "");
+  while (!FindCamera("serial:listed")) LetTimePass();
+  const Finished listed = RunToEnd({TACLINK, "cameras"});
+  EXPECT_EQ(listed.exit_code, 0) << listed.err;
+  EXPECT_THAT(listed.out, HasSubstr("'Emulated camera' usb:1-8 serial:listed"));
+  EXPECT_THAT(listed.out, HasSubstr("MJPG  320x240    120, 60, 30 per second"));
+  EXPECT_THAT(listed.out, HasSubstr("YUYV  640x480    30, 15, 10, 5, 4, 3, 2 per second"));
+  std::printf("%s", listed.out.c_str());
+}
+
+}  // namespace
+}  // namespace taclink::testing
