@@ -43,7 +43,9 @@ LinkContacts From(const v1::LinkContactsStatus& message) {
           .joint_state_distance_s = message.joint_state_distance_s()};
 }
 
-ArmContacts From(const v1::StreamContactsResponse& message) {
+}  // namespace
+
+ArmContacts FromMessage(const v1::StreamContactsResponse& message) {
   ArmContacts out;
   for (const auto& link : message.links()) out.links.push_back(From(link));
   for (const auto& contact : message.contacts()) out.contacts.push_back(From(contact));
@@ -61,8 +63,6 @@ ArmContacts From(const v1::StreamContactsResponse& message) {
   out.utc_ns = message.utc_ns();
   return out;
 }
-
-}  // namespace
 
 const char* Name(PoseValidity validity) {
   switch (validity) {
@@ -95,7 +95,7 @@ Result<ArmContacts> ContactReader::Next(milliseconds timeout) {
     const auto read = call_->Read(system_clock::now() + timeout);
     if (!read) return read.error();
   }
-  return From(call_->response);
+  return FromMessage(call_->response);
 }
 
 void ContactReader::Cancel() {

@@ -38,6 +38,8 @@ ErrorCode CodeOf(grpc::StatusCode code) {
       return ErrorCode::kTimeout;
     case grpc::StatusCode::FAILED_PRECONDITION:
       return ErrorCode::kFailedPrecondition;
+    case grpc::StatusCode::OUT_OF_RANGE:
+      return ErrorCode::kEndOfData;
     case grpc::StatusCode::RESOURCE_EXHAUSTED:
       return ErrorCode::kResourceExhausted;
     case grpc::StatusCode::UNIMPLEMENTED:

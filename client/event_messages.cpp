@@ -6,9 +6,9 @@
 namespace taclink::client {
 namespace {
 
-constexpr std::array<const char*, 12> kKindNames = {
-    "unknown", "contact_begin", "contact_update", "contact_end", "force_level", "link_status",
-    "tare",    "calibration",   "baseline",       "drift",       "thresholds",  "frames_lost"};
+constexpr std::array<const char*, 13> kKindNames = {
+    "unknown",     "contact_begin", "contact_update", "contact_end", "force_level", "link_status", "tare",
+    "calibration", "baseline",      "drift",          "thresholds",  "frames_lost", "recording"};
 
 std::array<double, 3> From(const v1::Vector3& v) {
   return {v.x(), v.y(), v.z()};

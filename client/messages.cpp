@@ -92,6 +92,8 @@ SourceKind From(v1::SourceKind kind) {
       return SourceKind::kFiles;
     case v1::SOURCE_KIND_SIMULATED:
       return SourceKind::kSimulated;
+    case v1::SOURCE_KIND_LOG:
+      return SourceKind::kLog;
     default:
       return SourceKind::kUnknown;
   }
@@ -298,6 +300,8 @@ const char* Name(SourceKind kind) {
       return "files";
     case SourceKind::kSimulated:
       return "simulated";
+    case SourceKind::kLog:
+      return "log";
     case SourceKind::kUnknown:
       break;
   }
@@ -344,6 +348,7 @@ Frame FromMessage(const v1::LinkFrame& message) {
   for (const auto& contact : message.contacts()) frame.contacts.push_back(From(contact));
   frame.total_force_n = From(message.total_force_n());
   frame.unchanged = message.unchanged();
+  frame.replayed = message.replayed();
   frame.force_model = From(message.force_model());
   frame.baseline_age_s = message.baseline_age_s();
   frame.baseline = FromMessage(message.baseline());

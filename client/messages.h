@@ -1,5 +1,6 @@
 #pragma once
 
+#include "client/taclink/arm_contacts.h"
 #include "client/taclink/client.h"
 #include "taclink/v1/tactile.pb.h"
 
@@ -13,6 +14,7 @@ CalibrationResult FromMessage(const v1::CalibrationResult& message);
 Vector3 FromMessage(const v1::Vector3& message);
 Pose FromMessage(const v1::Pose& message);
 LinkStatus FromMessage(v1::LinkStatus status);
+ArmContacts FromMessage(const v1::StreamContactsResponse& message);
 std::optional<Covariance3> FromMessage(const google::protobuf::RepeatedField<double>& covariance);
 v1::StreamFramesRequest ToMessage(const StreamOptions& options);
 v1::CalibrateRequest ToMessage(const CalibrateOptions& options);

@@ -36,10 +36,14 @@ Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, C
   events_ = std::make_unique<EventEngine>(hub_, std::move(watched), options.events, clock);
 }
 
-Result<size_t> Arm::FindLink(const std::string& name) const {
+std::vector<std::string> Arm::link_names() const {
   std::vector<std::string> names;
   for (const LinkDescription& link : links_) names.push_back(link.name);
-  return server::FindLink(names, name);
+  return names;
+}
+
+Result<size_t> Arm::FindLink(const std::string& name) const {
+  return server::FindLink(link_names(), name);
 }
 
 void Arm::Start() {

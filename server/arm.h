@@ -18,7 +18,7 @@
 
 namespace taclink::server {
 
-enum class SourceKind { kV4l2, kFiles, kSimulated };
+enum class SourceKind { kV4l2, kFiles, kSimulated, kLog };
 
 /// What clients are told about a link that does not change while the server runs.
 struct LinkDescription {
@@ -60,6 +60,9 @@ class Arm {
 
   const std::string& name() const { return name_; }
   const std::vector<LinkDescription>& links() const { return links_; }
+  std::vector<std::string> link_names() const;
+  /// The links' frames come from a log: nothing can be done to them.
+  bool plays_log() const { return !links_.empty() && links_[0].source == SourceKind::kLog; }
   LinkSupervisor& worker(size_t link) { return *workers_[link]; }
   const LinkSupervisor& worker(size_t link) const { return *workers_[link]; }
   Watchdog& watchdog() { return watchdog_; }

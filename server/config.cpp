@@ -80,6 +80,7 @@ SourceConfig Reader::ReadSource(YamlMap& link) const {
       config.loop = link.Bool("loop", config.loop);
       if (link.Has("start_after_s")) config.start_after_s = link.Number("start_after_s", 0, kStartAfter);
       config.in_memory = link.Bool("in_memory", config.in_memory);
+      config.yuyv = link.Bool("yuyv", config.yuyv);
       return config;
     }
     default:
@@ -165,6 +166,7 @@ Result<Config> ParseConfig(const std::string& name, std::string_view text, const
   config.http = ReadHttp(root, path);
   config.security = ReadSecurity(root, path);
   config.events = ReadEvents(root, folder);
+  config.recording = ReadRecording(root, path);
   ReadArm(root, reader, config);
   root.Done();
   if (const auto finished = file->Finish(); !finished) return finished.error();

@@ -17,6 +17,7 @@
 #include "server/config_limits.h"
 #include "server/config_operations.h"
 #include "server/config_pressure.h"
+#include "server/config_recording.h"
 #include "server/config_security.h"
 #include "server/events/options.h"
 #include "server/link_supervisor.h"
@@ -40,6 +41,7 @@ struct FileSourceConfig {
   bool loop = true;
   std::optional<double> start_after_s = {};  ///< a full second of the machine's clock; none: at once
   bool in_memory = false;                    ///< pictures are read once, at the start
+  bool yuyv = false;                         ///< gray pictures come as YUYV, as from a camera
 };
 
 struct SimulatedSourceConfig {
@@ -80,6 +82,7 @@ struct Config {
   HttpConfig http;
   SecurityConfig security;
   EventOptions events;
+  RecordingConfig recording;
   std::string arm_name;
   KinematicsConfig kinematics;
   std::vector<LinkConfig> links;

@@ -49,7 +49,8 @@ struct SourceWriter {
         << "\n"
         << "      loop: " << (files.loop ? "true" : "false") << "\n";
     if (files.start_after_s) out << "      start_after_s: " << *files.start_after_s << "\n";
-    out << "      in_memory: " << (files.in_memory ? "true" : "false") << "\n";
+    out << "      in_memory: " << (files.in_memory ? "true" : "false") << "\n"
+        << "      yuyv: " << (files.yuyv ? "true" : "false") << "\n";
   }
   void operator()(const SimulatedSourceConfig& simulated) const {
     out << "      scene: " << Quoted(simulated.scene) << "\n";
@@ -65,6 +66,7 @@ std::string ConfigText(const Config& config) {
       << "server:\n  listen: " << Quoted(config.listen) << "\n"
       << LimitsText(config.limits) << HttpText(config.http) << SecurityText(config.security)
       << EventsText(config.events);
+  WriteRecording(out, config.recording);
   WriteLog(out, config.log);
   WriteShutdown(out, config.shutdown);
   WriteWatchdog(out, config.watchdog);

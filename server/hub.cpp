@@ -28,8 +28,8 @@ Subscription::~Subscription() {
   queue_->Close();
 }
 
-PublicationPtr Subscription::Take(bool* unchanged) {
-  return queue_->Take(unchanged);
+PublicationPtr Subscription::Take(bool* unchanged, PicturesPtr* pictures) {
+  return queue_->Take(unchanged, pictures);
 }
 
 std::vector<DeliveryCounts> Subscription::Counts() const {
@@ -54,12 +54,15 @@ size_t Subscription::capacity() const {
 
 Hub::Hub(size_t links, FrameEncoder encoder)
     : encoder_(std::move(encoder)), latest_(links), queues_(std::make_shared<const Queues>()) {
-  for (size_t link = 0; link < links; ++link) links_.push_back(std::make_unique<LinkEncoder>(link, encoder_));
+  for (size_t link = 0; link < links; ++link) {
+    links_.push_back(std::make_unique<LinkEncoder>(link, encoder_));
+    picture_readers_.push_back(std::make_shared<std::atomic<int>>(0));
+  }
 }
 
 Hub::~Hub() = default;
 
-void Hub::Publish(size_t link, std::shared_ptr<const LinkState> state) {
+void Hub::Publish(size_t link, std::shared_ptr<const LinkState> state, const PicturesPtr& pictures) {
   std::shared_ptr<const Queues> queues;
   PublicationPtr publication, previous;
   {
@@ -70,22 +73,29 @@ void Hub::Publish(size_t link, std::shared_ptr<const LinkState> state) {
   }
   for (const auto& weak : *queues) {
     const auto queue = weak.lock();
-    if (queue && !queue->closed() && queue->Offer(publication)) queue->Notify();
+    if (queue && !queue->closed() && queue->Offer(publication, pictures)) queue->Notify();
   }
 }
 
 std::unique_ptr<Subscription> Hub::Subscribe(SubscriberOptions options, std::function<void()> notify) {
   const Delivery delivery = options.delivery;
+  std::vector<std::shared_ptr<std::atomic<int>>> reads;
+  for (size_t link = 0; options.pictures && link < links_.size(); ++link) {
+    if (link < options.links.size() && !options.links[link]) continue;
+    reads.push_back(picture_readers_[link]);
+    ++*picture_readers_[link];
+  }
   const std::shared_ptr<SubscriberQueue> queue(
       new SubscriberQueue(links_.size(), std::move(options), std::move(notify)),
-      [before = dropped_before_](SubscriberQueue* leaving) {
+      [before = dropped_before_, reads = std::move(reads)](SubscriberQueue* leaving) {
         *before += leaving->dropped();
+        for (const auto& readers : reads) --*readers;
         delete leaving;
       });
   const std::lock_guard lock(mutex_);
   if (delivery == Delivery::kLatest) {
     for (const auto& latest : latest_) {
-      if (latest) queue->Offer(latest);
+      if (latest) queue->Offer(latest, nullptr);
     }
   }
   auto queues = std::make_shared<Queues>();

@@ -61,6 +61,8 @@ class Publication {
   mutable std::array<std::shared_ptr<const std::string>, kDetailCount> encoded_;
 };
 using PublicationPtr = std::shared_ptr<const Publication>;
+/// What a state was made of; kept only for those who want it.
+using PicturesPtr = std::shared_ptr<const RawPictures>;
 
 /// What happens to states that a subscriber is too slow for.
 enum class Delivery : uint8_t {
@@ -78,6 +80,7 @@ struct SubscriberOptions {
   size_t queue_bytes = size_t{32} << 20;
   Detail detail = Detail::kContacts;  ///< that the subscriber will read at, for the cost
   Deadband deadband = {};
+  bool pictures = false;  ///< also what the states were made of; counts in the cost
 };
 
 struct DeliveryCounts {
@@ -100,8 +103,8 @@ class Subscription {
 
   /// The next state, at once. Null: there is none, and the next one to come will be notified. `unchanged` is
   /// set to whether it is within the deadband about the newest one of its link that was taken before and was
-  /// not.
-  PublicationPtr Take(bool* unchanged = nullptr);
+  /// not; `pictures` to what it was made of (null: not asked for, or there is nothing).
+  PublicationPtr Take(bool* unchanged = nullptr, PicturesPtr* pictures = nullptr);
   std::vector<DeliveryCounts> Counts() const;  ///< by link
   uint64_t dropped() const;                    ///< of all links
   size_t waiting() const;
@@ -127,7 +130,9 @@ class Hub {
   ~Hub();
 
   /// Called by one thread for each link; different links at any time.
-  void Publish(size_t link, std::shared_ptr<const LinkState> state);
+  void Publish(size_t link, std::shared_ptr<const LinkState> state, const PicturesPtr& pictures = nullptr);
+  /// Whether any subscriber wants a link's pictures. Any thread.
+  bool WantsPictures(size_t link) const { return *picture_readers_[link] > 0; }
 
   /// `notify` is called, by a publisher and outside any lock, when a state arrives after Take found none; it
   /// must be quick and must not throw. One call may still be under way when the subscription is destroyed, so
@@ -145,7 +150,8 @@ class Hub {
 
   // Constant after construction.
   const FrameEncoder encoder_;
-  std::vector<std::unique_ptr<LinkEncoder>> links_;  // by link
+  std::vector<std::unique_ptr<LinkEncoder>> links_;                 // by link
+  std::vector<std::shared_ptr<std::atomic<int>>> picture_readers_;  // by link
   const std::shared_ptr<std::atomic<uint64_t>> dropped_before_ =
       std::make_shared<std::atomic<uint64_t>>(0);  // by subscribers that have left
   mutable std::mutex mutex_;

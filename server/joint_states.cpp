@@ -96,6 +96,16 @@ void JointStateBuffer::At(int64_t time_ns, Instant& out) const {
   }
 }
 
+std::vector<JointSample> JointStateBuffer::After(size_t joint, int64_t time_ns) const {
+  const std::lock_guard lock(mutex_);
+  const Track& track = tracks_[joint];
+  size_t first = track.count;
+  while (first > 0 && track.At(first - 1).time_ns > time_ns) --first;
+  std::vector<JointSample> samples;
+  for (size_t i = first; i < track.count; ++i) samples.push_back(track.At(i));
+  return samples;
+}
+
 JointStateBuffer::Estimate JointStateBuffer::EstimateAt(size_t joint, int64_t time_ns) const {
   const Track& track = tracks_[joint];
   if (track.count == 0) return {.position = HomeOf(joints_[joint])};

@@ -38,6 +38,13 @@ struct JointStates {
   std::span<const double> velocities;  ///< rad/s or m/s, as many; or none
 };
 
+/// One state of one joint.
+struct JointSample {
+  int64_t time_ns = 0;  ///< monotonic
+  double position = 0;
+  std::optional<double> velocity;
+};
+
 /// The joints' last positions over time. Several may write, each the joints it knows; any thread.
 class JointStateBuffer {
  public:
@@ -56,15 +63,14 @@ class JointStateBuffer {
   /// Where the joints are, or were, at a monotonic time; `out`'s buffers are reused.
   void At(int64_t time_ns, Instant& out) const;
 
+  /// A joint's states after a monotonic time that are still kept, oldest first.
+  std::vector<JointSample> After(size_t joint, int64_t time_ns) const;
+
   const std::vector<JointInfo>& joints() const { return joints_; }
   const JointStateOptions& options() const { return options_; }
 
  private:
-  struct Sample {
-    int64_t time_ns = 0;
-    double position = 0;
-    std::optional<double> velocity;
-  };
+  using Sample = JointSample;
   /// The last samples of a joint, oldest first.
   struct Track {
     std::vector<Sample> ring;

@@ -14,7 +14,7 @@ struct LinkHistograms {
   void Record(const LinkState& state) {
     constexpr double kMsPerNs = 1e-6;
     const FrameTimes& times = state.times;
-    if (times.exposure_monotonic_ns == 0) return;
+    if (times.exposure_monotonic_ns == 0 || state.replayed) return;
     latency.Add(static_cast<double>(times.published_ns - times.exposure_monotonic_ns) * kMsPerNs);
     if (times.received_ns != 0)
       capture.Add(static_cast<double>(times.received_ns - times.exposure_monotonic_ns) * kMsPerNs);

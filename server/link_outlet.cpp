@@ -16,6 +16,7 @@ void ResetTo(LinkState& state, LinkStatus status, std::string reason) {
   state.baseline_age_s = 0;
   state.baseline = {};
   state.stage_ms = {};
+  state.replayed = false;
 }
 
 void LinkOutlet::Close() {
@@ -24,15 +25,23 @@ void LinkOutlet::Close() {
   hub_ = nullptr;
 }
 
-bool LinkOutlet::PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, int64_t exposure_ns) {
+bool LinkOutlet::PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, StereoFrame& frame) {
   const std::lock_guard lock(mutex_);
   if (life != life_ || hub_ == nullptr) return false;
   // Before anyone can see it.
   state->times.published_ns = clock_.MonotonicNs();
   statistics_.RecordPictures(state->cameras);
+  // How late a log's frames were then is nothing that this server does.
+  const int64_t exposure_ns = state->replayed ? 0 : frame.times.exposure_monotonic_ns;
   statistics_.Record(state->sequence, exposure_ns, state->times.published_ns);
   histograms_.Record(*state);
-  Send(std::move(state));
+  PicturesPtr pictures;
+  if (hub_->WantsPictures(link_)) {
+    auto taken = picture_pool_.Acquire();
+    std::swap(*taken, frame.images);
+    pictures = picture_pool_.Share(std::move(taken));
+  }
+  Send(std::move(state), pictures);
   return true;
 }
 
@@ -54,10 +63,10 @@ bool LinkOutlet::PublishStatus(LinkStatus status, const std::string& reason) {
   return true;
 }
 
-void LinkOutlet::Send(std::unique_ptr<LinkState> state) {
+void LinkOutlet::Send(std::unique_ptr<LinkState> state, const PicturesPtr& pictures) {
   last_sequence_ = state->sequence;
   last_published_ns_ = state->times.published_ns = clock_.MonotonicNs();
-  hub_->Publish(link_, pool_.Share(std::move(state)));
+  hub_->Publish(link_, pool_.Share(std::move(state)), pictures);
 }
 
 }  // namespace taclink::server

@@ -31,9 +31,10 @@ class LinkOutlet {
   /// Nothing leaves any more; the hub is not touched afterwards.
   void Close();
 
-  /// Stamps and publishes what worker `life` made of a frame, and counts it. False: refused, for there is a
-  /// newer worker.
-  bool PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, int64_t exposure_ns);
+  /// Stamps and publishes what worker `life` made of a frame, and counts it. Where somebody wants the
+  /// pictures too, those of `frame` are taken and old buffers left in their place. False: refused, for there
+  /// is a newer worker.
+  bool PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, StereoFrame& frame);
   /// The same for a mere report of the worker's, which bears the last frame's number.
   bool PublishReport(uint64_t life, std::unique_ptr<LinkState> state);
   /// In place of the worker. False: the worker is publishing at this moment.
@@ -49,13 +50,14 @@ class LinkOutlet {
   const LinkHistograms& histograms() const { return histograms_; }
 
  private:
-  void Send(std::unique_ptr<LinkState> state);  // with the lock held
+  void Send(std::unique_ptr<LinkState> state, const PicturesPtr& pictures = nullptr);  // with the lock held
 
   // Constant after construction.
   const size_t link_;
   Clock& clock_;
 
   StatePool pool_;
+  SharedPool<RawPictures> picture_pool_;
   LinkStatisticsCollector statistics_;
   LinkHistograms histograms_;
   std::atomic<uint64_t> life_ = 0;

@@ -25,7 +25,9 @@ void LinkStatisticsCollector::Record(uint64_t sequence, int64_t exposure_ns, int
   const std::lock_guard lock(mutex_);
   if (frames_ > 0 && sequence > last_sequence_) frames_skipped_ += sequence - last_sequence_ - 1;
   last_sequence_ = sequence;
-  ring_[frames_ % ring_.size()] = {published_ns, published_ns - exposure_ns};
+  Entry& entry = ring_[frames_ % ring_.size()];
+  entry = {.published_ns = published_ns};
+  if (exposure_ns != 0) entry.latency_ns = published_ns - exposure_ns;
   ++frames_;
 }
 
@@ -57,8 +59,9 @@ LinkStatistics LinkStatisticsCollector::Snapshot(int64_t now_ns) const {
                      .frames_skipped = frames_skipped_,
                      .bad_pictures = bad_pictures_};
   std::vector<int64_t> latencies;
-  for (uint64_t i = 0; i < std::min<uint64_t>(frames_, ring_.size()); ++i)
-    latencies.push_back(ring_[i].latency_ns);
+  for (uint64_t i = 0; i < std::min<uint64_t>(frames_, ring_.size()); ++i) {
+    if (ring_[i].latency_ns) latencies.push_back(*ring_[i].latency_ns);
+  }
   if (!latencies.empty()) {
     out.latency_p50_ms = PercentileMs(latencies, 0.50);
     out.latency_p99_ms = PercentileMs(latencies, 0.99);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "sensing/core/link_state.h"
@@ -23,7 +24,8 @@ class LinkStatisticsCollector {
  public:
   LinkStatisticsCollector();
 
-  /// A frame was published. A sequence that does not rise means that the source began anew.
+  /// A frame was published. A sequence that does not rise means that the source began anew; an exposure at 0,
+  /// that there is no latency.
   void Record(uint64_t sequence, int64_t exposure_ns, int64_t published_ns);
   void RecordPictures(const std::array<CameraCounts, kCameraCount>& cameras);
   LinkStatistics Snapshot(int64_t now_ns) const;
@@ -31,7 +33,7 @@ class LinkStatisticsCollector {
  private:
   struct Entry {
     int64_t published_ns = 0;
-    int64_t latency_ns = 0;
+    std::optional<int64_t> latency_ns = {};
   };
 
   double Rate(int64_t now_ns) const;

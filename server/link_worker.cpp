@@ -118,6 +118,8 @@ void LinkWorker::Capture(const std::stop_token& stop) {
     capture_mark_.Begin(WorkStage::kWait, clock_.MonotonicNs());
     if (!supervisor_.Next(frame, options_.poll)) continue;
     if (options_.pressure) options_.pressure->Apply(frame);
+    frame.pressure.mpa = ExactInPascals(frame.pressure.mpa);
+    if (frame.pressure_mpa) frame.pressure_mpa = ExactInPascals(*frame.pressure_mpa);
     mailbox_.Put(frame);
   }
 }
@@ -212,7 +214,7 @@ void LinkWorker::EndCalibrationFromOutside(const Error& error) {
   if (observer) observer({.end = error});
 }
 
-void LinkWorker::SolveOne(const StereoFrame& frame) {
+void LinkWorker::SolveOne(StereoFrame& frame) {
   auto state = outlet_->Acquire();
   fem_mark_.Begin(settled_ && !job_ ? WorkStage::kFrame : WorkStage::kFirstFrames, clock_.MonotonicNs());
   try {
@@ -229,7 +231,7 @@ void LinkWorker::SolveOne(const StereoFrame& frame) {
   }
   state->sequence = frame.sequence;
   fem_mark_.Begin(WorkStage::kPublish, clock_.MonotonicNs());
-  outlet_->PublishFrame(life_, std::move(state), frame.times.exposure_monotonic_ns);
+  outlet_->PublishFrame(life_, std::move(state), frame);
 }
 
 void LinkWorker::PublishStatusIfDue() {

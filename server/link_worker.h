@@ -89,7 +89,7 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   void EndCalibrationFromOutside(const Error& error);
   void Capture(const std::stop_token& stop);
   void Solve(const std::stop_token& stop);
-  void SolveOne(const StereoFrame& frame);
+  void SolveOne(StereoFrame& frame);
   void PublishStatusIfDue();
   void TakeCalibrationOrder();
   void TellCalibration();

@@ -11,9 +11,12 @@
 
 #include "server/assembly/arm_builder.h"
 #include "server/assembly/config_check.h"
+#include "server/assembly/log_preamble.h"
+#include "server/assembly/replayed_arm.h"
 #include "server/config.h"
 #include "server/gateway/setup.h"
 #include "server/log.h"
+#include "server/recording/recorder.h"
 #include "server/reload.h"
 #include "server/rpc/rpc_server.h"
 #include "server/security/exposure.h"
@@ -30,6 +33,7 @@ constexpr std::chrono::seconds kLogFlush{10};
 
 struct Options {
   std::string config;
+  std::string replay;  // a log in place of the cameras
   std::string listen;
   std::optional<std::string> http_listen;
   bool insecure_open = false;
@@ -44,8 +48,15 @@ int Complain(std::string message, int code) {
   return code;
 }
 
+// The arm is the log's, all else is configured.
+Result<Config> WithLog(const std::string& path, Config config) {
+  const auto log = OpenReplayedLog(path);
+  return log ? ConfigureReplay(*log, std::move(config)) : log.error();
+}
+
 Result<Config> Configure(const Options& options) {
   auto config = options.config.empty() ? DemoConfig() : LoadConfig(options.config);
+  if (config && !options.replay.empty()) config = WithLog(options.replay, std::move(*config));
   if (!config) return config.error();
   if (!options.listen.empty()) {
     const auto good = CheckListenAddress(options.listen);
@@ -108,22 +119,40 @@ void PingSystemd(Arm& arm, const SystemdNotifier& systemd) {
   });
 }
 
+// The configured one, or the log's.
+Result<ReplayedArm> MakeArm(const Options& options, const Config& config) {
+  if (options.replay.empty()) {
+    auto arm = BuildArm(config, SystemClock());
+    if (!arm) return arm.error();
+    return ReplayedArm{
+        .arm = std::move(*arm), .joints = nullptr, .preamble = MakePreamble(config, TACLINK_VERSION)};
+  }
+  const auto log = OpenReplayedLog(options.replay);
+  if (!log) return log.error();
+  spdlog::info("playing {} in place of cameras, again and again", options.replay);
+  return BuildReplayedArm(*log, config, TACLINK_VERSION, SystemClock());
+}
+
 Result<void> Run(const Options& options, const Config& config) {
   Signals signals;
   const SystemdNotifier systemd = SystemdNotifier::FromEnvironment();
   const auto security = Security::Load(config.security);
   if (!security) return security.error();
-  const auto arm = BuildArm(config, SystemClock());
-  if (!arm) return arm.error();
-  const auto server = RpcServer::Start(config.listen, **arm, ToServiceLimits(config.limits), *security);
+  const auto made = MakeArm(options, config);
+  if (!made) return made.error();
+  Arm& arm = *made->arm;
+  Recorder recorder(arm, config.recording, made->preamble);
+  const auto server =
+      RpcServer::Start(config.listen, arm, ToServiceLimits(config.limits), *security, &recorder);
   if (!server) return server.error();
-  const auto gateway = StartGateway(config.http, **arm, **server, *security);
+  const auto gateway = StartGateway(config.http, arm, **server, *security);
   if (!gateway) return gateway.error();
   (*security)->Watch();
-  PingSystemd(**arm, systemd);
-  (*arm)->Start();
+  PingSystemd(arm, systemd);
+  recorder.Open();  // before the first frame
+  arm.Start();
   Reloader reloader(config);
-  AddReloads(reloader, **server, **arm);
+  AddReloads(reloader, **server, arm);
   signals.OnReload([&] { Reload(options, reloader, systemd); });
   spdlog::info("taclinkd {}: arm {} with {} links, listening on {}", TACLINK_VERSION, config.arm_name,
                config.links.size(), (*server)->address());
@@ -132,10 +161,11 @@ Result<void> Run(const Options& options, const Config& config) {
   systemd.Send("STOPPING=1");
   if (*gateway) (*gateway)->Drain();
   (*server)->Shutdown("server is shutting down", config.shutdown.limit);
-  (*arm)->Stop();
+  arm.Stop();
+  recorder.Close();
   spdlog::info("stopped");
   for (size_t link = 0; link < config.links.size(); ++link) {
-    if (!(*arm)->worker(link).LeavesThreads()) continue;
+    if (!arm.worker(link).LeavesThreads()) continue;
     spdlog::default_logger()->flush();
     std::_Exit(0);  // such a thread may yet use what exit() destroys
   }
@@ -157,6 +187,9 @@ int Main(int argc, char** argv) {
   CLI::App app("Serves the soft tactile links of an arm over gRPC", "taclinkd");
   app.set_version_flag("--version", std::string(TACLINK_VERSION));
   app.add_option("--config", options.config, "Configuration file (default: a simulated arm of four links)");
+  CLI::Option* replay = app.add_option(
+      "--replay", options.replay,
+      "Log to play again and again in place of the cameras; the arm is the one that it describes");
   app.add_option("--listen", options.listen,
                  "Address to listen on, in place of the configured one; port 0: any");
   app.add_option("--http-listen", options.http_listen,
@@ -165,7 +198,8 @@ int Main(int argc, char** argv) {
                "Allow other addresses than loopback without encryption or without tokens");
   app.add_flag("--print-config", options.print_config, "Print the effective configuration and exit");
   app.add_flag("--check-config", options.check_config,
-               "Make all that the configuration names, say OK or all that is wrong, and exit");
+               "Make all that the configuration names, say OK or all that is wrong, and exit")
+      ->excludes(replay);
   app.add_option("--log-level", options.log_level, "In place of the configured one")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}));
   app.add_option("--log-format", options.log_format, "In place of the configured one")

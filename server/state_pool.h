@@ -9,21 +9,22 @@
 
 namespace taclink::server {
 
-/// Link states whose buffers are used again once nobody holds them any more.
-class StatePool {
+/// Large objects whose buffers are used again once nobody holds them any more.
+template <typename T>
+class SharedPool {
  public:
-  /// An old state with its old content, or a new one.
-  std::unique_ptr<LinkState> Acquire() {
+  /// An old one with its old content, or a new one.
+  std::unique_ptr<T> Acquire() {
     const std::lock_guard lock(free_->mutex);
-    if (free_->states.empty()) return std::make_unique<LinkState>();
-    auto state = std::move(free_->states.back());
-    free_->states.pop_back();
-    return state;
+    if (free_->objects.empty()) return std::make_unique<T>();
+    auto object = std::move(free_->objects.back());
+    free_->objects.pop_back();
+    return object;
   }
 
-  /// Makes `state` immutable; it comes back to the pool with its last holder, even after the pool is gone.
-  std::shared_ptr<const LinkState> Share(std::unique_ptr<LinkState> state) {
-    return {state.release(), [free = free_](LinkState* returned) { free->Return(returned); }};
+  /// Makes `object` immutable; it comes back to the pool with its last holder, even after the pool is gone.
+  std::shared_ptr<const T> Share(std::unique_ptr<T> object) {
+    return {object.release(), [free = free_](T* returned) { free->Return(returned); }};
   }
 
  private:
@@ -31,16 +32,17 @@ class StatePool {
   static constexpr size_t kKept = 8;
 
   struct FreeList {
-    void Return(LinkState* state) {
-      std::unique_ptr<LinkState> owned(state);
+    void Return(T* object) {
+      std::unique_ptr<T> owned(object);
       const std::lock_guard lock(mutex);
-      if (states.size() < kKept) states.push_back(std::move(owned));
+      if (objects.size() < kKept) objects.push_back(std::move(owned));
     }
     std::mutex mutex;
-    std::vector<std::unique_ptr<LinkState>> states;  // guarded by mutex
+    std::vector<std::unique_ptr<T>> objects;  // guarded by mutex
   };
 
   const std::shared_ptr<FreeList> free_ = std::make_shared<FreeList>();
 };
+using StatePool = SharedPool<LinkState>;
 
 }  // namespace taclink::server

@@ -10,6 +10,12 @@ size_t Capacity(size_t links, const SubscriberOptions& options) {
   return options.delivery == Delivery::kLatest ? links : std::max<size_t>(options.queue_capacity, 1);
 }
 
+size_t Bytes(const RawPictures& pictures) {
+  size_t bytes = sizeof pictures;
+  for (const RawImage& image : pictures) bytes += image.bytes.capacity();
+  return bytes;
+}
+
 }  // namespace
 
 SubscriberQueue::SubscriberQueue(size_t links, SubscriberOptions options, std::function<void()> notify)
@@ -17,6 +23,7 @@ SubscriberQueue::SubscriberQueue(size_t links, SubscriberOptions options, std::f
       most_bytes_(options.queue_bytes),
       detail_(options.detail),
       deadband_(options.deadband),
+      pictures_(options.pictures),
       notify_(std::move(notify)),
       links_(links),
       ring_(Capacity(links, options)) {
@@ -31,10 +38,10 @@ SubscriberQueue::News SubscriberQueue::Judge(PerLink& link, const LinkState& sta
   return due ? News::kUnchanged : News::kNone;
 }
 
-bool SubscriberQueue::Offer(const PublicationPtr& publication) {
+bool SubscriberQueue::Offer(const PublicationPtr& publication, const PicturesPtr& pictures) {
   // What falls out is released after the lock.
-  PublicationPtr replaced;
-  std::vector<PublicationPtr> fallen;
+  Place replaced;
+  std::vector<Place> fallen;
   std::shared_ptr<const LinkState> reference;
   const std::lock_guard lock(mutex_);
   PerLink& link = links_[publication->link()];
@@ -50,7 +57,11 @@ bool SubscriberQueue::Offer(const PublicationPtr& publication) {
     if (news == News::kChanged) reference = std::exchange(link.reference, publication->shared_state());
     link.accepted_ns = published_ns;
   }
-  Place place{publication, publication->Cost(detail_), news == News::kUnchanged};
+  Place place{publication, nullptr, publication->Cost(detail_), news == News::kUnchanged};
+  if (pictures_ && pictures) {
+    place.pictures = pictures;
+    place.cost += Bytes(*pictures);
+  }
   if (delivery_ == Delivery::kEvery) {
     PushEvery(std::move(place), fallen);
   } else {
@@ -90,34 +101,33 @@ SubscriberQueue::Place SubscriberQueue::PopFirst() {
   return first;
 }
 
-void SubscriberQueue::PushEvery(Place place, std::vector<PublicationPtr>& fallen) {
+void SubscriberQueue::PushEvery(Place place, std::vector<Place>& fallen) {
   while (count_ > 0 && (count_ == ring_.size() || bytes_ + place.cost > most_bytes_)) {
     const bool for_bytes = count_ < ring_.size();
     Place oldest = PopFirst();
     Drop(oldest, for_bytes, place);
-    fallen.push_back(std::move(oldest.publication));
+    fallen.push_back(std::move(oldest));
   }
   bytes_ += place.cost;
   At(count_++) = std::move(place);
 }
 
 // The newest takes the place of the older one, so that a fast link can't push a slow one back.
-void SubscriberQueue::PushLatest(Place place, PublicationPtr& replaced) {
+void SubscriberQueue::PushLatest(Place place, Place& replaced) {
   bytes_ += place.cost;
   for (size_t i = 0; i < count_; ++i) {
     Place& older = At(i);
     if (older.publication->link() != place.publication->link()) continue;
     bytes_ -= older.cost;
-    const Place dropped = std::exchange(older, Place{});
-    Drop(dropped, false, place);
-    replaced = dropped.publication;
+    replaced = std::exchange(older, Place{});
+    Drop(replaced, false, place);
     older = std::move(place);
     return;
   }
   At(count_++) = std::move(place);
 }
 
-PublicationPtr SubscriberQueue::Take(bool* unchanged) {
+PublicationPtr SubscriberQueue::Take(bool* unchanged, PicturesPtr* pictures) {
   const std::lock_guard lock(mutex_);
   if (count_ == 0) {
     armed_ = true;
@@ -126,6 +136,7 @@ PublicationPtr SubscriberQueue::Take(bool* unchanged) {
   Place next = PopFirst();
   ++links_[next.publication->link()].counts.taken;
   if (unchanged) *unchanged = next.unchanged;
+  if (pictures) *pictures = std::move(next.pictures);
   return std::move(next.publication);
 }
 

@@ -17,8 +17,8 @@ class SubscriberQueue {
   SubscriberQueue(size_t links, SubscriberOptions options, std::function<void()> notify);
 
   /// True: the subscriber waits and is to be notified.
-  bool Offer(const PublicationPtr& publication);
-  PublicationPtr Take(bool* unchanged);
+  bool Offer(const PublicationPtr& publication, const PicturesPtr& pictures);
+  PublicationPtr Take(bool* unchanged, PicturesPtr* pictures);
   void Notify() const { notify_(); }
   void Close() { closed_ = true; }
   bool closed() const { return closed_; }
@@ -40,6 +40,7 @@ class SubscriberQueue {
   };
   struct Place {
     PublicationPtr publication;
+    PicturesPtr pictures;
     size_t cost = 0;         // bytes
     bool unchanged = false;  // within the deadband
   };
@@ -49,8 +50,8 @@ class SubscriberQueue {
   Place PopFirst();
   void Drop(const Place& place, bool for_bytes, Place& incoming);
   void ReferTo(const Place& dropped, Place& next);
-  void PushEvery(Place place, std::vector<PublicationPtr>& fallen);
-  void PushLatest(Place place, PublicationPtr& replaced);
+  void PushEvery(Place place, std::vector<Place>& fallen);
+  void PushLatest(Place place, Place& replaced);
   Place& At(size_t place) { return ring_[(first_ + place) % ring_.size()]; }
 
   // Constant after construction.
@@ -58,6 +59,7 @@ class SubscriberQueue {
   const size_t most_bytes_;
   const Detail detail_;
   const Deadband deadband_;
+  const bool pictures_;
   const std::function<void()> notify_;
 
   std::atomic<bool> closed_ = false;

@@ -192,6 +192,7 @@ void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFra
   out.set_tracking_mode(ToWire(state.tracking.mode));
   out.set_acquire_reason(ToWire(state.tracking.reason));
   out.set_labels_rejected(static_cast<uint32_t>(state.shape.rejected.size()));
+  out.set_replayed(state.replayed);
   if (detail >= Detail::kGeometry)
     FillVectors(state.shape.positions_mm, kMetresPerMm, *out.mutable_positions_m());
   if (detail >= Detail::kFull) FillFull(state, out);
@@ -216,6 +217,12 @@ std::string FrameResponsePrefix(size_t frame_bytes) {
 std::string UnchangedMark() {
   v1::LinkFrame frame;
   frame.set_unchanged(true);
+  return frame.SerializeAsString();
+}
+
+std::string ReplayedMark() {
+  v1::LinkFrame frame;
+  frame.set_replayed(true);
   return frame.SerializeAsString();
 }
 
@@ -245,6 +252,7 @@ Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
   }
   state.tracking.mode = FromWire(frame.tracking_mode());
   state.tracking.reason = FromWire(frame.acquire_reason());
+  state.replayed = frame.replayed();
   state.shape.positions_mm = VectorsFrom(frame.positions_m(), 1 / kMetresPerMm);
   ReadFull(frame, state);
   return decoded;

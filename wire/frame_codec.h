@@ -30,6 +30,9 @@ std::string FrameResponsePrefix(size_t frame_bytes);
 /// What makes a LinkFrame unchanged (LinkFrame.unchanged) when it stands after its bytes.
 std::string UnchangedMark();
 
+/// Likewise for one that comes from a log (LinkFrame.replayed).
+std::string ReplayedMark();
+
 struct DecodedFrame {
   LinkId link;
   Detail detail = Detail::kContacts;

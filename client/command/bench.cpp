@@ -9,6 +9,7 @@
 #include "client/command/bench_accuracy.h"
 #include "client/command/bench_files.h"
 #include "client/command/bench_json.h"
+#include "client/command/bench_log.h"
 #include "client/command/bench_server.h"
 #include "client/command/commands.h"
 #include "sensing/capture/image_io.h"
@@ -206,6 +207,7 @@ void AddBench(CLI::App& app, Selected& selected) {
   AddBenchAccuracy(*bench, selected);
   AddBenchStability(*bench, selected);
   AddBenchServer(*bench, selected);
+  AddBenchLog(*bench, selected);
 }
 
 }  // namespace taclink::command

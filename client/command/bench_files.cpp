@@ -41,4 +41,17 @@ Result<void> WriteBetweenMarks(const std::string& path, const std::string& comma
   return WriteText(path, page.substr(0, from) + begin + "\n" + text + page.substr(to));
 }
 
+Result<Scratch> Scratch::Make(const std::string& parent) {
+  const std::filesystem::path folder =
+      parent.empty() ? std::filesystem::temp_directory_path() : std::filesystem::path(parent);
+  std::string name = (folder / "taclink-bench-XXXXXX").string();
+  if (!mkdtemp(name.data())) return Error{ErrorCode::kUnavailable, name + ": no folder could be made"};
+  return Scratch{name};
+}
+
+Scratch::~Scratch() {
+  std::error_code ignored;
+  if (!path.empty()) std::filesystem::remove_all(path, ignored);
+}
+
 }  // namespace taclink::command

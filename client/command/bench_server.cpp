@@ -113,24 +113,6 @@ Json ToJson(const LoadResult& r) {
           {"server_mb", r.server_mb}};
 }
 
-/// A folder for the pictures, gone with this object.
-struct Scratch {
-  std::filesystem::path path;
-
-  static Result<Scratch> Make() {
-    std::string name = (std::filesystem::temp_directory_path() / "taclink-bench-XXXXXX").string();
-    if (!mkdtemp(name.data())) return Error{ErrorCode::kUnavailable, name + ": no folder could be made"};
-    return Scratch{name};
-  }
-  explicit Scratch(std::filesystem::path folder) : path(std::move(folder)) {}
-  Scratch(Scratch&& other) noexcept : path(std::exchange(other.path, {})) {}
-  Scratch& operator=(Scratch&&) = delete;
-  ~Scratch() {
-    std::error_code ignored;
-    if (!path.empty()) std::filesystem::remove_all(path, ignored);
-  }
-};
-
 // Loads of the same links and rate share a server, in the order given.
 Result<std::vector<LoadResult>> Run(const std::vector<ServerLoad>& loads, const LoadPictures& pictures,
                                     const Options& options) {
@@ -166,7 +148,7 @@ std::vector<Series> ChooseSeries(const Options& options) {
 
 Result<void> Server(Options options) {
   if (options.quick) options.seconds = std::min(options.seconds, 3.0);
-  const auto scratch = Scratch::Make();
+  const auto scratch = Scratch::Make({});
   if (!scratch) return scratch.error();
   const auto pictures = RenderLoadPictures(scratch->path.string());
   if (!pictures) return pictures.error();

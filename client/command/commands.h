@@ -18,6 +18,7 @@ CLI::Validator Within(double min, double max);
 void AddCameras(CLI::App& app, Selected& selected);
 void AddList(CLI::App& app, Selected& selected);
 void AddLog(CLI::App& app, Selected& selected);
+void AddRecord(CLI::App& app, Selected& selected);
 void AddRestart(CLI::App& app, Selected& selected);
 void AddWatch(CLI::App& app, Selected& selected);
 void AddDetect(CLI::App& app, Selected& selected);
@@ -33,6 +34,9 @@ void AddToken(CLI::App& app, Selected& selected);
 void AddTare(CLI::App& app, Selected& selected);
 void AddEvents(CLI::App& app, Selected& selected);
 void AddThresholds(CLI::App& app, Selected& selected);
+
+/// Likewise, below `record`.
+void AddPlay(CLI::App& record, Selected& selected);
 
 /// `--server`, or the environment variable TACLINK_SERVER, or the local default; and the options that
 /// ConnectTo (connect.h) takes beside it.

@@ -19,6 +19,16 @@ std::vector<std::string> CsvFields(const std::string& line) {
   return fields;
 }
 
+std::string CsvCell(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string cell = "\"";
+  for (const char c : text) {
+    if (c == '"') cell += '"';
+    cell += c;
+  }
+  return cell + '"';
+}
+
 bool IsEmptyCsvLine(const std::string& line) {
   return line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#';
 }

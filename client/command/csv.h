@@ -10,6 +10,9 @@ namespace taclink::command {
 /// A line's fields, without blanks and quotes around them. Quoted commas are not known.
 std::vector<std::string> CsvFields(const std::string& line);
 
+/// A field of a line to write: in quotes if it has commas, quotes or line ends (RFC 4180).
+std::string CsvCell(const std::string& text);
+
 /// Nothing there, or a comment (#).
 bool IsEmptyCsvLine(const std::string& line);
 

@@ -21,7 +21,7 @@ bool IsContact(EventKind kind) {
 
 bool IsOperation(EventKind kind) {
   return kind == EventKind::kTare || kind == EventKind::kCalibration || kind == EventKind::kBaseline ||
-         kind == EventKind::kThresholds;
+         kind == EventKind::kThresholds || kind == EventKind::kRecording;
 }
 
 std::string Place(const client::Event& event) {

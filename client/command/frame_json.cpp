@@ -52,6 +52,7 @@ std::string FrameJson(const client::Frame& frame) {
                {"tracked", frame.tracked},
                {"picture_share", frame.picture_share},
                {"unchanged", frame.unchanged},
+               {"replayed", frame.replayed},
                {"contacts", std::move(contacts)},
                {"total_force_n", frame.total_force_n}};
   if (!frame.positions_m.empty()) json["positions_mm"] = ToJson(frame.positions_m, kMmPerMetre);

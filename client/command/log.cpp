@@ -1,4 +1,3 @@
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +6,8 @@
 
 #include "client/command/commands.h"
 #include "client/command/json.h"
+#include "client/command/log_text.h"
+#include "client/command/log_tools.h"
 #include "wire/mcap/check.h"
 #include "wire/mcap/file_sink.h"
 #include "wire/mcap/reader.h"
@@ -31,18 +32,6 @@ Result<std::shared_ptr<mcap::ByteSource>> OpenBytes(const std::string& file) {
   return std::shared_ptr<mcap::ByteSource>(std::move(*source));
 }
 
-std::string Utc(uint64_t ns) {
-  const std::chrono::sys_time<std::chrono::milliseconds> time(std::chrono::milliseconds(ns / 1'000'000));
-  return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", time);
-}
-
-std::string Size(uint64_t bytes) {
-  const auto number = static_cast<double>(bytes);
-  if (bytes < 10'000) return fmt::format("{} bytes", bytes);
-  return bytes < 10'000'000 ? fmt::format("{:.1f} kB", number * 1e-3)
-                            : fmt::format("{:.1f} MB", number * 1e-6);
-}
-
 uint64_t MessagesOf(const mcap::Statistics& statistics, uint16_t channel) {
   const auto at = statistics.channel_message_counts.find(channel);
   return at == statistics.channel_message_counts.end() ? 0 : at->second;
@@ -55,12 +44,13 @@ std::string SchemaName(const mcap::Reader& reader, const mcap::Channel& channel)
 
 void PrintText(const std::string& file, uint64_t size, const mcap::Reader& reader) {
   const mcap::Statistics& statistics = reader.statistics();
-  fmt::print("{}: {}, written by {}\n", file, Size(size), reader.header().library);
+  fmt::print("{}: {}, written by {}\n", file, SizeText(size), reader.header().library);
   if (!reader.summary_problem().empty())
     fmt::print("not closed, or damaged: {}; 'taclink log recover' makes it whole\n",
                reader.summary_problem());
   if (statistics.message_count > 0) {
-    fmt::print("{} to {}, {:.3f} s\n", Utc(statistics.message_start_ns), Utc(statistics.message_end_ns),
+    fmt::print("{} to {}, {:.3f} s\n", UtcText(statistics.message_start_ns),
+               UtcText(statistics.message_end_ns),
                static_cast<double>(statistics.message_end_ns - statistics.message_start_ns) * 1e-9);
   }
   fmt::print("{} messages in {} chunks\n", statistics.message_count, statistics.chunk_count);
@@ -69,7 +59,8 @@ void PrintText(const std::string& file, uint64_t size, const mcap::Reader& reade
                SchemaName(reader, channel));
   }
   for (const auto& attachment : reader.attachments()) {
-    fmt::print("attachment {}, {}, {}\n", attachment.name, attachment.media_type, Size(attachment.data_size));
+    fmt::print("attachment {}, {}, {}\n", attachment.name, attachment.media_type,
+               SizeText(attachment.data_size));
   }
   for (const auto& metadata : reader.metadata()) {
     const auto record = reader.ReadMetadata(metadata);
@@ -166,7 +157,7 @@ CLI::App* AddOne(CLI::App& log, const std::string& name, const std::string& what
 }  // namespace
 
 void AddLog(CLI::App& app, Selected& selected) {
-  CLI::App* log = app.add_subcommand("log", "Look into logs, check and mend them");
+  CLI::App* log = app.add_subcommand("log", "Look into logs, check, mend, cut, merge, export and draw them");
   log->require_subcommand(1);
   auto options = std::make_shared<Options>();
   AddOne(*log, "info", "What a log holds", options, selected, Info)
@@ -177,6 +168,11 @@ void AddLog(CLI::App& app, Selected& selected) {
          selected, Recover)
       ->add_option("-o,--output", options->output, "The new log")
       ->required();
+  AddLogCut(*log, selected);
+  AddLogMerge(*log, selected);
+  AddLogExport(*log, selected);
+  AddLogPlot(*log, selected);
+  AddLogSolve(*log, selected);
 }
 
 }  // namespace taclink::command

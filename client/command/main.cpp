@@ -40,6 +40,7 @@ int main(int argc, char** argv) {
   taclink::command::AddCameras(app, selected);
   taclink::command::AddList(app, selected);
   taclink::command::AddLog(app, selected);
+  taclink::command::AddRecord(app, selected);
   taclink::command::AddRestart(app, selected);
   taclink::command::AddWatch(app, selected);
   taclink::command::AddDetect(app, selected);

@@ -120,33 +120,6 @@ class LoadClient {
   std::thread thread_;
 };
 
-// Until every link has its baseline.
-Result<void> WaitUntilMeasuring(client::Client& connection) {
-  const auto give_up = steady_clock::now() + kWarmUpPatience;
-  std::string reason;
-  while (steady_clock::now() < give_up) {
-    const auto arm = connection.GetArm();
-    if (!arm) return arm.error();
-    const bool all = std::all_of(arm->links.begin(), arm->links.end(), [](const client::Link& link) {
-      return link.status == client::LinkStatus::kOk || link.status == client::LinkStatus::kDegraded;
-    });
-    if (all) return {};
-    for (const client::Link& link : arm->links) {
-      if (!link.status_reason.empty()) reason = link.name + " says: " + link.status_reason;
-    }
-    std::this_thread::sleep_for(kPoll);
-  }
-  return Error{ErrorCode::kTimeout, "the links did not begin to measure within three minutes; " + reason};
-}
-
-Result<uint64_t> Skipped(client::Client& connection) {
-  const auto arm = connection.GetArm();
-  if (!arm) return arm.error();
-  uint64_t skipped = 0;
-  for (const client::Link& link : arm->links) skipped += link.frames_skipped;
-  return skipped;
-}
-
 using LoadClients = std::vector<std::unique_ptr<LoadClient>>;
 
 Result<void> Collect(LoadClients& clients, LoadResult& result) {
@@ -182,7 +155,7 @@ Result<LoadResult> Measure(const ServerLoad& load, const ServerProcess& server, 
     clients.push_back(std::move(*client));
   }
   std::this_thread::sleep_for(kWarmUp);
-  const auto skipped_before = Skipped(connection);
+  const auto skipped_before = FramesSkipped(connection);
   if (!skipped_before) return skipped_before.error();
   const ProcessUsage server_before = server.Usage(), own_before = OwnUsage(), all_before = MachineUsage();
   const auto begin = steady_clock::now();
@@ -191,7 +164,7 @@ Result<LoadResult> Measure(const ServerLoad& load, const ServerProcess& server, 
   for (const auto& client : clients) client->End();
   result.seconds = std::chrono::duration<double>(steady_clock::now() - begin).count();
   const ProcessUsage server_after = server.Usage(), own_after = OwnUsage(), all_after = MachineUsage();
-  const auto skipped_after = Skipped(connection);
+  const auto skipped_after = FramesSkipped(connection);
   if (!skipped_after) return skipped_after.error();
   result.skipped = *skipped_after - *skipped_before;
   result.server_cores = (server_after.cpu_s - server_before.cpu_s) / result.seconds;
@@ -205,6 +178,32 @@ Result<LoadResult> Measure(const ServerLoad& load, const ServerProcess& server, 
 }
 
 }  // namespace
+
+Result<void> WaitUntilMeasuring(client::Client& connection) {
+  const auto give_up = steady_clock::now() + kWarmUpPatience;
+  std::string reason;
+  while (steady_clock::now() < give_up) {
+    const auto arm = connection.GetArm();
+    if (!arm) return arm.error();
+    const bool all = std::all_of(arm->links.begin(), arm->links.end(), [](const client::Link& link) {
+      return link.status == client::LinkStatus::kOk || link.status == client::LinkStatus::kDegraded;
+    });
+    if (all) return {};
+    for (const client::Link& link : arm->links) {
+      if (!link.status_reason.empty()) reason = link.name + " says: " + link.status_reason;
+    }
+    std::this_thread::sleep_for(kPoll);
+  }
+  return Error{ErrorCode::kTimeout, "the links did not begin to measure within three minutes; " + reason};
+}
+
+Result<uint64_t> FramesSkipped(client::Client& connection) {
+  const auto arm = connection.GetArm();
+  if (!arm) return arm.error();
+  uint64_t skipped = 0;
+  for (const client::Link& link : arm->links) skipped += link.frames_skipped;
+  return skipped;
+}
 
 Result<LoadPictures> RenderLoadPictures(const std::string& folder) {
   auto scene = ParseScene("load", kScene);
@@ -231,7 +230,7 @@ Result<LoadPictures> RenderLoadPictures(const std::string& folder) {
   return pictures;
 }
 
-std::string LoadConfigText(const LoadPictures& pictures, int links, double rate_hz) {
+std::string LoadConfigText(const LoadPictures& pictures, int links, double rate_hz, bool yuyv) {
   std::ostringstream text;
   text << "taclink_config: 1\nlimits: {max_streams: 1000, max_streams_per_peer: 1000}\n"
        << "arm:\n  name: load\n  links:\n";
@@ -239,7 +238,8 @@ std::string LoadConfigText(const LoadPictures& pictures, int links, double rate_
     // Neither the exposures nor the touches of the links are in step.
     const double after_s = (kPairs + 1) / rate_hz * link / links;
     text << "    - {name: link" << link << ", model: cylinder, source: files, folder: \"" << pictures.folder
-         << "\", frame_rate_hz: " << rate_hz << ", start_after_s: " << after_s << ", in_memory: true}\n";
+         << "\", frame_rate_hz: " << rate_hz << ", start_after_s: " << after_s
+         << ", in_memory: true, yuyv: " << (yuyv ? "true" : "false") << "}\n";
   }
   return text.str();
 }

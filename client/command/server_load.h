@@ -42,8 +42,13 @@ struct LoadPictures {
 };
 Result<LoadPictures> RenderLoadPictures(const std::string& folder);
 
-/// A server's configuration for some links that play them at a rate.
-std::string LoadConfigText(const LoadPictures& pictures, int links, double rate_hz);
+/// A server's configuration for some links that play them at a rate, as gray or as YUYV pictures.
+std::string LoadConfigText(const LoadPictures& pictures, int links, double rate_hz, bool yuyv = false);
+
+/// Until every link has its baseline. Errors: kTimeout, with what a link says.
+Result<void> WaitUntilMeasuring(client::Client& connection);
+/// Exposures that the server did not solve, of all links.
+Result<uint64_t> FramesSkipped(client::Client& connection);
 
 /// Starts one server for loads of the same links and rate, and its clients one load after another.
 /// `seconds`: of each measurement.

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <csignal>
@@ -8,20 +7,15 @@
 
 #include "client/command/commands.h"
 #include "client/command/connect.h"
-#include "client/command/frame_json.h"
-#include "client/command/json.h"
-#include "client/command/watch_view.h"
+#include "client/command/frame_output.h"
 #include "client/taclink/client.h"
 
 namespace taclink::command {
 namespace {
 
 using std::chrono::milliseconds;
-using std::chrono::steady_clock;
 
 constexpr milliseconds kPoll{100};  // how soon Ctrl-C is noticed
-constexpr milliseconds kRedraw{100};
-constexpr const char* kClearScreen = "\x1b[2J";
 
 struct Options {
   std::string server = "127.0.0.1:50051";
@@ -48,59 +42,6 @@ client::StreamOptions ToStream(const Options& options) {
           .deadband_move_m = options.deadband_mm * 1e-3};
 }
 
-/// Where frames go: one of three forms.
-class Output {
- public:
-  explicit Output(const Options& options)
-      : json_(options.json),
-        live_(!options.json && isatty(STDOUT_FILENO) == 1),
-        view_("taclink watch " + options.server + "   (Ctrl-C ends)") {
-    if (live_) fmt::print("{}", kClearScreen);
-  }
-
-  void Take(const client::Frame& frame, const std::vector<client::StreamCounts>& counts) {
-    if (json_) {
-      PrintDrops(counts);
-      fmt::print("{}\n", FrameJson(frame));
-      std::fflush(stdout);
-    } else if (live_) {
-      view_.Take(frame);
-    } else {
-      for (const auto& line : log_.Take(frame)) fmt::print("{}\n", line);
-      std::fflush(stdout);
-    }
-  }
-
-  void Refresh(const client::FrameReader& reader) {
-    const auto now = steady_clock::now();
-    if (!live_ || now - drawn_ < kRedraw) return;
-    drawn_ = now;
-    fmt::print("{}", view_.Draw(reader.counts(), now));
-    std::fflush(stdout);
-  }
-
- private:
-  // A line of its own whenever the server left something out: {"dropped": {"link": frames since the start}}.
-  void PrintDrops(const std::vector<client::StreamCounts>& counts) {
-    uint64_t total = 0;
-    Json dropped = Json::object();
-    for (const auto& link : counts) {
-      total += link.frames_dropped;
-      dropped[link.link] = link.frames_dropped;
-    }
-    if (total == dropped_) return;
-    dropped_ = total;
-    fmt::print("{}\n", Json({{"dropped", dropped}}).dump());
-  }
-
-  const bool json_;
-  const bool live_;
-  LiveView view_;
-  ChangeLog log_;
-  uint64_t dropped_ = 0;
-  steady_clock::time_point drawn_;
-};
-
 Result<void> Run(const Options& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
@@ -108,7 +49,7 @@ Result<void> Run(const Options& options) {
   if (!reader) return reader.error();
   std::signal(SIGINT, [](int) { interrupted = true; });
   std::signal(SIGTERM, [](int) { interrupted = true; });
-  Output output(options);
+  FrameOutput output("taclink watch " + options.server + "   (Ctrl-C ends)", options.json);
   // Every link says something once a second, so silence means a server or a network that hangs.
   const double patience_s = std::max(options.patience_s, options.rate_hz > 0 ? 3 / options.rate_hz : 0);
   double silence_s = 0;
@@ -127,7 +68,7 @@ Result<void> Run(const Options& options) {
                                options.server, patience_s)};
     }
     if (std::ferror(stdout) != 0) break;  // main reports it
-    output.Refresh(**reader);
+    output.Refresh((*reader)->counts());
   }
   return {};
 }

@@ -41,7 +41,7 @@ const char* Name(ForceModel model);
 
 enum class MarkerSource : uint8_t { kUnknown, kBoth, kTop, kBottom, kInferred };
 
-enum class SourceKind { kUnknown, kV4l2, kFiles, kSimulated };
+enum class SourceKind { kUnknown, kV4l2, kFiles, kSimulated, kLog };
 const char* Name(SourceKind kind);
 
 /// How the worker of a link does: late, being started again, or dead so often that it waits for RestartLink.
@@ -192,6 +192,7 @@ struct Frame {
   bool tracked = false;      ///< markers were followed; else the full pictures were searched
   double picture_share = 0;  ///< part of both pictures' pixels that were read
   bool unchanged = false;    ///< within the stream's deadband; at kContacts
+  bool replayed = false;     ///< from a log: the times are those of then
 
   // kGeometry
   std::vector<Vector3> positions_m;
@@ -205,9 +206,9 @@ struct Frame {
   bool force_converged = true;
 
   /// From exposure to this client; right as far as both machines' clocks agree. None: a frame without a
-  /// picture.
+  /// picture, or from a log.
   std::optional<double> latency_s() const {
-    if (times.exposure_utc_ns == 0) return {};
+    if (times.exposure_utc_ns == 0 || replayed) return {};
     return static_cast<double>(times.client_utc_ns - times.exposure_utc_ns) * 1e-9;
   }
 };
@@ -283,6 +284,7 @@ struct Credentials {
   std::string key_file = {};          ///< of that certificate
   std::string token = {};             ///< goes with every call; never in the clear to another machine
 };
+class Recordings;        // taclink/recordings.h
 class ContactReader;     // taclink/arm_contacts.h
 class JointStateWriter;  // likewise
 
@@ -315,6 +317,9 @@ class Client {
   /// kEndOfData (cancelled); then the link stays as it was.
   Result<CalibrationResult> Calibrate(const CalibrateOptions& options, const CalibrateProgress& progress = {},
                                       std::chrono::milliseconds timeout = std::chrono::seconds(60));
+
+  /// The server's recordings; see taclink/recordings.h.
+  Recordings RecordingCalls() const;
 
   /// All contacts of the arm in its base frame. `max_rate_hz` 0: whenever a link publishes. Returns once the
   /// server has accepted. Errors: kInvalidArgument, kResourceExhausted, kUnavailable.

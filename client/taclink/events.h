@@ -70,6 +70,7 @@ enum class EventKind {
   kDrift,
   kThresholds,
   kFramesLost,
+  kRecording,
 };
 const char* Name(EventKind kind);  ///< "contact_begin", ...
 std::optional<EventKind> EventKindOf(const std::string& name);
@@ -82,7 +83,7 @@ struct Event {
   uint64_t frame_sequence = 0;
   int64_t exposure_utc_ns = 0, exposure_ns = 0, published_ns = 0, raised_ns = 0;
   int64_t raised_utc_ns = 0, sent_utc_ns = 0;
-  int64_t client_utc_ns = 0;  ///< this client had it
+  int64_t client_utc_ns = 0;  ///< this client had it; 0: it comes from a log
 
   // Contacts and force levels.
   uint64_t contact_id = 0;
@@ -109,7 +110,7 @@ struct Event {
 
   /// From the exposure of the frame that made it to this client; right as far as both clocks agree.
   std::optional<double> latency_s() const {
-    if (exposure_utc_ns == 0) return {};
+    if (exposure_utc_ns == 0 || client_utc_ns == 0) return {};
     return static_cast<double>(client_utc_ns - exposure_utc_ns) * 1e-9;
   }
 };

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sensing/camera/bundle.h"
@@ -91,6 +92,8 @@ Result<CalibrationSummary> CalibrateFromRest(const LinkModel& model, const Label
 /// Calibration files (YAML, `taclink_calibration: 2`; 1 is read too), for links of that model only. Errors:
 /// kNotFound, kInvalidArgument (file, line, what was expected).
 Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model);
+/// The same from a file's text; `name` stands for the file in messages. Errors: kInvalidArgument.
+Result<StereoRig> ParseCalibration(const std::string& name, std::string_view content, const LinkModel& model);
 /// The file's text.
 std::string CalibrationText(const std::string& model_name, const CalibrationSummary& summary);
 /// Replaces the file as a whole. Errors: kUnavailable.

@@ -51,10 +51,7 @@ std::string SigmasText(const CameraCalibration& one, const std::string& indent) 
   return out.str();
 }
 
-}  // namespace
-
-Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model) {
-  auto file = YamlFile::Load(path);
+Result<StereoRig> ReadRig(Result<YamlFile> file, const LinkModel& model) {
   if (!file) return file.error();
   YamlMap& root = file->root();
   const int version = root.Integer("taclink_calibration", {.min = 1, .max = kFormatVersion});
@@ -75,6 +72,17 @@ Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& mode
   root.Done();
   if (auto good = file->Finish(); !good) return good.error();
   return rig;
+}
+
+}  // namespace
+
+Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model) {
+  return ReadRig(YamlFile::Load(path), model);
+}
+
+Result<StereoRig> ParseCalibration(const std::string& name, std::string_view content,
+                                   const LinkModel& model) {
+  return ReadRig(YamlFile::Parse(name, content), model);
 }
 
 std::string CalibrationText(const std::string& model_name, const CalibrationSummary& summary) {

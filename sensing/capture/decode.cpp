@@ -43,39 +43,52 @@ bool IsHarmless(tjhandle handle) {
              std::string_view::npos;
 }
 
-}  // namespace
-
-struct GrayDecoder::Jpeg {
+struct JpegHandle {
   tjhandle handle = tjInitDecompress();
 
-  Jpeg() = default;
-  Jpeg(const Jpeg&) = delete;
-  Jpeg& operator=(const Jpeg&) = delete;
-  ~Jpeg() {
+  JpegHandle() = default;
+  JpegHandle(const JpegHandle&) = delete;
+  JpegHandle& operator=(const JpegHandle&) = delete;
+  ~JpegHandle() {
     if (handle) tjDestroy(handle);
   }
 
-  Result<void> Decode(const RawImage& image, cv::Mat& gray) {
+  Result<PictureSize> ReadHeader(std::span<const uint8_t> bytes) const {
     if (!handle) return Error{ErrorCode::kInternal, "TurboJPEG does not start"};
-    const unsigned char* const bytes = image.bytes.data();
-    const auto size = static_cast<unsigned long>(image.bytes.size());
-    int width = 0, height = 0, subsampling = 0, colorspace = 0;
-    if (size == 0 || tjDecompressHeader3(handle, bytes, size, &width, &height, &subsampling, &colorspace)) {
-      return Bad("not a JPEG picture" + (size == 0 ? ": no bytes" : Why()));
+    if (bytes.empty()) return Bad("not a JPEG picture: no bytes");
+    PictureSize size;
+    int subsampling = 0, colorspace = 0;
+    if (tjDecompressHeader3(handle, bytes.data(), bytes.size(), &size.width_px, &size.height_px, &subsampling,
+                            &colorspace)) {
+      return Bad("not a JPEG picture" + Why());
     }
-    if (width != image.width_px || height != image.height_px) {
-      return Bad("JPEG picture is " + SizeText(width, height) + ", not " +
+    return size;
+  }
+
+  std::string Why() const { return std::string(": ") + tjGetErrorStr2(handle); }
+};
+
+}  // namespace
+
+Result<PictureSize> JpegSize(std::span<const uint8_t> bytes) {
+  return JpegHandle().ReadHeader(bytes);
+}
+
+struct GrayDecoder::Jpeg : JpegHandle {
+  Result<void> Decode(const RawImage& image, cv::Mat& gray) {
+    const auto size = ReadHeader(image.bytes);
+    if (!size) return size.error();
+    if (size->width_px != image.width_px || size->height_px != image.height_px) {
+      return Bad("JPEG picture is " + SizeText(size->width_px, size->height_px) + ", not " +
                  SizeText(image.width_px, image.height_px));
     }
-    if (tjDecompress2(handle, bytes, size, gray.data, width, static_cast<int>(gray.step[0]), height,
-                      TJPF_GRAY, TJFLAG_LIMITSCANS) &&
+    if (tjDecompress2(handle, image.bytes.data(), image.bytes.size(), gray.data, size->width_px,
+                      static_cast<int>(gray.step[0]), size->height_px, TJPF_GRAY, TJFLAG_LIMITSCANS) &&
         !IsHarmless(handle)) {
       return Bad("damaged JPEG picture" + Why());
     }
     return {};
   }
-
-  std::string Why() const { return std::string(": ") + tjGetErrorStr2(handle); }
 };
 
 GrayDecoder::GrayDecoder() : jpeg_(std::make_unique<Jpeg>()) {}

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <span>
 
 #include "sensing/core/frame.h"
 #include "sensing/core/result.h"
@@ -10,6 +12,13 @@ namespace taclink {
 
 /// No picture is wider or higher than this, px. What claims to be is refused before memory is taken for it.
 inline constexpr int kMaxPictureSidePx = 8192;
+
+struct PictureSize {
+  int width_px = 0;
+  int height_px = 0;
+};
+/// Of a JPEG picture, as its header says. Errors: kInvalidArgument (none, or a damaged header).
+Result<PictureSize> JpegSize(std::span<const uint8_t> bytes);
 
 /// Raw pictures to gray ones, 8 bits, the camera's own luma (BT.601). Used from one thread at a time.
 class GrayDecoder {

@@ -84,6 +84,7 @@ class FileSource final : public FrameSource {
   Result<void> CheckSizes();
   Result<void> LoadAll();
   Result<void> Load(StereoFrame& frame);
+  Result<void> Read(const std::string& path, RawImage& image) const;
   int64_t DueNs(uint64_t index) const {
     return start_ns_ + std::llround(1e9 * static_cast<double>(index) / options_.frame_rate_hz);
   }
@@ -132,7 +133,7 @@ Result<void> FileSource::LoadAll() {
     auto& images = loaded_.emplace_back();
     for (const CameraId id : kBothCameras) {
       if (pair[Index(id)].empty()) continue;
-      if (auto read = ReadRawImage(pair[Index(id)], images[Index(id)]); !read) return read;
+      if (auto read = Read(pair[Index(id)], images[Index(id)]); !read) return read;
     }
   }
   return {};
@@ -205,11 +206,23 @@ Result<void> FileSource::Load(StereoFrame& frame) {
       ++counters_.unpaired[Index(id == CameraId::kTop ? CameraId::kBottom : CameraId::kTop)];
     } else if (!loaded_.empty()) {
       image = loaded_[next_ % pairs_.size()][Index(id)];
-    } else if (auto read = ReadRawImage(pair[Index(id)], image); !read) {
+    } else if (auto read = Read(pair[Index(id)], image); !read) {
       return read;
     }
   }
   return {};
+}
+
+Result<void> FileSource::Read(const std::string& path, RawImage& image) const {
+  auto read = ReadRawImage(path, image);
+  if (!read || !options_.yuyv || image.format != PixelFormat::kGray8) return read;
+  constexpr uint8_t kNoColour = 128;
+  std::vector<uint8_t> bytes;
+  bytes.reserve(2 * image.bytes.size());
+  for (const uint8_t gray : image.bytes) bytes.insert(bytes.end(), {gray, kNoColour});
+  image.bytes = std::move(bytes);
+  image.format = PixelFormat::kYuyv;
+  return read;
 }
 
 SourceInfo FileSource::Info() const {

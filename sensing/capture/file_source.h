@@ -19,12 +19,13 @@ struct FileOptions {
       {};                  ///< Start puts the first pair so long after a full second of `clock`,
                            ///< so that sources are in step, or out of it; none: at once
   bool in_memory = false;  ///< Start reads all pictures, so that Next only copies
+  bool yuyv = false;       ///< gray pictures come as kYuyv, as most cameras would send them
 };
 
 /// Numbered picture pairs in a folder: top_000001.png and bottom_000001.png, also .jpg and .jpeg, any count
 /// of digits, in the order of their numbers. A number with only one picture gives a frame whose other image
-/// is not valid. All must have one size, which Start checks. PNG pictures come as kGray8, JPEG ones as kMjpeg
-/// bytes. The time of exposure is when a pair was due, by `clock`.
+/// is not valid. All must have one size, which Start checks. PNG pictures come as kGray8 (or, with `yuyv`,
+/// kYuyv), JPEG ones as kMjpeg bytes. The time of exposure is when a pair was due, by `clock`.
 std::unique_ptr<FrameSource> MakeFileSource(FileOptions options, Clock& clock);
 
 }  // namespace taclink

@@ -21,7 +21,7 @@ enum class DriftState : uint8_t {
 
 struct Baseline {
   BaselineOrigin origin = BaselineOrigin::kNone;
-  int64_t taken_utc_ns = 0;  ///< since 1970-01-01; 0: there is none
+  int64_t taken_utc_ns = 0;  ///< exposure of its newest picture, since 1970-01-01; 0: there is none
   double drift_mm = 0;       ///< how far it has followed the skin since: of the marker that went furthest
   DriftState drift_state = DriftState::kOff;
 };

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +23,9 @@ struct RawImage {
   bool valid = false;            ///< false: this camera gave no picture for this frame
   std::string why_missing = {};  ///< for people, when not valid; may be empty
 };
+
+/// The pictures of one moment, top and bottom.
+using RawPictures = std::array<RawImage, kCameraCount>;
 
 /// When things happened to a frame. Nanoseconds; 0: has not happened. Monotonic times are CLOCK_MONOTONIC's.
 struct FrameTimes {
@@ -54,13 +59,24 @@ struct PressureReport {
   bool assumed() const { return origin == PressureOrigin::kNone || origin == PressureOrigin::kConstant; }
 };
 
+/// `mpa` rounded to 2^-40 MPa (a millionth of a pascal): such a pressure is the same number again after a
+/// way through Pa (times 10^6 = 2^6 5^6, which needs 14 bits more), so that a log can be solved again bit for
+/// bit.
+inline double ExactInPascals(double mpa) {
+  return std::ldexp(std::round(std::ldexp(mpa, 40)), -40);
+}
+
+struct LinkState;
+
 /// What a link's cameras saw at one moment.
 struct StereoFrame {
   uint64_t sequence = 0;  ///< counts exposures of this source; a gap is a frame that was not seen
   FrameTimes times;
-  std::array<RawImage, kCameraCount> images;
+  RawPictures images;
   std::optional<double> pressure_mpa;  ///< gauge pressure inside the skin at that time; none: not measured
   PressureReport pressure;
+  /// From a log: what was found then, in place of pictures; null: from cameras.
+  std::shared_ptr<const LinkState> recorded = nullptr;
 };
 
 }  // namespace taclink

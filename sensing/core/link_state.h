@@ -51,9 +51,10 @@ struct LinkState {
   NodalForces forces;  ///< empty while nothing is measured
   std::vector<Contact> contacts;
   Vec3 total_force_n = Vec3::Zero();  ///< sum over the contacts
-  double baseline_age_s = 0;          ///< since the rest shape was taken
+  double baseline_age_s = 0;          ///< from when the baseline was taken to the exposure
   Baseline baseline;
   StageTimes stage_ms;
+  bool replayed = false;  ///< from a log: the UTC times are those of then
 
   bool measured() const { return !shape.positions_mm.empty(); }
   /// Nothing is measured; most buffers stay.

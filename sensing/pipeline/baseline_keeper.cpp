@@ -18,6 +18,10 @@ double StrongestLoad(const LinkState& state) {
   return strongest;
 }
 
+int64_t MonotonicNs(const FrameTimes& times, const Clock& clock) {
+  return times.exposure_monotonic_ns != 0 ? times.exposure_monotonic_ns : clock.MonotonicNs();
+}
+
 }  // namespace
 
 BaselineKeeper::BaselineKeeper(const LinkModel& model, const std::optional<DriftOptions>& drift)
@@ -25,9 +29,11 @@ BaselineKeeper::BaselineKeeper(const LinkModel& model, const std::optional<Drift
   off_mm_.reserve(static_cast<size_t>(model.markers.count()));
 }
 
-void BaselineKeeper::Take(BaselineOrigin origin, double pressure_mpa, Clock& clock) {
-  baseline_ = {.origin = origin, .taken_utc_ns = clock.UtcNs()};
-  taken_ns_ = clock.MonotonicNs();
+void BaselineKeeper::Take(BaselineOrigin origin, double pressure_mpa, const FrameTimes& times,
+                          const Clock& clock) {
+  baseline_ = {.origin = origin,
+               .taken_utc_ns = times.exposure_utc_ns != 0 ? times.exposure_utc_ns : clock.UtcNs()};
+  taken_ns_ = MonotonicNs(times, clock);
   pressure_mpa_ = pressure_mpa;
   follower_.Reset();
 }
@@ -67,13 +73,13 @@ void BaselineKeeper::Apply(const ShapeReconstructor& reconstructor, double press
 }
 
 void BaselineKeeper::Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels,
-                           ShapeReconstructor& reconstructor, Clock& clock) {
+                           ShapeReconstructor& reconstructor, const Clock& clock) {
   if (drift_) FollowDrift(times, state, clock);
   state.baseline = baseline_;
   state.baseline.drift_mm = follower_.largest_mm();
   if (drift_) state.baseline.drift_state = follower_.following() ? DriftState::kFollowing : DriftState::kHeld;
-  state.baseline_age_s = AgeS(clock);
-  if (tare_) TakeTareFrame(state, labels, reconstructor, clock);
+  state.baseline_age_s = AgeS(times, clock);
+  if (tare_) TakeTareFrame(times, state, labels, reconstructor, clock);
 }
 
 void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock) {
@@ -81,12 +87,13 @@ void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state
   const bool good = state.status == LinkStatus::kOk ||
                     (state.measured() && HasDriftedFar() && state.status_reason == DriftAdvice());
   const bool sure = good && std::abs(PressureChange(frame_pressure_mpa_)) <= kSamePressureMpa;
-  const int64_t now_ns = times.exposure_monotonic_ns != 0 ? times.exposure_monotonic_ns : clock.MonotonicNs();
-  follower_.Update(now_ns, sure ? std::optional(StrongestLoad(state)) : std::nullopt, off_mm_);
+  follower_.Update(MonotonicNs(times, clock), sure ? std::optional(StrongestLoad(state)) : std::nullopt,
+                   off_mm_);
 }
 
-void BaselineKeeper::TakeTareFrame(const LinkState& state, const LabelledMarkers& labels,
-                                   ShapeReconstructor& reconstructor, Clock& clock) {
+void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& state,
+                                   const LabelledMarkers& labels, ShapeReconstructor& reconstructor,
+                                   const Clock& clock) {
   const Result<bool> complete = tare_->Add(state, labels, off_mm_);
   if (complete && !*complete) return;
   if (!complete) {
@@ -95,15 +102,16 @@ void BaselineKeeper::TakeTareFrame(const LinkState& state, const LabelledMarkers
     tare_end_ = TareSummary{.frames = tare_->frames(),
                             .forced = tare_->forced(),
                             .shift_mm = tare_->shift_mm(),
-                            .previous_age_s = AgeS(clock)};
+                            .previous_age_s = AgeS(times, clock)};
     reconstructor.Tare(tare_->markers(), frame_pressure_mpa_);
-    Take(tare_->forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, frame_pressure_mpa_, clock);
+    Take(tare_->forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, frame_pressure_mpa_, times,
+         clock);
   }
   tare_.reset();
 }
 
-double BaselineKeeper::AgeS(const Clock& clock) const {
-  return static_cast<double>(clock.MonotonicNs() - taken_ns_) * 1e-9;
+double BaselineKeeper::AgeS(const FrameTimes& times, const Clock& clock) const {
+  return static_cast<double>(MonotonicNs(times, clock) - taken_ns_) * 1e-9;
 }
 
 std::string BaselineKeeper::DriftAdvice() const {

@@ -23,8 +23,9 @@ class BaselineKeeper {
  public:
   BaselineKeeper(const LinkModel& model, const std::optional<DriftOptions>& drift);
 
-  /// A baseline was taken, under this gauge pressure.
-  void Take(BaselineOrigin origin, double pressure_mpa, Clock& clock);
+  /// A baseline was taken, under this gauge pressure, the newest of its frames at `times`. Times are those of
+  /// frames, so that pictures solved again later tell the same; the clock's for frames without.
+  void Take(BaselineOrigin origin, double pressure_mpa, const FrameTimes& times, const Clock& clock);
   double PressureChange(double pressure_mpa) const { return pressure_mpa - pressure_mpa_; }
 
   /// Errors: kFailedPrecondition (one is under way).
@@ -39,16 +40,16 @@ class BaselineKeeper {
   /// Follows drift and takes a tare's frame, which may be its last; fills what the state says of the
   /// baseline.
   void Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels,
-             ShapeReconstructor& reconstructor, Clock& clock);
+             ShapeReconstructor& reconstructor, const Clock& clock);
 
   bool HasDriftedFar() const { return drift_ && follower_.largest_mm() > drift_->limit_mm; }
   std::string DriftAdvice() const;
 
  private:
   void FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock);
-  void TakeTareFrame(const LinkState& state, const LabelledMarkers& labels, ShapeReconstructor& reconstructor,
-                     Clock& clock);
-  double AgeS(const Clock& clock) const;
+  void TakeTareFrame(const FrameTimes& times, const LinkState& state, const LabelledMarkers& labels,
+                     ShapeReconstructor& reconstructor, const Clock& clock);
+  double AgeS(const FrameTimes& times, const Clock& clock) const;
 
   const LinkModel model_;
   const std::optional<DriftOptions> drift_;

@@ -152,8 +152,17 @@ struct LinkPipeline::Stages {
     return rest && rest_progress.refusal && now_ns > refused_ns && now_ns < refused_ns + wait_ns;
   }
 
-  void SkipRest(LinkState& state) {
+  // Nothing stays of what was measured into the same buffers before.
+  static void Forget(LinkState& state) {
     state.ClearMeasurement();
+    state.forces.model = NodalForces().model;
+    state.baseline = {};
+    state.baseline_age_s = 0;
+    for (CameraCounts& camera : state.cameras) camera.labelled = 0;
+  }
+
+  void SkipRest(LinkState& state) {
+    Forget(state);
     state.tracking = {};
     for (size_t i = 0; i < kCameraCount; ++i)
       state.cameras[i].detections = static_cast<int>(detections[i].size());
@@ -163,14 +172,14 @@ struct LinkPipeline::Stages {
 
   // A baseline under a pressure that is not known would be wrong for good.
   void WaitForPressure(LinkState& state) {
-    state.ClearMeasurement();
+    Forget(state);
     SetStatus(state, LinkStatus::kCalibrating,
               "the rest shape waits for the pressure sensor: " + state.pressure.trouble);
   }
 
   // A pair before the baseline is known.
   void TakeRest(const FrameTimes& times, double pressure_mpa, LinkState& state) {
-    state.ClearMeasurement();
+    Forget(state);
     if (!camera_trouble.empty()) return SetStatus(state, LinkStatus::kCalibrating, camera_trouble);
     const auto complete = rest->Add(detections);
     rest_progress.taken = rest->taken();
@@ -191,7 +200,7 @@ struct LinkPipeline::Stages {
     shape_options.cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
     reconstructor.emplace(model, calibration->rig, shape_options);
     reconstructor->SetBaseline(rest->markers(), pressure_mpa);
-    keeper.Take(rest_origin, pressure_mpa, clock);
+    keeper.Take(rest_origin, pressure_mpa, times, clock);
     predicted_mm.clear();
     rest.reset();
   }
@@ -207,7 +216,7 @@ struct LinkPipeline::Stages {
     } else if (seen < kDegradedFraction * all) {
       SetStatus(state, LinkStatus::kDegraded, count());
     } else if (!state.forces.converged) {
-      SetStatus(state, LinkStatus::kDegraded, "more loads than the force model takes");
+      SetStatus(state, LinkStatus::kDegraded, kTooManyLoads);
     } else if (state.pressure.stale) {
       SetStatus(state, LinkStatus::kDegraded, "the pressure is not known: " + state.pressure.trouble);
     } else if (keeper.HasDriftedFar()) {

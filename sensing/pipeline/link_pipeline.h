@@ -34,6 +34,9 @@ struct PipelineOptions {
   std::optional<DriftOptions> drift;
 };
 
+/// LinkState's reason where the forces did not converge.
+inline constexpr const char* kTooManyLoads = "more loads than the force model takes";
+
 /// How the taking of rest pairs goes.
 struct RestProgress {
   int taken = 0, wanted = 0;

@@ -42,22 +42,26 @@ Result<std::unique_ptr<ArmPoses>> BuildPoses(const Config& config) {
   if (!config.kinematics.urdf) return std::unique_ptr<ArmPoses>();
   auto kinematics = ArmKinematics::Load(*config.kinematics.urdf, config.kinematics.base);
   if (!kinematics) return kinematics.error();
+  return MakePoses(config, std::move(*kinematics));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ArmPoses>> MakePoses(const Config& config,
+                                            std::shared_ptr<const ArmKinematics> kinematics) {
   std::vector<LinkMount> mounts;
   for (const LinkConfig& link : config.links) {
     mounts.push_back({.frame = {}, .frame_from_link = link.FrameFromLink()});
     if (link.frame.empty()) continue;
-    const auto frame = (*kinematics)->FindFrame(link.frame);
+    const auto frame = kinematics->FindFrame(link.frame);
     if (!frame) {
       return Error{frame.error().code,
                    "link '" + link.name + "': " + frame.error().message + "; correct its pose.frame"};
     }
     mounts.back().frame = *frame;
   }
-  return std::make_unique<ArmPoses>(std::move(*kinematics), std::move(mounts),
-                                    config.kinematics.joint_states);
+  return std::make_unique<ArmPoses>(std::move(kinematics), std::move(mounts), config.kinematics.joint_states);
 }
-
-}  // namespace
 
 std::vector<Result<LinkParts>> BuildLinks(const Config& config, Clock& clock) {
   // Simulated links solve their scenes first.

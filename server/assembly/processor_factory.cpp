@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "sensing/camera/calibration.h"
-#include "sensing/pipeline/link_pipeline.h"
 
 namespace taclink::server {
 namespace {
@@ -85,7 +84,7 @@ class PipelineProcessor final : public LinkProcessor {
 
 }  // namespace
 
-Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model) {
+PipelineOptions ToPipelineOptions(const LinkConfig& link) {
   PipelineOptions options;
   options.force.model = link.force_model;
   options.force.refinement = link.force_refinement;
@@ -94,6 +93,11 @@ Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, con
     if (const auto* constant = std::get_if<ConstantPressureConfig>(&link.pressure->source))
       options.pressure_mpa = constant->kpa * kMpaPerKpa;
   }
+  return options;
+}
+
+Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model) {
+  PipelineOptions options = ToPipelineOptions(link);
   if (link.calibration && IsMissing(*link.calibration)) {
     spdlog::warn(
         "link {}: {} does not exist yet; the first pictures calibrate the cameras instead. "

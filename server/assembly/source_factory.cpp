@@ -31,7 +31,8 @@ struct SourceMaker {
                            .loop = config.loop,
                            .paced = true,
                            .start_after_s = config.start_after_s,
-                           .in_memory = config.in_memory},
+                           .in_memory = config.in_memory,
+                           .yuyv = config.yuyv},
                           clock);
   }
 

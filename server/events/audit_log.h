@@ -15,7 +15,7 @@ class AuditLog {
   /// `file` empty: nothing is written.
   AuditLog(std::string file, size_t max_bytes);
 
-  /// Tares, calibrations, baselines, drift and thresholds are written, other kinds are not.
+  /// Tares, calibrations, baselines, drift, thresholds and recordings are written, other kinds are not.
   void Write(const Event& event, const std::string& link);
 
   uint64_t failures() const { return failures_; }

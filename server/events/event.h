@@ -25,8 +25,9 @@ enum class EventKind : uint8_t {
   kDrift,
   kThresholds,
   kFramesLost,  ///< the engine was too slow: what happened in them is not told
+  kRecording,   ///< begun, ended, in trouble
 };
-inline constexpr size_t kEventKinds = 11;
+inline constexpr size_t kEventKinds = 12;
 
 struct ContactDetail {
   uint64_t id = 0;  ///< the contact's in the frame that began it; lasts

@@ -33,7 +33,7 @@ std::string NewRunId(const Clock& clock) {
 const char* Name(EventKind kind) {
   static constexpr std::array<const char*, kEventKinds> kNames = {
       "contact_begin", "contact_update", "contact_end", "force_level", "link_status", "tare",
-      "calibration",   "baseline",       "drift",       "thresholds",  "frames_lost"};
+      "calibration",   "baseline",       "drift",       "thresholds",  "frames_lost", "recording"};
   return kNames[static_cast<size_t>(kind)];
 }
 
@@ -159,7 +159,7 @@ void EventEngine::Raise(Event event) {
   history_.Add(std::move(event));
 }
 
-void EventEngine::Post(EventKind kind, size_t link, Operation operation) {
+void EventEngine::Post(EventKind kind, std::optional<size_t> link, Operation operation) {
   operation.who.resize(std::min(operation.who.size(), kLongestText));
   operation.outcome.resize(std::min(operation.outcome.size(), kLongestText));
   {

@@ -47,9 +47,9 @@ class EventEngine {
 
   EventHistory& history() { return history_; }
 
-  /// Something was asked of a link. Any thread, at once: it is told and audited by the engine's thread. Of
-  /// more than 1024 that wait, the newest are left out, which the log says.
-  void Post(EventKind kind, size_t link, Operation operation);
+  /// Something was asked of a link (none: of the whole arm). Any thread, at once: it is told and audited by
+  /// the engine's thread. Of more than 1024 that wait, the newest are left out, which the log says.
+  void Post(EventKind kind, std::optional<size_t> link, Operation operation);
 
   /// In force from the next frame on; told and audited. Errors: kInvalidArgument, kNotFound (no such region).
   Result<void> SetThresholds(size_t link, const std::string& region, const Thresholds& thresholds,
@@ -62,7 +62,7 @@ class EventEngine {
   struct Signal;
   struct Posted {
     EventKind kind;
-    size_t link;
+    std::optional<size_t> link;
     Operation operation;
   };
 

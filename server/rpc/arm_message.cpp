@@ -17,6 +17,8 @@ v1::SourceKind ToWire(SourceKind kind) {
       return v1::SOURCE_KIND_FILES;
     case SourceKind::kSimulated:
       return v1::SOURCE_KIND_SIMULATED;
+    case SourceKind::kLog:
+      return v1::SOURCE_KIND_LOG;
   }
   return v1::SOURCE_KIND_UNSPECIFIED;
 }

@@ -27,7 +27,7 @@ ContactStream::ContactStream(Arm& arm, double max_rate_hz, StreamRegistry& regis
       joints_(arm.poses().joints().joints()),
       newest_(arm.links().size()),
       rate_(max_rate_hz) {
-  for (const LinkDescription& link : arm.links()) link_names_.push_back(link.name);
+  link_names_ = arm.link_names();
 }
 
 void ContactStream::Begin() {

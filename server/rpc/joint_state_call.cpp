@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/joint_state_intake.h"
+#include "server/replay/replay_link.h"
 
 namespace taclink::server {
 namespace {
@@ -35,7 +36,10 @@ grpc::ServerReadReactor<v1::UpdateJointStatesRequest>* TakeJointStates(
   using Stream = UpdateStream<v1::UpdateJointStatesRequest>;
   auto intake = std::make_shared<JointStateIntake>(arm.poses(), arm.clock());
   auto stream = std::make_shared<Stream>(
-      registry, [intake](const v1::UpdateJointStatesRequest& request) { return intake->Take(From(request)); },
+      registry,
+      [intake, plays_log = arm.plays_log()](const v1::UpdateJointStatesRequest& request) {
+        return plays_log ? Result<void>(PlaysLog()) : intake->Take(From(request));
+      },
       [intake, &response] {
         response.set_accepted(intake->counts().accepted);
         response.set_refused(intake->counts().refused);

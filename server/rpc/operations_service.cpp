@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "server/replay/replay_link.h"
 #include "server/rpc/status.h"
 #include "server/rpc/who.h"
 
@@ -12,8 +13,8 @@ grpc::ServerUnaryReactor* OperationsService::RestartLink(grpc::CallbackServerCon
                                                          v1::RestartLinkResponse*) {
   auto* reactor = context->DefaultReactor();
   const auto link = arm_.FindLink(request->link());
-  if (!link) {
-    reactor->Finish(ToGrpc(link.error()));
+  if (!link || arm_.plays_log()) {
+    reactor->Finish(ToGrpc(link ? PlaysLog() : link.error()));
     return reactor;
   }
   spdlog::info("link {}: restart ordered by {}", request->link(), Who(*context, *security_));

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "server/client_time.h"
+#include "server/replay/replay_link.h"
 #include "wire/units.h"
 
 namespace taclink::server {
@@ -15,6 +16,7 @@ class PressureIntake {
   explicit PressureIntake(Arm& arm) : arm_(arm) {}
 
   Result<void> Take(const v1::UpdatePressureRequest& request) {
+    if (arm_.plays_log()) return PlaysLog();
     if (!request.link().empty()) {
       const auto link = arm_.FindLink(request.link());
       if (!link) return link.error();

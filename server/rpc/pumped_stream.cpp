@@ -62,7 +62,7 @@ void PumpedStream::Pump() {
     const std::lock_guard lock(mutex_);
     step = Decide();
     // Also where the server gave up on a client that does not read: it may still get to see the reason.
-    status = end_reason_.empty() ? grpc::Status::CANCELLED
+    status = end_reason_.empty() ? end_.value_or(grpc::Status::CANCELLED)
                                  : grpc::Status(grpc::StatusCode::UNAVAILABLE, end_reason_);
   }
   // Outside the lock: writing_ or finished_ now keep every other thread from coming here.
@@ -89,6 +89,7 @@ PumpedStream::Step PumpedStream::Decide() {
   }
   finished_ = !end_reason_.empty();
   auto message = finished_ ? Last(end_reason_) : Next();
+  if (!message && end_) finished_ = true;
   if (!message) return finished_ ? Step::kFinish : Step::kNothing;
   message_ = std::move(*message);
   writing_ = !finished_;

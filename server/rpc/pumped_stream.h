@@ -39,6 +39,8 @@ class PumpedStream : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   virtual std::optional<grpc::ByteBuffer> Next() = 0;
   /// The message before the server ends the stream; none: only the status tells. One thread at a time.
   virtual std::optional<grpc::ByteBuffer> Last(const std::string& reason) = 0;
+  /// For Next: the call ends so once it has been asked again and had no more.
+  void EndWith(const grpc::Status& status) { end_ = status; }
 
  private:
   void OnWriteDone(bool ok) final;
@@ -60,7 +62,8 @@ class PumpedStream : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   bool writing_ = false;
   bool cancelled_ = false;
   bool finished_ = false;
-  std::string end_reason_;  // not empty: the server ends the stream
+  std::string end_reason_;           // not empty: the server ends the stream
+  std::optional<grpc::Status> end_;  // by Next
 
   grpc::ByteBuffer message_;  // under way while writing_ or finished_
 };

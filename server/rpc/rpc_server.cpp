@@ -31,16 +31,21 @@ std::string WithPort(const std::string& listen, int port) {
 
 }  // namespace
 
-RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const Security>& security)
+RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const Security>& security,
+                     Recorder* recorder)
     : senders_(std::make_shared<boost::asio::thread_pool>(1)),
       service_(arm, limits, senders_, security),
-      operations_(arm, security) {}
+      operations_(arm, security) {
+  if (recorder != nullptr)
+    recordings_ = std::make_unique<RecordingService>(*recorder, service_.registry(), senders_, security);
+}
 
 Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, Arm& arm, ServiceLimits limits,
-                                                    std::shared_ptr<const Security> security) {
+                                                    std::shared_ptr<const Security> security,
+                                                    Recorder* recorder) {
   EnablePlugins();
   if (!security) security = std::make_shared<const Security>();
-  std::unique_ptr<RpcServer> out(new RpcServer(arm, limits, security));
+  std::unique_ptr<RpcServer> out(new RpcServer(arm, limits, security, recorder));
   int port = 0;
   grpc::ServerBuilder builder;
   Apply(limits, builder);
@@ -48,6 +53,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
   builder.AddListeningPort(listen, MakeCredentials(listen, security), &port);
   builder.RegisterService(&out->service_);
   builder.RegisterService(&out->operations_);
+  if (recorder != nullptr) builder.RegisterService(out->recordings_.get());
   out->server_ = builder.BuildAndStart();
   if (!out->server_ || port == 0) {
     return Error{ErrorCode::kUnavailable,
@@ -56,6 +62,8 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
   out->address_ = WithPort(listen, port);
   out->server_->GetHealthCheckService()->SetServingStatus(v1::TactileService::service_full_name(), true);
   out->server_->GetHealthCheckService()->SetServingStatus(v1::OperationsService::service_full_name(), true);
+  if (recorder != nullptr)
+    out->server_->GetHealthCheckService()->SetServingStatus(v1::RecordingService::service_full_name(), true);
   return out;
 }
 
@@ -72,6 +80,7 @@ void RpcServer::Shutdown(const std::string& reason, std::chrono::milliseconds pa
   service_.WaitUntilNoStreams(patience);
   server_->Shutdown(deadline);
   server_->Wait();
+  if (recordings_) recordings_->Join();
   senders_->join();
   server_.reset();
 }

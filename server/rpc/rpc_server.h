@@ -10,18 +10,21 @@
 #include "sensing/core/result.h"
 #include "server/arm.h"
 #include "server/rpc/operations_service.h"
+#include "server/rpc/recording_service.h"
 #include "server/rpc/tactile_service.h"
 #include "server/security/security.h"
 
 namespace taclink::server {
 
-/// gRPC over one arm: TactileService, health, reflection. The arm must outlive it.
+/// gRPC over one arm: TactileService, OperationsService, RecordingService, health, reflection. The arm must
+/// outlive it.
 class RpcServer {
  public:
-  /// Listens at once. `security` null: everybody may call, in the clear. Errors: kUnavailable (the address
-  /// can't be had).
+  /// Listens at once. `security` null: everybody may call, in the clear. `recorder` null: no
+  /// RecordingService; otherwise it must outlive the server. Errors: kUnavailable (the address can't be had).
   static Result<std::unique_ptr<RpcServer>> Start(const std::string& listen, Arm& arm, ServiceLimits limits,
-                                                  std::shared_ptr<const Security> security = nullptr);
+                                                  std::shared_ptr<const Security> security = nullptr,
+                                                  Recorder* recorder = nullptr);
   ~RpcServer();
 
   /// Tells every stream why, then ends all calls by `patience` at the latest. May be called twice.
@@ -35,12 +38,14 @@ class RpcServer {
   void SetLimits(ServiceLimits limits) { service_.SetLimits(limits); }
 
  private:
-  RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const Security>& security);
+  RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const Security>& security,
+            Recorder* recorder);
 
   // Constant after Start. The service outlives the server that calls it.
   const std::shared_ptr<boost::asio::thread_pool> senders_;
   TactileService service_;
   OperationsService operations_;
+  std::unique_ptr<RecordingService> recordings_;  // null: none
   std::unique_ptr<grpc::Server> server_;
   std::string address_;
 };

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "server/link_names.h"
 #include "taclink/v1/tactile.grpc.pb.h"
 #include "wire/convert.h"
 #include "wire/units.h"
@@ -25,19 +26,6 @@ Result<Deadband> ParseDeadband(const v1::StreamFramesRequest& request) {
 }
 
 }  // namespace
-
-Result<std::vector<bool>> FindLinks(const std::vector<std::string>& link_names,
-                                    const google::protobuf::RepeatedPtrField<std::string>& names) {
-  std::vector<bool> wanted;
-  if (names.empty()) return wanted;
-  wanted.assign(link_names.size(), false);
-  for (const std::string& name : names) {
-    const auto link = FindLink(link_names, name);
-    if (!link) return link.error();
-    wanted[*link] = true;
-  }
-  return wanted;
-}
 
 Result<FrameStreamOptions> ParseStreamRequest(const grpc::ByteBuffer& bytes,
                                               const std::vector<std::string>& link_names,

@@ -4,8 +4,10 @@
 
 #include <utility>
 
+#include "server/link_names.h"
 #include "server/rpc/arm_message.h"
 #include "server/rpc/event_calls.h"
+#include "server/rpc/refused_stream.h"
 #include "server/rpc/status.h"
 #include "server/rpc/stream_request.h"
 #include "server/rpc/who.h"
@@ -18,20 +20,6 @@ constexpr size_t kMaxUpdateCalls = 16;
 constexpr uint32_t kDefaultPairs = 8, kMaxPairs = 300, kDefaultTareFrames = 10;
 
 using StreamReactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
-
-/// A call that is refused before it began.
-class RefusedStream final : public StreamReactor {
- public:
-  explicit RefusedStream(const Error& error) { Finish(ToGrpc(error)); }
-
- private:
-  void OnDone() override { delete this; }
-};
-
-StreamReactor* Refuse(const grpc::CallbackServerContext& context, const char* method, const Error& error) {
-  spdlog::info("{}: {} refused: {}", PeerOf(context), method, error.message);
-  return new RefusedStream(error);  // deletes itself when gRPC is done with it
-}
 
 Error Invalid(std::string message) {
   return {ErrorCode::kInvalidArgument, std::move(message)};
@@ -53,7 +41,7 @@ TactileService::TactileService(Arm& arm, ServiceLimits limits,
       registry_(limits.max_streams, limits.max_streams_per_peer),
       updates_(kMaxUpdateCalls),
       limits_(limits) {
-  for (const LinkDescription& link : arm.links()) link_names_.push_back(link.name);
+  link_names_ = arm.link_names();
 }
 
 void TactileService::EndStreams(const std::string& reason) {
@@ -85,7 +73,7 @@ grpc::ServerUnaryReactor* TactileService::GetArm(grpc::CallbackServerContext* co
 StreamReactor* TactileService::StreamFrames(grpc::CallbackServerContext* context,
                                             const grpc::ByteBuffer* request) {
   auto options = ParseStreamRequest(*request, link_names_, limits());
-  if (!options) return Refuse(*context, "StreamFrames", options.error());
+  if (!options) return RefuseStream(*context, "StreamFrames", options.error());
   auto stream = std::make_shared<FrameStream>(std::move(*options), link_names_, registry_, senders_);
   if (auto* refused = AddOrRefuse(*context, "StreamFrames", stream)) return refused;
   stream->Begin(arm_.hub());
@@ -95,7 +83,7 @@ StreamReactor* TactileService::StreamFrames(grpc::CallbackServerContext* context
 StreamReactor* TactileService::StreamContacts(grpc::CallbackServerContext* context,
                                               const grpc::ByteBuffer* request) {
   const auto max_rate_hz = ContactStream::ParseRequest(*request);
-  if (!max_rate_hz) return Refuse(*context, "StreamContacts", max_rate_hz.error());
+  if (!max_rate_hz) return RefuseStream(*context, "StreamContacts", max_rate_hz.error());
   auto stream = std::make_shared<ContactStream>(arm_, *max_rate_hz, registry_, senders_);
   if (auto* refused = AddOrRefuse(*context, "StreamContacts", stream)) return refused;
   stream->Begin();
@@ -108,11 +96,11 @@ StreamReactor* TactileService::StreamEvents(grpc::CallbackServerContext* context
   v1::StreamEventsRequest request;
   grpc::ByteBuffer copy(*bytes);  // parsing empties it
   if (!grpc::SerializationTraits<v1::StreamEventsRequest>::Deserialize(&copy, &request).ok())
-    return Refuse(*context, kCall, Invalid("the request is no StreamEventsRequest message"));
+    return RefuseStream(*context, kCall, Invalid("the request is no StreamEventsRequest message"));
   const auto links = FindLinks(link_names_, request.links());
-  if (!links) return Refuse(*context, kCall, links.error());
+  if (!links) return RefuseStream(*context, kCall, links.error());
   const auto options = server::ParseRequest(request, *links, arm_.events().history());
-  if (!options) return Refuse(*context, kCall, options.error());
+  if (!options) return RefuseStream(*context, kCall, options.error());
   auto stream = std::make_shared<EventStream>(link_names_, arm_.clock(), registry_, senders_);
   if (auto* refused = AddOrRefuse(*context, kCall, stream)) return refused;
   stream->Begin(arm_.events().history(), options->start, options->filter);
@@ -122,7 +110,7 @@ StreamReactor* TactileService::StreamEvents(grpc::CallbackServerContext* context
 StreamReactor* TactileService::AddOrRefuse(const grpc::CallbackServerContext& context, const char* method,
                                            std::shared_ptr<PumpedStream> stream) {
   const auto admitted = registry_.Admit(std::move(stream), PeerOf(context));
-  return admitted ? nullptr : Refuse(context, method, admitted.error());
+  return admitted ? nullptr : RefuseStream(context, method, admitted.error());
 }
 
 grpc::ServerReadReactor<v1::UpdateJointStatesRequest>* TactileService::UpdateJointStates(

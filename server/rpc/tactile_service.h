@@ -40,6 +40,7 @@ class TactileService final
 
   /// Ends all streams with `reason` and refuses new ones.
   void EndStreams(const std::string& reason);
+  StreamRegistry& registry() { return registry_; }
   size_t streams() const { return registry_.streams(); }
   void WaitUntilNoStreams(std::chrono::milliseconds patience) const { registry_.WaitUntilEmpty(patience); }
   /// Of streams that begin from now on.

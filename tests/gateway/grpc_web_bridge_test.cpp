@@ -2,7 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "server/gateway/grpc_web.h"
+#include "taclink/v1/recording.pb.h"
 #include "taclink/v1/tactile.pb.h"
 #include "tests/gateway/support.h"
 
@@ -138,6 +141,48 @@ TEST(GrpcWebBridge, FramesStreamUntilTheServerEnds) {
 }
 
 // A browser's abort closes the connection; the server notices though it has nothing to send.
+TEST(GrpcWebBridge, ALogIsPlayedAndSteered) {
+  const std::string folder = ::testing::TempDir() + "bridge." + std::to_string(::getpid());
+  TestGateway gateway({}, std::make_shared<const Security>(), {.folder = folder});
+  Recorder& recorder = gateway.server().recorder();
+  ASSERT_TRUE(recorder.Start({}, "test").ok());
+  for (uint64_t sequence = 1; sequence <= 5; ++sequence) gateway.server().Publish(0, sequence, sequence);
+  const auto recorded = recorder.Stop("test");
+  ASSERT_TRUE(recorded.ok() && recorded->frames() == 5);
+
+  const std::string service = "/taclink.v1.RecordingService/";
+  v1::ReplayRequest request;
+  request.set_log(recorded->log());
+  request.set_paused(true);
+  request.set_without_arm(true);
+  request.set_without_contacts(true);
+  RawHttp browser(gateway.address());
+  browser.Send(Post(service + "Replay", EncodeMessage(WebFormat::kBinary, request.SerializeAsString())));
+  EXPECT_EQ(browser.ReadHead().status, 200);
+  v1::ReplayResponse first;
+  ASSERT_TRUE(first.ParseFromString(WebBody(browser.ReadChunk().value_or("")).messages.at(0)));
+  EXPECT_TRUE(first.status().paused());
+  v1::ControlReplayRequest order;
+  order.set_player(first.status().player());
+  order.set_pause(false);
+  const auto answer =
+      Ask(gateway.address(),
+          Post(service + "ControlReplay", EncodeMessage(WebFormat::kBinary, order.SerializeAsString())));
+  EXPECT_EQ(WebBody(answer.body).trailers, "grpc-status: 0\r\n");
+  std::string rest;
+  while (const auto chunk = browser.ReadChunk()) rest += *chunk;
+  const WebBody body(rest);
+  std::vector<uint64_t> frames;
+  for (const std::string& message : body.messages) {
+    v1::ReplayResponse response;
+    EXPECT_TRUE(response.ParseFromString(message));
+    if (response.has_frame()) frames.push_back(response.frame().sequence());
+  }
+  EXPECT_THAT(frames, ElementsAre(1, 2, 3, 4, 5));
+  EXPECT_EQ(body.trailers, "grpc-status: 0\r\n");
+  std::filesystem::remove_all(folder);
+}
+
 TEST(GrpcWebBridge, AGoneBrowserEndsItsStream) {
   TestGateway gateway;
   for (const bool half : {true, false}) {

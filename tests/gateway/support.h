@@ -15,8 +15,9 @@ namespace taclink::server {
 class TestGateway {
  public:
   explicit TestGateway(GatewayOptions options = {},
-                       std::shared_ptr<const Security> security = std::make_shared<const Security>())
-      : server_(std::make_unique<TestServer>()) {
+                       std::shared_ptr<const Security> security = std::make_shared<const Security>(),
+                       const RecordingConfig& recording = {})
+      : server_(std::make_unique<TestServer>(TestLimits(), nullptr, TestServer::MakePressure(), recording)) {
     options.listen = "127.0.0.1:0";
     GatewayServices services{.channel = server_->server().InProcessChannel(),
                              .security = std::move(security),

@@ -30,7 +30,7 @@ class TestServer {
  public:
   using MakePressure = std::function<std::unique_ptr<PressureSource>(size_t link, Clock& clock)>;
   explicit TestServer(ServiceLimits limits = TestLimits(), std::unique_ptr<ArmPoses> poses = nullptr,
-                      const MakePressure& pressure = {}) {
+                      const MakePressure& pressure = {}, const RecordingConfig& recording = {}) {
     for (size_t link = 0; link < 2; ++link) {
       links_.push_back(MakeLink(link));
       if (pressure) links_.back().pressure = pressure(link, clock_);
@@ -38,13 +38,16 @@ class TestServer {
     arm_ =
         std::make_unique<Arm>("test", std::move(links_), CountingEncoder(), clock_,
                               ArmOptions{.worker = {.poll = std::chrono::milliseconds(5)}}, std::move(poses));
-    auto server = RpcServer::Start("127.0.0.1:0", *arm_, limits);
+    recorder_ = std::make_unique<Recorder>(
+        *arm_, recording, LogPreamble{.files = {}, .metadata = {{"taclink", {{"arm", "test"}}}}});
+    auto server = RpcServer::Start("127.0.0.1:0", *arm_, limits, nullptr, recorder_.get());
     EXPECT_TRUE(server.ok()) << server.error().message;
     server_ = std::move(*server);
   }
 
   Arm& arm() { return *arm_; }
   RpcServer& server() { return *server_; }
+  Recorder& recorder() { return *recorder_; }
   ManualClock& clock() { return clock_; }
   SourceScript& script(size_t link) { return *scripts_[link]; }
   int states_alive() const { return *alive_; }
@@ -115,6 +118,7 @@ class TestServer {
   std::vector<std::shared_ptr<SourceScript>> scripts_;
   std::vector<LinkParts> links_;
   std::unique_ptr<Arm> arm_;
+  std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<RpcServer> server_;
 };
 

@@ -39,6 +39,7 @@ arm:
       folder: pictures
       loop: false
       in_memory: true
+      yuyv: true
       start_after_s: 0.25
       drift: {follow: false}
     - name: wrist
@@ -119,6 +120,7 @@ TEST(Config, ReadsEverything) {
   EXPECT_EQ(files.folder, "/etc/taclink/pictures");
   EXPECT_FALSE(files.loop);
   EXPECT_TRUE(files.in_memory);
+  EXPECT_TRUE(files.yuyv);
   EXPECT_EQ(files.start_after_s, 0.25);
   EXPECT_EQ(config->links[1].model, "barrel");
   EXPECT_EQ(config->links[1].force_model, ForceModel::kNonlinear);

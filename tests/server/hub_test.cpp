@@ -189,6 +189,37 @@ TEST(Hub, RateLimitHoldsInTheLongRun) {
   }
 }
 
+TEST(Hub, PicturesAreKeptOnlyForThoseWhoWantThem) {
+  Hub hub(2, Encode);
+  const auto without = hub.Subscribe({.delivery = Delivery::kEvery}, [] {});
+  EXPECT_FALSE(hub.WantsPictures(0));
+  auto with = hub.Subscribe(
+      {.links = {true, false}, .delivery = Delivery::kEvery, .queue_bytes = 250'000, .pictures = true},
+      [] {});
+  EXPECT_TRUE(hub.WantsPictures(0));
+  EXPECT_FALSE(hub.WantsPictures(1));
+  std::vector<std::weak_ptr<const RawPictures>> published;
+  for (uint64_t i = 1; i <= 3; ++i) {
+    auto pictures = std::make_shared<RawPictures>();
+    (*pictures)[0].bytes.assign(100'000, static_cast<uint8_t>(i));
+    published.push_back(pictures);
+    hub.Publish(0, MakeState(i), pictures);
+  }
+  EXPECT_EQ(with->Counts()[0].dropped_for_bytes, 1u);
+  EXPECT_TRUE(published[0].expired());
+  PicturesPtr pictures;
+  for (const uint64_t i : {2u, 3u}) {
+    EXPECT_EQ(with->Take(nullptr, &pictures)->state().sequence, i);
+    EXPECT_EQ((*pictures)[0].bytes[0], i);
+  }
+  pictures.reset();
+  EXPECT_TRUE(published[2].expired()) << "the other one's queue holds pictures";
+  EXPECT_EQ(TakeAll(*without), (std::vector<uint64_t>{1, 2, 3}));
+  with.reset();
+  hub.Publish(0, MakeState(4));
+  EXPECT_FALSE(hub.WantsPictures(0));
+}
+
 TEST(Hub, NotifiesOnceForEachTimeThatNothingWasThere) {
   Hub hub(1, Encode);
   int notified = 0;

@@ -51,6 +51,18 @@ TEST(JointStates, StraightBetweenPositions) {
   }
 }
 
+TEST(JointStates, ThoseAfterATimeComeInOrder) {
+  auto buffer = MakeBuffer();
+  for (int i = 1; i <= 3; ++i) EXPECT_TRUE(Add(buffer, i * kMs, {1}, {0.1 * i}, {1.0 * i}).ok());
+  const auto after = buffer.After(1, kMs);
+  ASSERT_EQ(after.size(), 2u);
+  EXPECT_EQ(after[0].time_ns, 2 * kMs);
+  EXPECT_EQ(after[1].position, 0.1 * 3);
+  EXPECT_EQ(after[1].velocity, 3.0);
+  EXPECT_TRUE(buffer.After(1, 3 * kMs).empty());
+  EXPECT_TRUE(buffer.After(0, 0).empty());
+}
+
 // A cubic is exact for a joint that moves by one.
 TEST(JointStates, VelocitiesMakeACubic) {
   auto buffer = MakeBuffer();

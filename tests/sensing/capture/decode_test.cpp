@@ -67,6 +67,17 @@ TEST(GrayDecoder, MjpegIsCloseAndTheMemoryIsReused) {
   }
 }
 
+TEST(JpegSize, IsWhatTheHeaderSays) {
+  std::vector<uint8_t> bytes = EncodeJpeg(SlopePicture(kWidth, kHeight));
+  bytes.resize(bytes.size() / 2);  // the header is whole
+  const auto size = JpegSize(bytes);
+  ASSERT_TRUE(size.ok()) << size.error().message;
+  EXPECT_EQ(size->width_px, kWidth);
+  EXPECT_EQ(size->height_px, kHeight);
+  EXPECT_FALSE(JpegSize({}).ok());
+  EXPECT_FALSE(JpegSize(std::vector<uint8_t>(100, 0xff)).ok());
+}
+
 TEST(GrayDecoder, AMatrixThatIsPartOfAnotherIsReplaced) {
   cv::Mat whole(100, 100, CV_8UC1, cv::Scalar(7));
   cv::Mat part = whole(cv::Rect(10, 10, kWidth, kHeight));

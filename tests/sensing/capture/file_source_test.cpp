@@ -74,6 +74,21 @@ TEST_F(FileSourceTest, PicturesInMemoryOutliveTheirFiles) {
   }
 }
 
+TEST_F(FileSourceTest, GrayPicturesComeAsYuyvIfAsked) {
+  WritePairs(1);
+  for (const bool in_memory : {false, true}) {
+    const auto source = MakeFileSource(
+        {.folder = folder_.path(), .paced = false, .in_memory = in_memory, .yuyv = true}, clock_);
+    ASSERT_TRUE(source->Start().ok());
+    ASSERT_TRUE(source->Next(frame_, milliseconds(0)).ok());
+    const RawImage& image = frame_.images[0];
+    EXPECT_EQ(image.format, PixelFormat::kYuyv);
+    ASSERT_EQ(image.bytes.size(), 2u * 32 * 24);
+    EXPECT_EQ(image.bytes[0], 1);
+    EXPECT_EQ(image.bytes[1], 128);
+  }
+}
+
 TEST_F(FileSourceTest, GivesPairsInTheOrderOfTheirNumbers) {
   // As text, 10 comes before 9; digits need not be as many.
   for (const int number : {10, 9, 100}) {

@@ -102,6 +102,37 @@ TEST_F(TareTest, AFreeSkinIsTared) {
   EXPECT_NEAR(TotalForce(), 0.2, 0.04);
 }
 
+// So that the same pictures solved later, by another clock, tell the same.
+TEST_F(TareTest, TheBaselineHasTheTimesOfItsFrames) {
+  Start(TouchScene());
+  const int64_t rest_utc_ns = 1'600'000'000'000'000'000;
+  pipeline_ = std::make_unique<LinkPipeline>(skin_->model, Options(), clock_);
+  for (int k = 0; k < 6; ++k) {
+    skin_->Take(0, sequence_++);
+    skin_->frame.times.exposure_monotonic_ns = 1'000'000 * (k + 1);
+    skin_->frame.times.exposure_utc_ns = rest_utc_ns + k;
+    skin_->frame.pressure_mpa.reset();
+    pipeline_->Process(skin_->frame, state_);
+  }
+  EXPECT_EQ(state_.baseline.taken_utc_ns, rest_utc_ns + 3);
+  EXPECT_DOUBLE_EQ(state_.baseline_age_s, 2e-3);
+}
+
+// Nor does it matter what the state's buffers were used for before.
+TEST_F(TareTest, WhileRestIsTakenAnewTheStateHoldsNothingOld) {
+  Start(TouchScene());
+  for (double t = 1.4; t < kTouchedS; t += kFrameS) Process(t);
+  ASSERT_TRUE(state_.measured());
+  pipeline_->BeginRest(4);
+  Process(0);
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_FALSE(state_.measured());
+  EXPECT_TRUE(state_.contacts.empty());
+  EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kNone);
+  EXPECT_EQ(state_.baseline_age_s, 0);
+  for (const CameraCounts& camera : state_.cameras) EXPECT_EQ(camera.labelled, 0);
+}
+
 TEST_F(TareTest, ATouchedSkinIsRefusedUnlessForced) {
   Start(TouchScene());
   for (double t = 1.4; t < kTouchedS; t += kFrameS) Process(t);

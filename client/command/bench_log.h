@@ -1,0 +1,10 @@
+#pragma once
+
+#include "client/command/commands.h"
+
+namespace taclink::command {
+
+/// `taclink bench log`.
+void AddBenchLog(CLI::App& bench, Selected& selected);
+
+}  // namespace taclink::command

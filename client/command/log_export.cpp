@@ -1,0 +1,58 @@
+#include "client/command/log_export.h"
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "client/command/log_tools.h"
+
+namespace taclink::command {
+namespace {
+
+struct Options {
+  std::string input, folder, format;
+  PartOptions part;
+  bool with_pictures = false;
+};
+
+Result<void> MakeFolder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!error && std::filesystem::is_directory(folder)) return {};
+  return Error{ErrorCode::kUnavailable,
+               folder + ": can't be made a folder: " + (error ? error.message() : "something else is there") +
+                   "; choose another one"};
+}
+
+Result<void> Export(const Options& options) {
+  auto source = LogSource::Open(options.input);
+  if (!source) return source.error();
+  const auto part = ChoosePart(**source, options.part);
+  if (!part) return part.error();
+  if (const auto made = MakeFolder(options.folder); !made) return made;
+  Result<void> done;
+  if (options.format == "csv") done = ExportCsv(**source, *part, options.folder);
+  if (options.format == "jsonl") done = ExportJsonl(**source, *part, options.folder, options.with_pictures);
+  if (options.format == "npz") done = ExportNpz(**source, *part, options.folder);
+  return done ? (*source)->Report() : done;
+}
+
+}  // namespace
+
+void AddLogExport(CLI::App& log, Selected& selected) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = log.add_subcommand("export", "Write a log's content for other programs; SI units");
+  command->add_option("file", options->input, "The log, MCAP")->required();
+  command->add_option("-o,--output", options->folder, "Folder for the new files")->required();
+  command
+      ->add_option("--format", options->format,
+                   "csv: tables of contacts, frames, events and joints; jsonl: every message; npz: arrays of "
+                   "each link")
+      ->required()
+      ->check(CLI::IsMember({"csv", "jsonl", "npz"}));
+  AddPartOptions(*command, options->part);
+  command->add_flag("--with-pictures", options->with_pictures, "jsonl: also the pictures' bytes, in base64");
+  command->callback([options, &selected] { selected = [options] { return Export(*options); }; });
+}
+
+}  // namespace taclink::command

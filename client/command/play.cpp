@@ -1,0 +1,167 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "client/command/commands.h"
+#include "client/command/connect.h"
+#include "client/command/contacts_view.h"
+#include "client/command/event_text.h"
+#include "client/command/frame_output.h"
+#include "client/command/json.h"
+#include "client/taclink/recordings.h"
+#include "client/taclink/replay.h"
+
+namespace taclink::command {
+namespace {
+
+constexpr std::chrono::milliseconds kPoll{100};  // how soon Ctrl-C is noticed
+constexpr double kSlowest = 0.1, kFastest = 100;
+
+struct Options {
+  std::string server = "127.0.0.1:50051";
+  client::ReplayOptions replay;
+  std::string detail = "contacts";
+  double from_s = 0, to_s = 0;
+  bool events = false, contacts = false, json = false;
+};
+
+std::atomic<bool> interrupted = false;
+
+int64_t Ns(double seconds) {
+  return static_cast<int64_t>(seconds * 1e9);
+}
+
+/// Seconds of the log become times.
+Result<client::ReplayOptions> ToReplay(const Options& options, client::Recordings& recordings) {
+  client::ReplayOptions replay = options.replay;
+  replay.detail = options.detail == "full"       ? client::Detail::kFull
+                  : options.detail == "geometry" ? client::Detail::kGeometry
+                                                 : client::Detail::kContacts;
+  replay.events = options.events;
+  replay.contacts = options.contacts;
+  replay.arm = false;
+  if (options.from_s == 0 && options.to_s == 0) return replay;
+  const auto logs = recordings.List();
+  if (!logs) return logs.error();
+  for (const client::Log& log : *logs) {
+    if (log.name != replay.log) continue;
+    if (log.start_utc_ns == 0)
+      return Error{ErrorCode::kFailedPrecondition,
+                   replay.log + " is being written, so its times are not known yet"};
+    replay.from_utc_ns = log.start_utc_ns + Ns(options.from_s);
+    if (options.to_s > 0) replay.to_utc_ns = log.start_utc_ns + Ns(options.to_s);
+    return replay;
+  }
+  return replay;  // the server says that there is no such log
+}
+
+/// Prints what is played; tells at the end what was not as it should be.
+class Output {
+ public:
+  explicit Output(const Options& options)
+      : json_(options.json),
+        frames_("taclink record play " + options.replay.log + "   (Ctrl-C ends)", options.json) {}
+
+  void operator()(const client::Frame& frame) { frames_.Take(frame); }
+  void operator()(const client::Event& event) {
+    if (!frames_.drawn_over()) Line(json_ ? EventJson(event, "") : EventText(event));
+  }
+  void operator()(const client::ArmContacts& contacts) {
+    if (!frames_.drawn_over()) Line(json_ ? ContactsJson(contacts) : ContactsTable(contacts));
+  }
+  void operator()(const client::ReplayLoss& loss) {
+    if (!json_ && frames_.drawn_over()) return;
+    Line(json_ ? Json({{"lost", {{"link", loss.link}, {"frames", loss.count}}}}).dump()
+               : fmt::format("-- {}: {} frames are not in the log --", loss.link, loss.count));
+  }
+  void operator()(const client::Arm&) {}
+  void operator()(const client::ReplayStatus& status) {
+    damaged_ = status.damaged;
+    lateness_s_ = std::max(lateness_s_, status.lateness_s);
+  }
+
+  void Refresh() { frames_.Refresh(); }
+  void Finish() const {
+    if (damaged_ > 0)
+      fmt::print(stderr,
+                 "taclink: note: {} places of the log could not be read; 'taclink log check' says more\n",
+                 damaged_);
+    if (lateness_s_ > 0.1) fmt::print(stderr, "taclink: note: up to {:.1f} s late\n", lateness_s_);
+  }
+
+ private:
+  static void Line(const std::string& text) {
+    fmt::print("{}\n", text);
+    std::fflush(stdout);
+  }
+
+  const bool json_;
+  FrameOutput frames_;
+  uint64_t damaged_ = 0;
+  double lateness_s_ = 0;
+};
+
+Result<void> Run(const Options& options) {
+  auto connection = ConnectTo(options.server);
+  if (!connection) return connection.error();
+  auto recordings = connection->RecordingCalls();
+  const auto replay = ToReplay(options, recordings);
+  if (!replay) return replay.error();
+  auto reader = recordings.Replay(*replay);
+  if (!reader) return reader.error();
+  std::signal(SIGINT, [](int) { interrupted = true; });
+  std::signal(SIGTERM, [](int) { interrupted = true; });
+  Output output(options);
+  while (!interrupted) {
+    const auto message = (*reader)->Next(kPoll);
+    if (message) {
+      std::visit(output, message->content);
+    } else if (message.error().code == ErrorCode::kEndOfData) {
+      break;
+    } else if (message.error().code != ErrorCode::kTimeout) {
+      return message.error();
+    }
+    if (std::ferror(stdout) != 0) break;  // main reports it
+    output.Refresh();
+  }
+  output.Finish();
+  return {};
+}
+
+}  // namespace
+
+void AddPlay(CLI::App& record, Selected& selected) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = record.add_subcommand("play", "Show a log of the server at its pace, as 'watch' does");
+  AddServerOption(*command, options->server);
+  command->add_option("log", options->replay.log, "Name of the log, as 'list' shows it")->required();
+  command->add_option("--link", options->replay.links, "Names of links (default: all)");
+  command->add_option("--detail", options->detail, "contacts, geometry or full")
+      ->check(CLI::IsMember({"contacts", "geometry", "full"}))
+      ->capture_default_str();
+  const auto check = [](const std::string& text) {
+    const std::string outside = Within(kSlowest, kFastest)(text);
+    return text == "0" ? std::string() : outside;
+  };
+  command
+      ->add_option("--speed", options->replay.speed, "0.1 to 100 times as it happened; 0: as fast as it can")
+      ->check(check)
+      ->capture_default_str();
+  command->add_option("--from", options->from_s, "Begin so many seconds after the log's first message")
+      ->check(Within(0, 1e9));
+  command->add_option("--to", options->to_s, "End there; 0: at its last one")->check(Within(0, 1e9));
+  command->add_flag("--loop", options->replay.loop, "Begin anew at the end");
+  command->add_flag("--events", options->events, "Also events, as 'events' prints them");
+  command->add_flag("--contacts", options->contacts, "Also the arm's contacts, as 'contacts' prints them");
+  command->add_flag("--json", options->json, "One JSON object a line");
+  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+}
+
+}  // namespace taclink::command

@@ -1,0 +1,234 @@
+#include <fmt/format.h>
+
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/command/commands.h"
+#include "client/command/connect.h"
+#include "client/command/json.h"
+#include "client/command/log_text.h"
+#include "client/taclink/recordings.h"
+
+namespace taclink::command {
+namespace {
+
+using client::LogCompression;
+using client::RecorderStatus;
+using client::Recordings;
+
+struct Options {
+  std::string server = "127.0.0.1:50051";
+  client::RecordingOptions recording;
+  std::string compression = "configured";
+  std::string log, output;
+  double duration_s = 0;
+  bool json = false;
+};
+
+volatile std::sig_atomic_t interrupted = 0;
+
+Result<Recordings> Connect(const Options& options) {
+  auto connection = ConnectTo(options.server);
+  if (!connection) return connection.error();
+  return connection->RecordingCalls();
+}
+
+Json ToJson(const RecorderStatus& status) {
+  return {{"state", client::Name(status.state)},
+          {"trouble", status.trouble},
+          {"log", status.log},
+          {"folder", status.folder},
+          {"started_utc_ns", status.started_utc_ns},
+          {"synced_utc_ns", status.synced_utc_ns},
+          {"bytes", status.bytes},
+          {"logs", status.logs},
+          {"frames", status.frames},
+          {"events", status.events},
+          {"frames_lost", status.frames_lost},
+          {"free_bytes", status.free_bytes},
+          {"pictures", status.pictures}};
+}
+
+void Print(const RecorderStatus& status, bool json) {
+  if (json) {
+    fmt::print("{}\n", ToJson(status).dump());
+    return;
+  }
+  fmt::print("{}{}{}\n", client::Name(status.state), status.log.empty() ? "" : ": ", status.log);
+  if (!status.trouble.empty()) fmt::print("  {}\n", status.trouble);
+  if (status.started_utc_ns != 0) {
+    fmt::print("  {} frames, {} lost, {} events, {} in {} logs\n", status.frames, status.frames_lost,
+               status.events, SizeText(status.bytes), status.logs);
+  }
+  if (status.folder.empty()) {
+    fmt::print("  no folder is configured (recording.folder): nothing can be recorded\n");
+  } else {
+    fmt::print("  folder {} on the server, {} free\n", status.folder, SizeText(status.free_bytes));
+  }
+}
+
+Result<void> PrintStatus(const Result<RecorderStatus>& status, const Options& options) {
+  if (!status) return status.error();
+  Print(*status, options.json);
+  return {};
+}
+
+void WaitFor(double duration_s) {
+  interrupted = 0;
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(duration_s);
+  while (interrupted == 0 && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+}
+
+Result<void> Start(const Options& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  client::RecordingOptions recording = options.recording;
+  if (options.compression == "none") recording.compression = LogCompression::kNone;
+  if (options.compression == "zstd") recording.compression = LogCompression::kZstd;
+  if (options.compression == "lz4") recording.compression = LogCompression::kLz4;
+  const auto started = recordings->Start(recording);
+  if (!started || options.duration_s <= 0) return PrintStatus(started, options);
+  WaitFor(options.duration_s);
+  return PrintStatus(recordings->Stop(), options);
+}
+
+Result<void> Stop(const Options& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  return PrintStatus(recordings->Stop(), options);
+}
+
+Result<void> Status(const Options& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  return PrintStatus(recordings->Status(), options);
+}
+
+Json ToJson(const client::Log& log) {
+  return {{"name", log.name},
+          {"bytes", log.bytes},
+          {"start_utc_ns", log.start_utc_ns},
+          {"end_utc_ns", log.end_utc_ns},
+          {"links", log.links},
+          {"frames", log.frames},
+          {"contacts", log.contacts ? Json(*log.contacts) : Json()},
+          {"pictures", log.pictures},
+          {"open", log.open},
+          {"problem", log.problem},
+          {"note", log.note}};
+}
+
+void PrintRow(const client::Log& log) {
+  fmt::print("{:<44} {:>9}", log.name, SizeText(log.bytes));
+  if (log.open) {
+    fmt::print("  being written");
+  } else if (log.start_utc_ns != 0) {
+    fmt::print("  {}  {:>8.1f} s  {} links, {} frames", UtcText(static_cast<uint64_t>(log.start_utc_ns)),
+               static_cast<double>(log.end_utc_ns - log.start_utc_ns) * 1e-9, log.links.size(), log.frames);
+    if (log.contacts) fmt::print(", {} contacts", *log.contacts);
+    if (log.pictures) fmt::print(", pictures");
+  }
+  fmt::print("{}{}\n", log.note.empty() ? "" : "  ", log.note);
+  if (!log.problem.empty()) fmt::print("  {}\n", log.problem);
+}
+
+Result<void> List(const Options& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  const auto logs = recordings->List();
+  if (!logs) return logs.error();
+  if (!options.json && logs->empty()) fmt::print("no logs\n");
+  for (const client::Log& log : *logs) {
+    if (options.json) {
+      fmt::print("{}\n", ToJson(log).dump());
+    } else {
+      PrintRow(log);
+    }
+  }
+  return {};
+}
+
+// What is there already stays, and the rest is fetched.
+Result<void> Download(const Options& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  std::string path = options.output.empty() ? options.log : options.output;
+  if (std::filesystem::is_directory(path)) path += "/" + options.log;
+  std::error_code none;
+  const uint64_t there = std::filesystem::exists(path) ? std::filesystem::file_size(path, none) : 0;
+  std::ofstream out(path, std::ios::binary | std::ios::app);
+  if (!out) return Error{ErrorCode::kPermissionDenied, path + " cannot be written"};
+  bool written = true;
+  uint64_t end = there;
+  const auto done =
+      recordings->Download(options.log, there, [&](std::string_view data, uint64_t offset, uint64_t) {
+        written = offset == end && out.write(data.data(), static_cast<std::streamsize>(data.size())).good();
+        end += data.size();
+        return written;
+      });
+  out.close();
+  if (!written || !out)
+    return Error{ErrorCode::kResourceExhausted, path + " cannot be written; is the disk full?"};
+  if (!done && done.error().code == ErrorCode::kUnavailable)
+    return Error{ErrorCode::kUnavailable, done.error().message + "; the same command again fetches the rest"};
+  if (!done) return done.error();
+  fmt::print("{}: {}{}\n", path, SizeText(end),
+             there > 0 ? ", of which " + SizeText(there) + " were there" : "");
+  return {};
+}
+
+Result<void> Delete(const Options& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  return recordings->Delete(options.log);
+}
+
+CLI::App* AddOne(CLI::App& record, const char* name, const char* what,
+                 const std::shared_ptr<Options>& options, Selected& selected,
+                 Result<void> (*run)(const Options&)) {
+  CLI::App* command = record.add_subcommand(name, what);
+  AddServerOption(*command, options->server);
+  command->callback([options, run, &selected] { selected = [options, run] { return run(*options); }; });
+  return command;
+}
+
+}  // namespace
+
+void AddRecord(CLI::App& app, Selected& selected) {
+  CLI::App* record = app.add_subcommand("record", "Record what a server's links feel, on the server");
+  record->require_subcommand(1);
+  auto options = std::make_shared<Options>();
+  CLI::App* start = AddOne(*record, "start", "Begin a recording", options, selected, Start);
+  start->add_option("--name", options->recording.name, "Part of the logs' names (default: the arm's name)");
+  start->add_option("--link", options->recording.links, "Names of links (default: all)");
+  start->add_flag("--pictures", options->recording.pictures, "Also the cameras' pictures, as they sent them");
+  start->add_option("--compression", options->compression)
+      ->check(CLI::IsMember({"configured", "none", "zstd", "lz4"}));
+  start->add_option("--note", options->recording.note, "Text kept in the logs");
+  start
+      ->add_option("--duration", options->duration_s,
+                   "Stop after so many seconds, or with ^C; 0: later, by 'stop'")
+      ->check(Within(0, 1e9));
+  CLI::App* stop = AddOne(*record, "stop", "End it", options, selected, Stop);
+  CLI::App* status = AddOne(*record, "status", "How the server's recorder does", options, selected, Status);
+  CLI::App* list = AddOne(*record, "list", "The server's logs", options, selected, List);
+  for (CLI::App* command : {start, stop, status, list}) command->add_flag("--json", options->json, "JSON");
+  CLI::App* fetch = AddOne(*record, "fetch", "Copy a log from the server; goes on where it broke off",
+                           options, selected, Download);
+  fetch->add_option("-o,--output", options->output, "File or folder (default: its name, here)");
+  CLI::App* remove = AddOne(*record, "delete", "Delete a log on the server", options, selected, Delete);
+  for (CLI::App* command : {fetch, remove})
+    command->add_option("log", options->log, "Name of the log, as 'list' shows it")->required();
+  AddPlay(*record, selected);
+}
+
+}  // namespace taclink::command

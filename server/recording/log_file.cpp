@@ -1,0 +1,35 @@
+#include "server/recording/log_file.h"
+
+#include <utility>
+
+namespace taclink::server {
+
+Result<std::unique_ptr<LogFile>> LogFile::Create(const LogFolder& folder, const std::string& name,
+                                                 const LogPreamble& preamble, mcap::WriterOptions options,
+                                                 int64_t utc_ns) {
+  auto sink = mcap::FileSink::Create(folder.PartPath(name));
+  if (!sink) return sink.error();
+  std::unique_ptr<LogFile> file(new LogFile(folder, name, std::move(*sink), utc_ns));
+  auto writer = wire::log::LogWriter::Create(*file->sink_, std::move(options));
+  if (!writer) return writer.error();
+  file->writer_ = std::move(*writer);
+  for (const auto& [record, content] : preamble.metadata) {
+    if (const auto added = file->writer_->AddMetadata(record, content); !added) return added.error();
+  }
+  for (const LogPreamble::File& one : preamble.files) {
+    const auto added = file->writer_->AddAttachment(one.name, one.media_type, one.text, utc_ns);
+    if (!added) return added.error();
+  }
+  return file;
+}
+
+Result<void> LogFile::Close(mcap::TextMap totals) {
+  if (const auto flushed = writer_->mcap().Flush(); !flushed) return flushed.error();
+  if (const auto added = writer_->AddMetadata(wire::log::kTotalsName, std::move(totals)); !added)
+    return added.error();
+  if (const auto closed = writer_->mcap().Close(); !closed) return closed.error();
+  if (const auto synced = sink_->Sync(); !synced) return synced.error();
+  return folder_.Finish(name_);
+}
+
+}  // namespace taclink::server

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/recording/log_folder.h"
+#include "wire/log/log_writer.h"
+#include "wire/mcap/file_sink.h"
+
+namespace taclink::server {
+
+/// What every log of a recording begins with.
+struct LogPreamble {
+  struct File {
+    std::string name, media_type, text;
+  };
+  std::vector<File> files;                        ///< attachments
+  std::map<std::string, mcap::TextMap> metadata;  ///< by the record's name
+};
+
+/// A log that is being written, under its name with ".part".
+class LogFile {
+ public:
+  /// Errors: as mcap::FileSink::Create and Append.
+  static Result<std::unique_ptr<LogFile>> Create(const LogFolder& folder, const std::string& name,
+                                                 const LogPreamble& preamble, mcap::WriterOptions options,
+                                                 int64_t utc_ns);
+
+  wire::log::LogWriter& writer() { return *writer_; }
+  const std::string& name() const { return name_; }
+  int64_t started_utc_ns() const { return started_utc_ns_; }
+  uint64_t bytes() const { return sink_->position(); }
+  /// Chunks that the file has taken: what was written before the newest one ended is in it.
+  uint64_t chunks() const { return writer_->mcap().statistics().chunk_count; }
+
+  /// All that was written is safe from a power cut. Errors: the system's; then the open chunk is lost.
+  Result<void> Sync() { return writer_->mcap().Sync(); }
+  /// Ends the log and gives it its final name. Errors: the system's; then it stays ".part".
+  Result<void> Close(mcap::TextMap totals);
+
+ private:
+  LogFile(LogFolder folder, std::string name, std::unique_ptr<mcap::FileSink> sink, int64_t utc_ns)
+      : folder_(std::move(folder)), name_(std::move(name)), sink_(std::move(sink)), started_utc_ns_(utc_ns) {}
+
+  const LogFolder folder_;
+  const std::string name_;
+  const std::unique_ptr<mcap::FileSink> sink_;
+  const int64_t started_utc_ns_;
+  std::unique_ptr<wire::log::LogWriter> writer_;
+};
+
+}  // namespace taclink::server

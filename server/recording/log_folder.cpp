@@ -1,0 +1,187 @@
+#include "server/recording/log_folder.h"
+
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+
+#include "wire/mcap/file_sink.h"
+#include "wire/mcap/recover.h"
+
+namespace taclink::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kSuffix = ".mcap", kPart = ".part", kRecovering = ".recovering";
+
+Error FromSystem(const std::string& what, const std::error_code& error) {
+  const bool denied = error == std::errc::permission_denied || error == std::errc::read_only_file_system;
+  return {denied ? ErrorCode::kPermissionDenied : ErrorCode::kUnavailable, what + ": " + error.message()};
+}
+
+Result<void> SyncFolder(const std::string& path) {
+  const int folder = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool synced = folder >= 0 && ::fsync(folder) == 0;
+  const std::error_code error(errno, std::generic_category());
+  if (folder >= 0) ::close(folder);
+  if (!synced) return FromSystem(path, error);
+  return {};
+}
+
+}  // namespace
+
+std::string LogName(const std::string& prefix, int64_t utc_ns, int part) {
+  const std::chrono::sys_seconds time{std::chrono::seconds(utc_ns / 1'000'000'000)};
+  return fmt::format("{}-{:%Y%m%dT%H%M%SZ}-{:03}{}", prefix, time, part, kSuffix);
+}
+
+bool IsLogName(const std::string& name) {
+  const auto good = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_' || c == '.';
+  };
+  return name.size() > kSuffix.size() && name.size() <= 200 && name.ends_with(kSuffix) &&
+         !name.starts_with('.') && std::all_of(name.begin(), name.end(), good);
+}
+
+Result<void> LogFolder::Prepare() const {
+  std::error_code error;
+  fs::create_directories(path_, error);
+  if (error) return FromSystem("recording.folder " + path_, error);
+  const std::string probe = path_ + "/.taclink-" + std::to_string(::getpid());
+  const int file = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  if (file < 0) return FromSystem("recording.folder " + path_, {errno, std::generic_category()});
+  ::close(file);
+  fs::remove(probe, error);
+  return {};
+}
+
+bool LogFolder::Exists() const {
+  std::error_code error;
+  return fs::is_directory(path_, error);
+}
+
+std::vector<LogFileEntry> LogFolder::List() const {
+  std::vector<LogFileEntry> logs;
+  std::error_code error;
+  for (fs::directory_iterator at(path_, error), end; !error && at != end; at.increment(error)) {
+    LogFileEntry log{.name = at->path().filename().string()};
+    log.open = log.name.ends_with(kPart);
+    if (log.open) log.name.resize(log.name.size() - kPart.size());
+    std::error_code gone;
+    log.bytes = at->file_size(gone);
+    if (!gone && IsLogName(log.name)) logs.push_back(std::move(log));
+  }
+  // A log that is closed at this very moment may show twice, or an open one beside its recovered twin.
+  std::sort(logs.begin(), logs.end(), [](const auto& a, const auto& b) {
+    return a.name != b.name ? a.name < b.name : a.open < b.open;
+  });
+  logs.erase(
+      std::unique(logs.begin(), logs.end(), [](const auto& a, const auto& b) { return a.name == b.name; }),
+      logs.end());
+  return logs;
+}
+
+Result<LogFileEntry> LogFolder::Find(const std::string& name) const {
+  if (!IsLogName(name))
+    return Error{ErrorCode::kInvalidArgument,
+                 "'" + name + "' is no name of a log; see 'taclink record list'"};
+  for (const bool open : {false, true}) {
+    LogFileEntry log{.name = name, .open = open};
+    std::error_code gone;
+    log.bytes = fs::file_size(PathOf(log), gone);
+    if (!gone) return log;
+  }
+  return Error{ErrorCode::kNotFound, "there is no log '" + name + "'; see 'taclink record list'"};
+}
+
+std::string LogFolder::PathOf(const LogFileEntry& log) const {
+  return log.open ? PartPath(log.name) : FinalPath(log.name);
+}
+
+Result<void> LogFolder::Finish(const std::string& name) const {
+  std::error_code error;
+  fs::rename(PartPath(name), FinalPath(name), error);
+  if (error) return FromSystem(PartPath(name), error);
+  return SyncFolder(path_);
+}
+
+Result<void> LogFolder::Delete(const std::string& name) const {
+  const auto log = Find(name);
+  if (!log) return log.error();
+  if (log->open)
+    return Error{ErrorCode::kFailedPrecondition, name + " is being written; stop the recording first"};
+  std::error_code error;
+  fs::remove(PathOf(*log), error);
+  if (error) return FromSystem(name, error);
+  return {};
+}
+
+std::vector<std::string> LogFolder::EnforceQuota(uint64_t quota_bytes) const {
+  const auto logs = List();
+  uint64_t bytes = 0;
+  for (const LogFileEntry& log : logs) bytes += log.bytes;
+  std::vector<std::string> deleted;
+  for (const LogFileEntry& log : logs) {
+    if (bytes <= quota_bytes) break;
+    if (log.open || !Delete(log.name)) continue;
+    bytes -= log.bytes;
+    deleted.push_back(log.name);
+  }
+  return deleted;
+}
+
+uint64_t LogFolder::FreeBytes() const {
+  // A folder that is made only when it is needed will be where the one above it is.
+  std::error_code error;
+  for (fs::path folder = path_; !folder.empty(); folder = folder.parent_path()) {
+    const auto space = fs::space(folder, error);
+    if (!error) return space.available;
+    if (folder == folder.parent_path()) break;
+  }
+  return 0;
+}
+
+std::vector<LogFileEntry> LogFolder::Unfinished() const {
+  std::vector<LogFileEntry> logs = List();
+  std::erase_if(logs, [](const LogFileEntry& log) { return !log.open; });
+  return logs;
+}
+
+std::string LogFolder::Recover(const std::string& name) const {
+  const std::string part = PartPath(name), fresh = FinalPath(name) + std::string(kRecovering);
+  std::error_code ignored;
+  fs::remove(fresh, ignored);  // of a recovery that was cut off
+  const auto failed = [&](const Error& error) {
+    fs::remove(fresh, ignored);
+    return name + " was not closed and could not be made whole: " + error.message + "; it stays as " + part;
+  };
+  const auto source = mcap::FileSource::Open(part);
+  if (!source) return failed(source.error());
+  auto sink = mcap::FileSink::Create(fresh);
+  if (!sink) return failed(sink.error());
+  mcap::RecoverOptions options;
+  options.writer.compression = mcap::Compression::kLz4;
+  const auto report = mcap::Recover(**source, **sink, options);
+  if (!report) return failed(report.error());
+  const mcap::Statistics& kept = report->written;
+  const bool nothing = kept.message_count + kept.attachment_count + kept.metadata_count == 0;
+  if (nothing && (*source)->size() > 0)
+    return failed({ErrorCode::kInvalidArgument, "nothing in it is intact"});
+  if (const auto synced = (*sink)->Sync(); !synced) return failed(synced.error());
+  std::error_code error;
+  fs::rename(fresh, FinalPath(name), error);
+  if (error) return failed(FromSystem(fresh, error));
+  if (const auto synced = SyncFolder(path_); !synced) return failed(synced.error());
+  fs::remove(part, ignored);
+  return name + " was not closed; made whole: " + report->scan.Text();
+}
+
+}  // namespace taclink::server

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sensing/core/result.h"
+
+namespace taclink::server {
+
+/// A log in the folder. While it is written its file has ".part" behind its name.
+struct LogFileEntry {
+  std::string name;
+  uint64_t bytes = 0;
+  bool open = false;
+};
+
+/// The folder that the server's logs are in. Holds no state: any thread, any number of objects.
+class LogFolder {
+ public:
+  explicit LogFolder(std::string path) : path_(std::move(path)) {}
+
+  /// Makes the folder if it is missing and tries to write. Errors: kPermissionDenied, kUnavailable.
+  Result<void> Prepare() const;
+  bool Exists() const;
+  const std::string& path() const { return path_; }
+
+  /// Oldest first, as the names tell it.
+  std::vector<LogFileEntry> List() const;
+  /// Errors: kNotFound, kInvalidArgument (no name of a log).
+  Result<LogFileEntry> Find(const std::string& name) const;
+  /// Of the file, with ".part" while the log is open.
+  std::string PathOf(const LogFileEntry& log) const;
+  std::string FinalPath(const std::string& name) const { return path_ + "/" + name; }
+  std::string PartPath(const std::string& name) const { return FinalPath(name) + ".part"; }
+  /// From ".part" to the final name, safe from a power cut. Errors: the system's.
+  Result<void> Finish(const std::string& name) const;
+  /// Errors: kNotFound, kFailedPrecondition (open), or the system's.
+  Result<void> Delete(const std::string& name) const;
+  /// Deletes the oldest that are not open until all together are below `quota_bytes`. Returns their names.
+  std::vector<std::string> EnforceQuota(uint64_t quota_bytes) const;
+  /// Free space for this user; 0: not known.
+  uint64_t FreeBytes() const;
+
+  /// Logs that are open: before a recording begins, those that an earlier run left so.
+  std::vector<LogFileEntry> Unfinished() const;
+  /// Makes such a log whole: what is intact goes to a log under its final name. Returns what came of it, for
+  /// people.
+  std::string Recover(const std::string& name) const;
+
+ private:
+  const std::string path_;
+};
+
+/// "PREFIX-20261122T120137Z-001.mcap".
+std::string LogName(const std::string& prefix, int64_t utc_ns, int part);
+/// Letters, digits, '-', '_' and '.', ending with ".mcap", not beginning with '.'.
+bool IsLogName(const std::string& name);
+
+}  // namespace taclink::server

@@ -1,0 +1,179 @@
+#include "server/recording/recorder.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "server/link_names.h"
+#include "server/thread_setup.h"
+
+namespace taclink::server {
+namespace {
+
+constexpr size_t kLongestName = 64, kLongestNote = 4096;
+
+bool IsNamePart(const std::string& name) {
+  const auto good = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+  };
+  return !name.empty() && name.size() <= kLongestName && std::all_of(name.begin(), name.end(), good);
+}
+
+// The arm's name with what a log's name can't have replaced.
+std::string NameOf(const Arm& arm) {
+  std::string name = arm.name().substr(0, kLongestName);
+  for (char& c : name) {
+    if (!IsNamePart(std::string(1, c))) c = '_';
+  }
+  return name.empty() ? "arm" : name;
+}
+
+std::optional<mcap::Compression> FromWire(v1::LogCompression compression) {
+  switch (compression) {
+    case v1::LOG_COMPRESSION_NONE:
+      return mcap::Compression::kNone;
+    case v1::LOG_COMPRESSION_ZSTD:
+      return mcap::Compression::kZstd;
+    case v1::LOG_COMPRESSION_LZ4:
+      return mcap::Compression::kLz4;
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace
+
+Recorder::Recorder(Arm& arm, const RecordingConfig& config, LogPreamble preamble)
+    : arm_(arm), config_(config), preamble_(std::move(preamble)), folder_(config.folder), catalog_(folder_) {}
+
+Recorder::~Recorder() {
+  Close();
+}
+
+void Recorder::Close() {
+  const std::lock_guard order(order_mutex_);
+  std::shared_ptr<Recording> recording;
+  {
+    const std::lock_guard lock(mutex_);
+    recording = std::exchange(recording_, nullptr);
+  }
+  if (recording) recording->Stop();
+}
+
+Result<void> Recorder::CheckFolder() const {
+  if (folder_.path().empty())
+    return Error{ErrorCode::kFailedPrecondition,
+                 "the server has no folder for logs: set recording.folder in its configuration"};
+  return folder_.Prepare();
+}
+
+void Recorder::Open() {
+  if (!config_.at_start && !folder_.Exists()) return;
+  if (const auto good = folder_.Prepare(); !good) {
+    spdlog::error("recording: {}; nothing can be recorded until that is mended", good.error().message);
+    return;
+  }
+  const std::vector<LogFileEntry> unfinished = folder_.Unfinished();
+  if (!unfinished.empty()) {
+    mender_ = std::jthread([unfinished, folder = folder_](const std::stop_token& stop) {
+      SetUpThread("log-mender", {});
+      for (const LogFileEntry& log : unfinished) {
+        if (stop.stop_requested()) return;
+        spdlog::warn("recording: {}", folder.Recover(log.name));
+      }
+    });
+  }
+  if (!config_.at_start) return;
+  v1::StartRecordingRequest request;
+  request.set_pictures(config_.pictures);
+  const auto started = Start(request, "recording.at_start");
+  if (!started) spdlog::error("recording: did not begin: {}", started.error().message);
+}
+
+Result<RecordingOrder> Recorder::ToOrder(const v1::StartRecordingRequest& request) const {
+  RecordingOrder order{.name = request.name().empty() ? NameOf(arm_) : request.name(),
+                       .pictures = request.pictures(),
+                       .note = request.note()};
+  if (!IsNamePart(order.name))
+    return Error{ErrorCode::kInvalidArgument,
+                 "name must be up to 64 letters, digits, '-' and '_', not '" + request.name() + "'"};
+  if (order.note.size() > kLongestNote)
+    return Error{ErrorCode::kInvalidArgument, "note must be shorter than 4096 bytes"};
+  const auto links = FindLinks(arm_.link_names(), request.links());
+  if (!links) return links.error();
+  order.links = *links;
+  order.compression = FromWire(request.compression())
+                          .value_or(order.pictures ? config_.picture_compression : config_.compression);
+  return order;
+}
+
+Result<v1::RecorderStatus> Recorder::Start(const v1::StartRecordingRequest& request, const std::string& who) {
+  const std::lock_guard one(order_mutex_);
+  const auto order = ToOrder(request);
+  if (!order) return order.error();
+  if (const auto good = CheckFolder(); !good) return good.error();
+  {
+    const std::lock_guard lock(mutex_);
+    if (recording_)
+      return Error{ErrorCode::kFailedPrecondition,
+                   recording_->Status().log() + " is being recorded; stop that first"};
+  }
+  LogPreamble preamble = preamble_;
+  mcap::TextMap& metadata = preamble.metadata[wire::log::kMetadataName];
+  metadata["started_by"] = who;
+  metadata["pictures"] = order->pictures ? "true" : "false";
+  if (!order->note.empty()) metadata["note"] = order->note;
+  auto started = Recording::Start(arm_, config_, *order, std::move(preamble));
+  if (!started) return started.error();
+  {
+    const std::lock_guard lock(mutex_);
+    recording_ = std::move(*started);
+  }
+  const v1::RecorderStatus status = Status();
+  spdlog::info("{}: recording {} begins", who, status.log());
+  arm_.events().Post(EventKind::kRecording, std::nullopt,
+                     {.who = who, .outcome = status.log() + " begins", .values = {}});
+  return status;
+}
+
+Result<v1::RecorderStatus> Recorder::Stop(const std::string& who) {
+  const std::lock_guard one(order_mutex_);
+  std::shared_ptr<Recording> recording;
+  {
+    const std::lock_guard lock(mutex_);
+    recording = recording_;
+  }
+  if (!recording) return Error{ErrorCode::kFailedPrecondition, "nothing is being recorded"};
+  recording->Stop();
+  {
+    const std::lock_guard lock(mutex_);
+    last_ = recording->Status();
+    recording_.reset();
+  }
+  const v1::RecorderStatus status = Status();
+  spdlog::info("{}: recording {} ends: {} frames, {} lost", who, status.log(), status.frames(),
+               status.frames_lost());
+  arm_.events().Post(EventKind::kRecording, std::nullopt,
+                     {.who = who,
+                      .outcome = status.log() + " ends",
+                      .values = {{"frames", static_cast<double>(status.frames())},
+                                 {"frames_lost", static_cast<double>(status.frames_lost())}}});
+  return status;
+}
+
+v1::RecorderStatus Recorder::Status() const {
+  v1::RecorderStatus status;
+  {
+    const std::lock_guard lock(mutex_);
+    status = recording_ ? recording_->Status() : last_;
+    if (!recording_ && status.state() != v1::RECORDER_STATE_TROUBLE)
+      status.set_state(v1::RECORDER_STATE_IDLE);
+  }
+  status.set_folder(folder_.path());
+  status.set_quota_bytes(static_cast<uint64_t>(config_.quota_mb * 1e6));
+  if (!folder_.path().empty()) status.set_free_bytes(folder_.FreeBytes());
+  return status;
+}
+
+}  // namespace taclink::server

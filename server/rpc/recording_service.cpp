@@ -1,0 +1,177 @@
+#include "server/rpc/recording_service.h"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/post.hpp>
+#include <string>
+#include <utility>
+
+#include "server/rpc/download_stream.h"
+#include "server/rpc/refused_stream.h"
+#include "server/rpc/replay_stream.h"
+#include "server/rpc/status.h"
+#include "server/rpc/who.h"
+
+namespace taclink::server {
+namespace {
+
+constexpr size_t kPlayerThreads = 2;  // a large chunk that one player reads does not make all others late
+
+// Damage is no fault of the caller's.
+OpenedLog OpenLog(Recorder& recorder, const std::string& name) {
+  if (const auto found = recorder.folder().Find(name); !found)
+    return {.reader = nullptr, .status = ToGrpc(found.error())};
+  auto reader = recorder.catalog().Open(name);
+  if (reader) return {.reader = std::move(*reader), .status = grpc::Status::OK};
+  const Error& error = reader.error();
+  const bool damaged = error.code == ErrorCode::kInvalidArgument;
+  return {.reader = nullptr,
+          .status = damaged ? grpc::Status(grpc::StatusCode::DATA_LOSS, error.message) : ToGrpc(error)};
+}
+
+}  // namespace
+
+RecordingService::RecordingService(Recorder& recorder, StreamRegistry& registry,
+                                   std::shared_ptr<boost::asio::thread_pool> senders,
+                                   std::shared_ptr<const Security> security)
+    : recorder_(recorder),
+      registry_(registry),
+      senders_(std::move(senders)),
+      files_(std::make_shared<boost::asio::thread_pool>(1)),
+      players_(std::make_shared<boost::asio::thread_pool>(kPlayerThreads)),
+      desk_(std::make_shared<ReplayDesk>()),
+      security_(std::move(security)) {}
+
+grpc::ServerUnaryReactor* RecordingService::Later(grpc::CallbackServerContext* context, const char* method,
+                                                  std::function<Result<void>()> work) {
+  auto* reactor = context->DefaultReactor();
+  boost::asio::post(*files_, [reactor, method, peer = PeerOf(*context), work = std::move(work)] {
+    const Result<void> done = work();
+    if (!done) spdlog::info("{}: {} refused: {}", peer, method, done.error().message);
+    reactor->Finish(done ? grpc::Status::OK : ToGrpc(done.error()));
+  });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* RecordingService::StartRecording(grpc::CallbackServerContext* context,
+                                                           const v1::StartRecordingRequest* request,
+                                                           v1::StartRecordingResponse* response) {
+  const auto work = [this, request, response, who = Who(*context, *security_)]() -> Result<void> {
+    auto status = recorder_.Start(*request, who);
+    if (!status) return status.error();
+    *response->mutable_status() = std::move(*status);
+    return {};
+  };
+  return Later(context, "StartRecording", work);
+}
+
+grpc::ServerUnaryReactor* RecordingService::StopRecording(grpc::CallbackServerContext* context,
+                                                          const v1::StopRecordingRequest*,
+                                                          v1::StopRecordingResponse* response) {
+  const auto work = [this, response, who = Who(*context, *security_)]() -> Result<void> {
+    auto status = recorder_.Stop(who);
+    if (!status) return status.error();
+    *response->mutable_status() = std::move(*status);
+    return {};
+  };
+  return Later(context, "StopRecording", work);
+}
+
+grpc::ServerUnaryReactor* RecordingService::GetRecorder(grpc::CallbackServerContext* context,
+                                                        const v1::GetRecorderRequest*,
+                                                        v1::GetRecorderResponse* response) {
+  return Later(context, "GetRecorder", [this, response]() -> Result<void> {
+    *response->mutable_status() = recorder_.Status();
+    return {};
+  });
+}
+
+grpc::ServerUnaryReactor* RecordingService::ListLogs(grpc::CallbackServerContext* context,
+                                                     const v1::ListLogsRequest*,
+                                                     v1::ListLogsResponse* response) {
+  return Later(context, "ListLogs", [this, response]() -> Result<void> {
+    for (v1::Log& log : recorder_.catalog().List()) *response->add_logs() = std::move(log);
+    return {};
+  });
+}
+
+grpc::ServerUnaryReactor* RecordingService::DescribeLog(grpc::CallbackServerContext* context,
+                                                        const v1::DescribeLogRequest* request,
+                                                        v1::DescribeLogResponse* response) {
+  return Later(context, "DescribeLog", [this, request, response]() -> Result<void> {
+    auto described = recorder_.catalog().Describe(request->log());
+    if (!described) return described.error();
+    *response = std::move(*described);
+    return {};
+  });
+}
+
+grpc::ServerUnaryReactor* RecordingService::DeleteLog(grpc::CallbackServerContext* context,
+                                                      const v1::DeleteLogRequest* request,
+                                                      v1::DeleteLogResponse*) {
+  const auto work = [this, request, who = Who(*context, *security_)]() -> Result<void> {
+    const auto deleted = recorder_.folder().Delete(request->log());
+    if (deleted) spdlog::info("{}: {} deleted", who, request->log());
+    return deleted;
+  };
+  return Later(context, "DeleteLog", work);
+}
+
+RecordingService::Stream* RecordingService::DownloadLog(grpc::CallbackServerContext* context,
+                                                        const grpc::ByteBuffer* bytes) {
+  constexpr const char* kCall = "DownloadLog";
+  v1::DownloadLogRequest request;
+  grpc::ByteBuffer copy(*bytes);  // parsing empties it
+  if (!grpc::SerializationTraits<v1::DownloadLogRequest>::Deserialize(&copy, &request).ok())
+    return RefuseStream(*context, kCall,
+                        {ErrorCode::kInvalidArgument, "the request is no DownloadLogRequest message"});
+  const auto found = recorder_.folder().Find(request.log());
+  if (!found) return RefuseStream(*context, kCall, found.error());
+  auto source = mcap::FileSource::Open(recorder_.folder().PathOf(*found));
+  if (!source) return RefuseStream(*context, kCall, source.error());
+  if (request.offset() > (*source)->size())
+    return RefuseStream(
+        *context, kCall,
+        {ErrorCode::kEndOfData, "offset " + std::to_string(request.offset()) + " is past the end of " +
+                                    request.log() + ", " + std::to_string((*source)->size())});
+  auto stream =
+      std::make_shared<DownloadStream>(std::move(*source), request.offset(), registry_, senders_, files_);
+  if (const auto admitted = registry_.Admit(stream, PeerOf(*context)); !admitted)
+    return RefuseStream(*context, kCall, admitted.error());
+  stream->Begin();
+  return stream.get();  // the registry holds it until gRPC is done
+}
+
+RecordingService::Stream* RecordingService::Replay(grpc::CallbackServerContext* context,
+                                                   const grpc::ByteBuffer* bytes) {
+  constexpr const char* kCall = "Replay";
+  auto order = ParseReplayRequest(*bytes);
+  if (!order) return RefuseStream(*context, kCall, order.error());
+  const std::string log = order->log, peer = PeerOf(*context);
+  auto stream = std::make_shared<ReplayStream>(std::move(*order), peer, desk_, registry_, senders_, players_);
+  if (const auto admitted = registry_.Admit(stream, peer); !admitted)
+    return RefuseStream(*context, kCall, admitted.error());
+  stream->Begin(*files_, [this, log] { return OpenLog(recorder_, log); });
+  return stream.get();  // the registry holds it until gRPC is done
+}
+
+grpc::ServerUnaryReactor* RecordingService::ControlReplay(grpc::CallbackServerContext* context,
+                                                          const v1::ControlReplayRequest* request,
+                                                          v1::ControlReplayResponse*) {
+  auto* reactor = context->DefaultReactor();
+  if (const auto stream = desk_->Find(request->player())) {
+    (*stream)->Control(*request, [reactor](const grpc::Status& status) { reactor->Finish(status); });
+  } else {
+    reactor->Finish(ToGrpc(stream.error()));
+  }
+  return reactor;
+}
+
+// A player's timer may be pending, and nobody waits for it any more.
+void RecordingService::Join() {
+  files_->join();
+  players_->stop();
+  players_->join();
+}
+
+}  // namespace taclink::server

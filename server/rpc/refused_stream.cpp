@@ -1,0 +1,27 @@
+#include "server/rpc/refused_stream.h"
+
+#include <spdlog/spdlog.h>
+
+#include "server/rpc/status.h"
+#include "server/rpc/who.h"
+
+namespace taclink::server {
+namespace {
+
+class RefusedStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
+ public:
+  explicit RefusedStream(const Error& error) { Finish(ToGrpc(error)); }
+
+ private:
+  void OnDone() override { delete this; }
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<grpc::ByteBuffer>* RefuseStream(const grpc::CallbackServerContext& context,
+                                                         const char* method, const Error& error) {
+  spdlog::info("{}: {} refused: {}", PeerOf(context), method, error.message);
+  return new RefusedStream(error);  // deletes itself when gRPC is done with it
+}
+
+}  // namespace taclink::server

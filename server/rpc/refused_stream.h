@@ -1,0 +1,14 @@
+#pragma once
+
+#include <grpcpp/support/byte_buffer.h>
+#include <grpcpp/support/server_callback.h>
+
+#include "sensing/core/result.h"
+
+namespace taclink::server {
+
+/// Ends a streaming call before it began, and logs it.
+grpc::ServerWriteReactor<grpc::ByteBuffer>* RefuseStream(const grpc::CallbackServerContext& context,
+                                                         const char* method, const Error& error);
+
+}  // namespace taclink::server

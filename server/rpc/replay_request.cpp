@@ -1,0 +1,32 @@
+#include "server/rpc/replay_request.h"
+
+#include <grpcpp/impl/codegen/proto_utils.h>
+
+#include "taclink/v1/recording.pb.h"
+#include "wire/convert.h"
+
+namespace taclink::server {
+
+Result<ReplayOrder> ParseReplayRequest(const grpc::ByteBuffer& bytes) {
+  v1::ReplayRequest request;
+  grpc::ByteBuffer copy(bytes);  // parsing empties it
+  if (!grpc::SerializationTraits<v1::ReplayRequest>::Deserialize(&copy, &request).ok())
+    return Error{ErrorCode::kInvalidArgument, "the request is no ReplayRequest message"};
+  if (!v1::Detail_IsValid(request.detail()))
+    return Error{ErrorCode::kInvalidArgument, "detail must be CONTACTS, GEOMETRY or FULL"};
+  if (const auto good = LogPlayer::CheckSpeed(request.speed()); !good) return good.error();
+  return ReplayOrder{.log = request.log(),
+                     .selection = {.links = {request.links().begin(), request.links().end()},
+                                   .events = !request.without_events(),
+                                   .contacts = !request.without_contacts(),
+                                   .arm = !request.without_arm()},
+                     .player = {.from_utc_ns = request.from_utc_ns(),
+                                .to_utc_ns = request.to_utc_ns(),
+                                .speed = request.speed(),
+                                .loop = request.loop(),
+                                .paused = request.paused()},
+                     .form = {.detail = wire::FromWire(request.detail()),
+                              .links = {request.links().begin(), request.links().end()}}};
+}
+
+}  // namespace taclink::server

@@ -1,0 +1,296 @@
+// What the hub publishes, in logs made over the API.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "client/taclink/recordings.h"
+#include "taclink/v1/frame.pb.h"
+#include "taclink/v1/log.pb.h"
+#include "tests/integration/support.h"
+#include "wire/log/topics.h"
+#include "wire/mcap/check.h"
+#include "wire/mcap/cursor.h"
+#include "wire/mcap/reader.h"
+
+namespace taclink::server {
+namespace {
+
+namespace fs = std::filesystem;
+using client::RecorderState;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using wire::log::TopicKind;
+
+std::string NewFolder() {
+  static int count = 0;
+  return ::testing::TempDir() + "recording." + std::to_string(::getpid()) + "." + std::to_string(++count);
+}
+
+std::string Content(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+/// What a log holds of one kind.
+template <typename T>
+std::vector<T> Read(const std::string& path, TopicKind kind, const std::string& link = "") {
+  std::vector<T> out;
+  auto source = mcap::FileSource::Open(path);
+  EXPECT_TRUE(source.ok()) << source.error().message;
+  const std::shared_ptr<const mcap::ByteSource> bytes(std::move(*source));
+  const auto report = mcap::Check(*bytes);
+  EXPECT_TRUE(report.ok() && report->ok()) << report->findings[0].what;
+  const auto reader = mcap::Reader::Open(bytes);
+  EXPECT_TRUE(reader.ok()) << reader.error().message;
+  EXPECT_EQ((*reader)->summary_problem(), "");
+  mcap::MessageCursor cursor(**reader, {.order = mcap::MessageOrder::kFile});
+  while (const auto message = cursor.Next()) {
+    const auto topic = wire::log::ParseTopic((*reader)->channels().at(message->channel_id).topic);
+    EXPECT_TRUE(topic);
+    if (topic->kind != kind || topic->link != link) continue;
+    EXPECT_TRUE(
+        out.emplace_back().ParseFromArray(message->data.data(), static_cast<int>(message->data.size())));
+  }
+  return out;
+}
+
+class RecordingTest : public ::testing::Test {
+ protected:
+  explicit RecordingTest(const RecordingConfig& config = {})
+      : folder_(NewFolder()), server_(TestLimits(), nullptr, {}, With(config)) {}
+  ~RecordingTest() override { fs::remove_all(folder_); }
+  RecordingConfig With(RecordingConfig config) const {
+    config.folder = folder_;
+    return config;
+  }
+
+  void Publish(size_t link, uint64_t first, uint64_t last) {
+    for (uint64_t sequence = first; sequence <= last; ++sequence)
+      server_.Publish(link, sequence, server_.clock().MonotonicNs());
+  }
+  client::RecorderStatus Start(const client::RecordingOptions& options = {}) {
+    const auto status = recordings_.Start(options);
+    EXPECT_TRUE(status.ok()) << status.error().message;
+    return status.ok() ? *status : client::RecorderStatus();
+  }
+  client::RecorderStatus Stop() {
+    const auto status = recordings_.Stop();
+    EXPECT_TRUE(status.ok()) << status.error().message;
+    return status.ok() ? *status : client::RecorderStatus();
+  }
+  template <typename F>
+  client::RecorderStatus WaitFor(const F& condition) {
+    const auto give_up = std::chrono::steady_clock::now() + kForever;
+    while (std::chrono::steady_clock::now() < give_up) {
+      const auto status = recordings_.Status();
+      EXPECT_TRUE(status.ok()) << status.error().message;
+      if (condition(*status)) return *status;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    ADD_FAILURE() << "not in time";
+    return {};
+  }
+  std::string PathOf(const std::string& log) const { return folder_ + "/" + log; }
+
+  const std::string folder_;
+  TestServer server_;
+  client::Client client_ = server_.Connect();
+  client::Recordings recordings_ = client_.RecordingCalls();
+};
+
+TEST_F(RecordingTest, HoldsEveryFrameAsItWasSent) {
+  EXPECT_EQ(recordings_.Status()->state, RecorderState::kIdle);
+  const auto started = Start({.note = "first"});
+  EXPECT_EQ(started.state, RecorderState::kRecording);
+  Publish(0, 1, 50);
+  Publish(1, 100, 120);
+  const auto stopped = Stop();
+  EXPECT_EQ(stopped.state, RecorderState::kIdle);
+  EXPECT_EQ(stopped.frames, 71u);
+  EXPECT_EQ(stopped.frames_lost, 0u);
+  const auto frames = Read<v1::LinkFrame>(PathOf(stopped.log), TopicKind::kFrame, "upper");
+  ASSERT_EQ(frames.size(), 50u);
+  const auto live = server_.arm().hub().Latest(0)->Encoded(Detail::kFull);
+  EXPECT_EQ(frames.back().SerializeAsString(), *live);
+  for (size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].sequence(), i + 1);
+  EXPECT_EQ(Read<v1::LinkFrame>(PathOf(stopped.log), TopicKind::kFrame, "lower").size(), 21u);
+  EXPECT_GE(Read<v1::Arm>(PathOf(stopped.log), TopicKind::kArm).size(), 1u);
+  EXPECT_EQ(Read<v1::RecordingLoss>(PathOf(stopped.log), TopicKind::kLosses).size(), 0u);
+
+  const auto logs = recordings_.List();
+  ASSERT_TRUE(logs.ok() && logs->size() == 1);
+  const client::Log& log = logs->front();
+  EXPECT_EQ(log.frames, 71u);
+  EXPECT_THAT(log.links, ::testing::UnorderedElementsAre("upper", "lower"));
+  EXPECT_EQ(log.note, "first");
+  EXPECT_FALSE(log.open);
+  EXPECT_EQ(log.problem, "");
+  EXPECT_EQ(log.bytes, fs::file_size(PathOf(log.name)));
+}
+
+TEST_F(RecordingTest, OnlyTheLinksAskedFor) {
+  Start({.name = "only", .links = {"lower"}});
+  Publish(0, 1, 5);
+  Publish(1, 1, 3);
+  const auto stopped = Stop();
+  EXPECT_THAT(stopped.log, HasSubstr("only-"));
+  EXPECT_EQ(stopped.frames, 3u);
+}
+
+TEST_F(RecordingTest, OrdersThatMakeNoSenseAreRefused) {
+  EXPECT_EQ(recordings_.Stop().error().code, ErrorCode::kFailedPrecondition);
+  EXPECT_EQ(recordings_.Start({.name = "../x"}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(recordings_.Start({.links = {"nose"}}).error().code, ErrorCode::kNotFound);
+  Start();
+  const auto second = recordings_.Start({});
+  EXPECT_EQ(second.error().code, ErrorCode::kFailedPrecondition);
+  EXPECT_THAT(second.error().message, HasSubstr("stop that first"));
+  const auto open = recordings_.List()->front();
+  EXPECT_TRUE(open.open);
+  EXPECT_EQ(recordings_.Delete(open.name).error().code, ErrorCode::kFailedPrecondition);
+  const auto stopped = Stop();
+  EXPECT_TRUE(recordings_.Delete(stopped.log).ok());
+  EXPECT_EQ(recordings_.Delete(stopped.log).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(recordings_.List()->size(), 0u);
+}
+
+TEST_F(RecordingTest, ALogIsDownloadedInPieces) {
+  Start({.compression = client::LogCompression::kNone});
+  Publish(0, 1, 400);
+  const std::string log = Stop().log;
+  const std::string whole = Content(PathOf(log));
+  ASSERT_GT(whole.size(), size_t{1} << 20);
+  std::string got;
+  const auto cut = recordings_.Download(log, 0, [&](std::string_view data, uint64_t offset, uint64_t size) {
+    EXPECT_EQ(offset, got.size());
+    EXPECT_EQ(size, whole.size());
+    got += data;
+    return false;
+  });
+  EXPECT_EQ(cut.error().code, ErrorCode::kEndOfData);
+  EXPECT_LT(got.size(), whole.size());
+  const auto rest = recordings_.Download(log, got.size(), [&](std::string_view data, uint64_t, uint64_t) {
+    got += data;
+    return true;
+  });
+  EXPECT_TRUE(rest.ok()) << rest.error().message;
+  EXPECT_TRUE(got == whole);
+  const auto none = [](auto, auto, auto) { return true; };
+  EXPECT_TRUE(recordings_.Download(log, whole.size(), none).ok());
+  EXPECT_EQ(recordings_.Download(log, whole.size() + 1, none).error().code, ErrorCode::kEndOfData);
+  EXPECT_EQ(recordings_.Download("none.mcap", 0, none).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(recordings_.Download("../" + log, 0, none).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(RecordingTest, PicturesAreThoseOfTheFrames) {
+  server_.arm().Start();
+  Start({.links = {"upper"}, .pictures = true});
+  for (uint64_t i = 1; i <= 20; ++i) {
+    server_.script(0).Push([i](StereoFrame& frame) -> Result<void> {
+      frame.sequence = i;
+      frame.times.exposure_monotonic_ns = frame.times.exposure_utc_ns = static_cast<int64_t>(i) * 1000;
+      for (RawImage& image : frame.images) {
+        image = {.format = PixelFormat::kGray8, .width_px = 8, .height_px = 2, .bytes = {}};
+        image.bytes.assign(16, static_cast<uint8_t>(i));
+        image.valid = true;
+      }
+      return {};
+    });
+    WaitFor([&](const auto& status) { return status.frames >= i; });
+  }
+  const std::string path = PathOf(Stop().log);
+  server_.arm().Stop();
+  EXPECT_FALSE(server_.arm().hub().WantsPictures(0)) << "nobody reads them any more";
+  std::map<int64_t, std::vector<uint64_t>> seen;  // by exposure: sequences of frame and pictures
+  auto source = mcap::FileSource::Open(path);
+  const auto reader = mcap::Reader::Open(std::shared_ptr<const mcap::ByteSource>(std::move(*source)));
+  mcap::MessageCursor cursor(**reader, {});
+  int pictures = 0;
+  while (const auto message = cursor.Next()) {
+    const auto topic = wire::log::ParseTopic((*reader)->channels().at(message->channel_id).topic);
+    if (topic->kind == TopicKind::kPicture) {
+      ++pictures;
+      EXPECT_EQ(message->publish_time_ns, 1000u * message->sequence);
+      const auto last = std::to_integer<uint8_t>(message->data.back());
+      EXPECT_EQ(last, message->sequence);
+    }
+  }
+  EXPECT_EQ(pictures, 40);
+}
+
+class SplitTest : public RecordingTest {
+ protected:
+  SplitTest() : RecordingTest({.split_mb = 0, .split_s = 10, .quota_mb = 0}) {}
+};
+
+TEST_F(SplitTest, ALogIsClosedAndTheNextBegun) {
+  Start();
+  Publish(0, 1, 5);
+  WaitFor([](const auto& status) { return status.frames == 5; });
+  server_.clock().Advance(std::chrono::seconds(11));
+  WaitFor([](const auto& status) { return status.logs == 2; });
+  Publish(0, 6, 8);
+  const auto stopped = Stop();
+  EXPECT_EQ(stopped.frames, 8u);
+  const auto logs = recordings_.List();
+  ASSERT_EQ(logs->size(), 2u);
+  EXPECT_EQ((*logs)[0].frames, 5u);
+  EXPECT_EQ((*logs)[1].frames, 3u);
+  for (const auto& log : *logs) EXPECT_GE(Read<v1::Arm>(PathOf(log.name), TopicKind::kArm).size(), 1u);
+}
+
+/// Files of this process can't grow beyond a limit: as a full disk, but for the error's name.
+class FileLimit {
+ public:
+  explicit FileLimit(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileLimit() { ::setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(RecordingTest, WhatTheDiskDoesNotTakeIsNamed) {
+  Start({.compression = client::LogCompression::kNone});
+  Publish(0, 1, 10);
+  WaitFor([](const auto& status) { return status.frames == 10; });
+  server_.clock().Advance(std::chrono::seconds(2));
+  const auto synced = WaitFor([](const auto& status) { return status.synced_utc_ns != 0; });
+  {
+    const FileLimit full(fs::file_size(PathOf(synced.log) + ".part"));
+    Publish(0, 11, 14);
+    server_.clock().Advance(std::chrono::seconds(2));
+    const auto trouble = WaitFor([](const auto& status) { return status.state == RecorderState::kTrouble; });
+    EXPECT_THAT(trouble.trouble, HasSubstr(synced.log));
+    EXPECT_EQ(WaitFor([](const auto& status) { return status.frames_lost == 4; }).frames_lost, 4u);
+  }
+  server_.clock().Advance(std::chrono::seconds(2));
+  WaitFor([](const auto& status) { return status.state == RecorderState::kRecording; });
+  Publish(0, 15, 20);
+  const auto stopped = Stop();
+  EXPECT_EQ(stopped.frames_lost, 4u);
+  EXPECT_EQ(stopped.frames, 16u);
+  const auto frames = Read<v1::LinkFrame>(PathOf(stopped.log), TopicKind::kFrame, "upper");
+  EXPECT_EQ(frames.size(), 16u);
+  const auto losses = Read<v1::RecordingLoss>(PathOf(stopped.log), TopicKind::kLosses);
+  ASSERT_EQ(losses.size(), 1u);
+  EXPECT_EQ(losses[0].link(), "upper");
+  EXPECT_EQ(losses[0].count(), 4u);
+  EXPECT_EQ(losses[0].after_sequence(), 10u);
+  EXPECT_EQ(losses[0].before_sequence(), 15u);
+  EXPECT_EQ(losses[0].reason(), v1::LOSS_REASON_DISK);
+}
+
+}  // namespace
+}  // namespace taclink::server
