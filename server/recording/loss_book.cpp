@@ -44,11 +44,6 @@ void LossBook::ChunkLost(const std::string& text) {
   }
 }
 
-void LossBook::Missed(size_t link, const std::string& text) {
-  ++lost_;
-  Lose(links_[link], 1, links_[link].newest, v1::LOSS_REASON_DISK, text);
-}
-
 void LossBook::Dropped(size_t link, uint64_t count) {
   if (count == 0) return;
   lost_ += count;

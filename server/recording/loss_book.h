@@ -23,8 +23,6 @@ class LossBook {
   void Kept();
   /// What was handed over since Kept is not in the file, nor will it be.
   void ChunkLost(const std::string& text);
-  /// A frame that was not handed over, because of the disk.
-  void Missed(size_t link, const std::string& text);
   /// Frames that fell out of the queue before the next one of this link.
   void Dropped(size_t link, uint64_t count);
 
