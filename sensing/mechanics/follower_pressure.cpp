@@ -10,42 +10,54 @@ Mat3 Skew(const Vec3& v) {
   return m;
 }
 
+// By the corners' points and directors, of a derivative by the wall's points.
+void AddWallStiffness(double half_thickness_mm, size_t i, size_t j, const Mat3& k, ElementHessian& hessian) {
+  const auto row = static_cast<Eigen::Index>(6 * i), column = static_cast<Eigen::Index>(6 * j);
+  const Mat3 by_director = -half_thickness_mm * k;
+  hessian.block<3, 3>(row, column) += k;
+  hessian.block<3, 3>(row, column + 3) += by_director;
+  hessian.block<3, 3>(row + 3, column) += by_director;
+  hessian.block<3, 3>(row + 3, column + 3) -= half_thickness_mm * by_director;
+}
+
 }  // namespace
 
 // Volume = 1/3 sum X . (X_xi x X_eta) over Gauss points, X the wall's points; differentiated by its corners.
+// The second derivative by corners i and j is the cross product with a vector, and minus that vector for j
+// and i.
 void FollowerPressure::Add(DerivativeOrder order, int /*element*/, const ElementState& state,
                            ElementResponse& response) const {
   Eigen::Matrix<double, 3, 4> wall;
-  for (Eigen::Index i = 0; i < 4; ++i) {
+  for (Eigen::Index i = 0; i < 4; ++i)
     wall.col(i) = state.segment<3>(6 * i) - half_thickness_mm_ * state.segment<3>(6 * i + 3);
-  }
+  const auto& [value, by_xi, by_eta] = ShapesAtGaussPoints();
+  const Lanes3 x = Interpolate(wall, value), x1 = Interpolate(wall, by_xi), x2 = Interpolate(wall, by_eta);
+  const Lanes3 area = Cross(x1, x2);
   const double scale = -pressure_mpa_ / 3;
-  const double by_director = -half_thickness_mm_;
-  for (const double xi : {-kGauss, kGauss}) {
-    for (const double eta : {-kGauss, kGauss}) {
-      const ShapeFunctions n = ShapeFunctionsAt(xi, eta);
-      const Vec3 x = wall * n.value, x1 = wall * n.by_xi, x2 = wall * n.by_eta;
-      const Vec3 area = x1.cross(x2), side1 = x2.cross(x), side2 = x.cross(x1);
-      response.energy_nmm += scale * x.dot(area);
-      if (order == DerivativeOrder::kEnergy) continue;
-      for (Eigen::Index i = 0; i < 4; ++i) {
-        const Vec3 force = scale * (n.value[i] * area + n.by_xi[i] * side1 + n.by_eta[i] * side2);
-        response.gradient.segment<3>(6 * i) += force;
-        response.gradient.segment<3>(6 * i + 3) += by_director * force;
-      }
-      if (order == DerivativeOrder::kGradient) continue;
-      const Mat3 k0 = scale * Skew(x), k1 = scale * Skew(x1), k2 = scale * Skew(x2);
-      for (Eigen::Index i = 0; i < 4; ++i) {
-        for (Eigen::Index j = 0; j < 4; ++j) {
-          const Mat3 k = (n.value[i] * n.by_eta[j] - n.by_eta[i] * n.value[j]) * k1 +
-                         (n.by_xi[i] * n.value[j] - n.value[i] * n.by_xi[j]) * k2 +
-                         (n.by_eta[i] * n.by_xi[j] - n.by_xi[i] * n.by_eta[j]) * k0;
-          response.hessian.block<3, 3>(6 * i, 6 * j) += k;
-          response.hessian.block<3, 3>(6 * i, 6 * j + 3) += by_director * k;
-          response.hessian.block<3, 3>(6 * i + 3, 6 * j) += by_director * k;
-          response.hessian.block<3, 3>(6 * i + 3, 6 * j + 3) += by_director * by_director * k;
-        }
-      }
+  response.energy_nmm += scale * Sum(Dot(x, area));
+  if (order == DerivativeOrder::kEnergy) return;
+  const Lanes3 side1 = Cross(x2, x), side2 = Cross(x, x1);
+  for (size_t i = 0; i < 4; ++i) {
+    Vec3 force;
+    for (size_t a = 0; a < 3; ++a) {
+      force[static_cast<Eigen::Index>(a)] =
+          scale * Sum(value[i] * area[a] + by_xi[i] * side1[a] + by_eta[i] * side2[a]);
+    }
+    const auto at = static_cast<Eigen::Index>(6 * i);
+    response.gradient.segment<3>(at) += force;
+    response.gradient.segment<3>(at + 3) -= half_thickness_mm_ * force;
+  }
+  if (order == DerivativeOrder::kGradient) return;
+  for (size_t i = 0; i < 4; ++i) {
+    for (size_t j = i + 1; j < 4; ++j) {
+      const Lanes by_x1 = value[i] * by_eta[j] - by_eta[i] * value[j];
+      const Lanes by_x2 = by_xi[i] * value[j] - value[i] * by_xi[j];
+      const Lanes by_x = by_eta[i] * by_xi[j] - by_xi[i] * by_eta[j];
+      Vec3 turning;
+      for (size_t a = 0; a < 3; ++a)
+        turning[static_cast<Eigen::Index>(a)] = scale * Sum(by_x1 * x1[a] + by_x2 * x2[a] + by_x * x[a]);
+      AddWallStiffness(half_thickness_mm_, i, j, Skew(turning), response.hessian);
+      AddWallStiffness(half_thickness_mm_, j, i, -Skew(turning), response.hessian);
     }
   }
 }

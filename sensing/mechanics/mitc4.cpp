@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "sensing/mechanics/shape_functions.h"
+
 namespace taclink {
 namespace {
 
@@ -10,7 +12,6 @@ using StrainRow = Eigen::Matrix<double, 1, kElementDofs>;
 using StrainMatrix = Eigen::Matrix<double, 5, kElementDofs>;
 using Corners = std::array<ShellCorner, 4>;
 
-constexpr double kGauss = 0.57735026918962576;
 constexpr double kShearCorrection = 5.0 / 6.0;
 constexpr std::array<double, 4> kXi = {-1, 1, 1, -1};
 constexpr std::array<double, 4> kEta = {-1, -1, 1, 1};

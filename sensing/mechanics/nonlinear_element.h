@@ -4,6 +4,7 @@
 
 #include "sensing/core/geometry.h"
 #include "sensing/core/link_model.h"
+#include "sensing/mechanics/lanes.h"
 #include "sensing/mechanics/shape_functions.h"
 
 namespace taclink {
@@ -17,10 +18,10 @@ enum class DerivativeOrder { kEnergy, kGradient, kHessian };
 
 /// What an element adds to the energy and its derivatives by the ElementState.
 struct ElementResponse {
-  void SetZero() {
+  void SetZero(DerivativeOrder order) {
     energy_nmm = 0;
     gradient.setZero();
-    hessian.setZero();
+    if (order == DerivativeOrder::kHessian) hessian.setZero();
   }
 
   double energy_nmm = 0;
@@ -39,31 +40,36 @@ class NonlinearElement {
   void Add(DerivativeOrder order, const ElementState& state, ElementResponse& response) const;
 
  private:
-  // Through-thickness and in-plane Gauss point: covariant to Cartesian strains, both halves of them.
-  struct Point {
+  // The in-plane Gauss points at one height: covariant to Cartesian strains, both halves of them.
+  struct Layer {
     double height_mm = 0;  // above the mid-surface
-    double weight_mm3 = 0;
-    Mat3 in_plane;                      // e11, e22, 2 e12 to Cartesian
-    Eigen::Matrix<double, 2, 3> warp;   // e11, e22, 2 e12 to transverse shears, where a director leans
-    Eigen::Matrix<double, 2, 4> shear;  // tying shears to Cartesian transverse shears
-    Vec3 rest_metric;                   // g11, g22, 2 g12 at rest
+    Lanes weight_mm3;
+    std::array<Lanes3, 3> in_plane;  // e11, e22, 2 e12 to Cartesian
+    std::array<Lanes3, 2> warp;      // e11, e22, 2 e12 to transverse shears, where a director leans
+    std::array<std::array<Lanes, 4>, 2> shear;  // tying shears to Cartesian transverse shears
+    Lanes3 rest_metric;                         // g11, g22, 2 g12 at rest
   };
 
+  struct Strained;
   struct Sums;
   using Corners = Eigen::Matrix<double, 3, 4>;
-  using Tied = Eigen::Matrix<double, 4, 24>;  // tying shears by the element's state
+  using Tied = Eigen::Matrix<double, 24, 4>;  // tying shears by the element's state
 
+  void SetPoint(const Corners& mids, const Corners& directors, size_t p, Layer& layer);
+  void Strain(const Layer& layer, const Corners& at_height, const Eigen::Vector4d& tying,
+              Strained& strained) const;
   template <DerivativeOrder kOrder>
   void AddUpTo(const ElementState& state, ElementResponse& response) const;
-  void AddStiffness(const Point& point, const ShapeFunctions& n, const Vec3& g1, const Vec3& g2,
-                    const Vec3& s, const Mat3& tangent_mpa, Sums& sums) const;
+  void AddStiffness(const Layer& layer, const Strained& strained, Sums& sums) const;
   Tied TyingByState(const Corners& mids, const Corners& directors) const;
   void AddHessian(const Sums& sums, const Tied& by_state, ElementHessian& hessian) const;
+  void AddTying(const Sums& sums, const Tied& by_state, ElementHessian& hessian) const;
 
   double thickness_mm_;
   Material material_;
   double shear_modulus_mpa_;
-  std::array<std::array<Point, 2>, 4> points_;
+  std::array<Layer, 2> layers_;  // as far below the mid-surface as above
+  Eigen::Matrix4d tying_stiffness_ = Eigen::Matrix4d::Zero();
   Eigen::Vector4d rest_tying_;
 };
 

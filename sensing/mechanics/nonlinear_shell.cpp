@@ -94,7 +94,7 @@ double NonlinearShell::ForEachElement(DerivativeOrder order, const ShellState& s
   double energy = 0;
   ElementResponse response;
   for (size_t e = 0; e < elements_.size(); ++e) {
-    response.SetZero();
+    response.SetZero(order);
     const ElementState q = StateOf(static_cast<int>(e), state);
     elements_[e].Add(order, q, response);
     for (const ElementLoad* load : loads) load->Add(order, static_cast<int>(e), q, response);
@@ -145,14 +145,14 @@ double NonlinearShell::Hessian(const ShellState& state, Loads loads, Eigen::Vect
           g.segment<3>(to) = response.gradient.segment<3>(at);
           g.segment<2>(to + 3) = turns[i].transpose() * response.gradient.segment<3>(at + 3);
           half.middleCols<3>(to) = response.hessian.middleCols<3>(at);
-          half.middleCols<2>(to + 3).noalias() = response.hessian.middleCols<3>(at + 3) * turns[i];
+          half.middleCols<2>(to + 3) = response.hessian.middleCols<3>(at + 3).lazyProduct(turns[i]);
         }
         Eigen::Matrix<double, kElementDofs, kElementDofs> k;
         for (size_t i = 0; i < 4; ++i) {
           const auto node = static_cast<size_t>(surface_.elements[e][i]);
           const auto at = static_cast<Eigen::Index>(6 * i), to = static_cast<Eigen::Index>(5 * i);
           k.middleRows<3>(to) = half.middleRows<3>(at);
-          k.middleRows<2>(to + 3).noalias() = turns[i].transpose() * half.middleRows<3>(at + 3);
+          k.middleRows<2>(to + 3) = turns[i].transpose().lazyProduct(half.middleRows<3>(at + 3));
           // A director that turns comes nearer to its own axis by half the angle squared.
           const double sinking = response.gradient.segment<3>(at + 3).dot(state.directors[node]);
           k(to + 3, to + 3) -= sinking;
