@@ -22,6 +22,7 @@ constexpr int kDefaultRefinement = 1;
 constexpr int kMostIterations = 6, kMostTangents = 1;
 constexpr int kMostUnsettled = 8;         // such frames in a row
 constexpr int kNewLoadsPerIteration = 3;  // the linearisation is only good near the state
+constexpr size_t kMostIdle = 16;          // 30 kB each at refinement 1
 constexpr double kMaxStepMm = 4;
 constexpr double kSettledMm = 0.02;       // of a step: a fifth of the markers' noise
 constexpr double kNearlySettledMm = 0.5;  // where a frame's iterations end
@@ -52,22 +53,22 @@ struct NonlinearEstimator::Solver {
     int site = 0;
     double load_n = 0;               // inwards
     Vec2 sideways_n = Vec2::Zero();  // around and along the axis
-    Eigen::VectorXd motion;          // of the shell, per N, by degree of freedom
-    Eigen::VectorXd column;          // of the markers, per N
-    bool has_sideways = false;       // the same, around and along the axis
-    std::array<Eigen::VectorXd, 2> sideways_motion, sideways;
+    // Per N inwards, around and along the axis.
+    Eigen::MatrixXd motions;                 // of the shell, by degree of freedom
+    std::array<Eigen::VectorXd, 3> columns;  // of the markers
   };
 
   void Rest();
   bool BeginTouch(double pressure_mpa);
   bool Refactor();
   void SolveColumns(Load& load);
-  Eigen::VectorXd Solve(const Eigen::VectorXd& by_force);
-  void SolveSideways(Load& load);
+  void Solve(const Eigen::MatrixXd& by_forces, Eigen::MatrixXd& motions);
   std::vector<Load>::iterator FindLoad(int site) {
     return std::find_if(loads.begin(), loads.end(), [&](const Load& load) { return load.site == site; });
   }
-  void AddForce(int site, int direction, double load_n, Eigen::VectorXd& force) const;
+  void AddForce(int site, int direction, double load_n, Eigen::Ref<Eigen::VectorXd> force) const;
+  std::vector<Load>::iterator AddLoad(int site);
+  void RemoveGone();
   void SubtractLoads();
   double Unbalance(const ElementLoad& pressure);
   void SetData(const SkinShape& shape, const SkinTangent& tangent, double pressure_mpa);
@@ -94,14 +95,16 @@ struct NonlinearEstimator::Solver {
   int unsettled = 0;         // frames in a row
   double shrinkage = kSlow;  // of one step to the next, seen with this tangent
   // Springs that hold the loaded nodes in the factorised matrix, and what undoes them in a solution.
-  std::vector<int> held;         // first degrees of freedom of those nodes
-  Eigen::MatrixXd unit_forces;   // scratch
-  Eigen::MatrixXd held_motions;  // of the shell, by a force on each of their directions
-  Eigen::MatrixXd held_undo;     // (1 / stiffness - compliance of the held)^-1
+  std::vector<int> held;                 // first degrees of freedom of those nodes
+  Eigen::MatrixXd unit_forces, at_held;  // scratch
+  Eigen::MatrixXd held_motions;          // of the shell, by a force on each of their directions
+  Eigen::MatrixXd held_undo;             // (1 / stiffness - compliance of the held)^-1
 
   ShellState state;         // in equilibrium with `loads`, nearly
   std::vector<Load> loads;  // those that act on it
-  Eigen::VectorXd gradient, settle, settle_column, step, force, column, sum;
+  std::vector<Load> idle;   // acted since the last tangent: markers' noise calls them again and again
+  Eigen::MatrixXd out_of_balance, settle, forces;
+  Eigen::VectorXd gradient, settle_column, step, sum;
   Eigen::VectorXd predicted, model_sigma;
   NonlinearEstimator::Work work;
 };
@@ -109,6 +112,7 @@ struct NonlinearEstimator::Solver {
 void NonlinearEstimator::Solver::Rest() {
   state = shell.Rest();
   loads.clear();
+  idle.clear();
   held.clear();
   in_use = nullptr;
   unsettled = 0;
@@ -155,6 +159,7 @@ bool NonlinearEstimator::Solver::Refactor() {
     definite = factor.Factorise(hessian);
   }
   in_use = &factor;
+  idle.clear();
   shrinkage = kSlow;
   if (held.empty()) return true;
   const auto n = static_cast<Eigen::Index>(3 * held.size());
@@ -175,17 +180,17 @@ bool NonlinearEstimator::Solver::Refactor() {
   return true;
 }
 
-Eigen::VectorXd NonlinearEstimator::Solver::Solve(const Eigen::VectorXd& by_force) {
-  Eigen::VectorXd solution = in_use->Solve(by_force);
-  if (held.empty()) return solution;
-  Eigen::VectorXd at_held(held_undo.rows());
-  for (Eigen::Index k = 0; k < at_held.size(); ++k)
-    at_held[k] = solution[held[static_cast<size_t>(k / 3)] + k % 3];
-  solution.noalias() += held_motions * (held_undo * at_held);
-  return solution;
+void NonlinearEstimator::Solver::Solve(const Eigen::MatrixXd& by_forces, Eigen::MatrixXd& motions) {
+  in_use->Solve(by_forces, motions);
+  if (held.empty()) return;
+  at_held.resize(held_undo.rows(), motions.cols());
+  for (Eigen::Index k = 0; k < at_held.rows(); ++k)
+    at_held.row(k) = motions.row(held[static_cast<size_t>(k / 3)] + k % 3);
+  motions.noalias() += held_motions * (held_undo * at_held);
 }
 
-void NonlinearEstimator::Solver::AddForce(int site, int direction, double load_n, Eigen::VectorXd& to) const {
+void NonlinearEstimator::Solver::AddForce(int site, int direction, double load_n,
+                                          Eigen::Ref<Eigen::VectorXd> to) const {
   const auto i = static_cast<size_t>(site);
   for (const auto& [node, share] : sites.spreads[i]) {
     const int dof = shell.Dof(node, 0);  // only free nodes are in a spread
@@ -193,23 +198,14 @@ void NonlinearEstimator::Solver::AddForce(int site, int direction, double load_n
   }
 }
 
+// All directions at once take little longer than one.
 void NonlinearEstimator::Solver::SolveColumns(Load& load) {
-  force.setZero(shell.dof_count());
-  AddForce(load.site, 0, 1, force);
-  load.motion = Solve(force);
-  MarkerMotions(model, mesh, shell, state, load.motion, load.column);
-  load.has_sideways = false;
-}
-
-void NonlinearEstimator::Solver::SolveSideways(Load& load) {
-  if (load.has_sideways) return;
-  load.has_sideways = true;
-  for (int direction = 0; direction < 2; ++direction) {
-    const auto d = static_cast<size_t>(direction);
-    force.setZero(shell.dof_count());
-    AddForce(load.site, direction + 1, 1, force);
-    load.sideways_motion[d] = Solve(force);
-    MarkerMotions(model, mesh, shell, state, load.sideways_motion[d], load.sideways[d]);
+  forces.setZero(shell.dof_count(), 3);
+  for (int direction = 0; direction < 3; ++direction)
+    AddForce(load.site, direction, 1, forces.col(direction));
+  Solve(forces, load.motions);
+  for (size_t d = 0; d < 3; ++d) {
+    MarkerMotions(model, mesh, shell, state, load.motions.col(static_cast<Eigen::Index>(d)), load.columns[d]);
   }
 }
 
@@ -244,15 +240,43 @@ void NonlinearEstimator::Solver::SetData(const SkinShape& shape, const SkinTange
   data.Set(shape, predicted, model_sigma);
 }
 
+std::vector<NonlinearEstimator::Solver::Load>::iterator NonlinearEstimator::Solver::AddLoad(int site) {
+  const auto known =
+      std::find_if(idle.begin(), idle.end(), [&](const Load& load) { return load.site == site; });
+  if (known != idle.end()) {
+    loads.push_back(std::move(*known));
+    idle.erase(known);
+  } else {
+    loads.emplace_back().site = site;
+    SolveColumns(loads.back());
+  }
+  return loads.end() - 1;
+}
+
+void NonlinearEstimator::Solver::RemoveGone() {
+  for (size_t i = 0; i < loads.size();) {
+    if (loads[i].load_n > 0) {
+      ++i;
+      continue;
+    }
+    loads[i].load_n = 0;
+    loads[i].sideways_n.setZero();
+    if (idle.size() == kMostIdle) idle.erase(idle.begin());
+    idle.push_back(std::move(loads[i]));
+    loads.erase(loads.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+}
+
 // What the loads have to be for the linearised shell; the fit then holds them. False: too many.
 bool NonlinearEstimator::Solver::FindLoads(const SkinTangent& tangent) {
   if (static_cast<int>(loads.size()) > fit_options.max_loads) return false;
-  settle = Solve(-gradient);
-  MarkerMotions(model, mesh, shell, state, settle, settle_column);
+  out_of_balance = -gradient;
+  Solve(out_of_balance, settle);
+  MarkerMotions(model, mesh, shell, state, settle.col(0), settle_column);
   data.residual_mm -= settle_column;
-  for (const Load& load : loads) data.residual_mm += load.load_n * load.column;
+  for (const Load& load : loads) data.residual_mm += load.load_n * load.columns[0];
   fit.Begin(data);
-  for (const Load& load : loads) fit.Add(data, load.site, load.column, load.load_n);
+  for (const Load& load : loads) fit.Add(data, load.site, load.columns[0], load.load_n);
   fit.Optimise(fit_options.significance);
   for (int added = 0; added < kNewLoadsPerIteration; ++added) {
     const int site = fit.MostSignificant(data, tangent);
@@ -260,11 +284,9 @@ bool NonlinearEstimator::Solver::FindLoads(const SkinTangent& tangent) {
     if (fit.IsFull()) return false;
     auto load = FindLoad(site);
     if (load == loads.end()) {  // else one that the fit has just let go
-      load = loads.emplace(loads.end());
-      load->site = site;
-      SolveColumns(*load);
+      load = AddLoad(site);
     }
-    fit.Add(data, site, load->column, 0);
+    fit.Add(data, site, load->columns[0], 0);
     fit.Optimise(fit_options.significance);
   }
   fit.RemoveBias();
@@ -277,8 +299,7 @@ void NonlinearEstimator::Solver::AddTangential() {
   sum.setZero(predicted.size());
   for (Load& load : loads) {
     if (load.sideways_n.isZero()) continue;
-    SolveSideways(load);
-    sum += load.sideways_n.x() * load.sideways[0] + load.sideways_n.y() * load.sideways[1];
+    sum += load.sideways_n.x() * load.columns[1] + load.sideways_n.y() * load.columns[2];
   }
   fit.AddToData(sum);
   fit.AddTangential(data, [&](const auto& shares, int direction) -> const Eigen::VectorXd& {
@@ -286,8 +307,7 @@ void NonlinearEstimator::Solver::AddTangential() {
     for (Eigen::Index k = 0; k < shares.size(); ++k) {
       if (shares[k] == 0) continue;
       const auto load = FindLoad(fit.sites_in()[static_cast<size_t>(k)]);
-      SolveSideways(*load);
-      sum += shares[k] * load->sideways[static_cast<size_t>(direction)];
+      sum += shares[k] * load->columns[static_cast<size_t>(direction) + 1];
     }
     return sum;
   });
@@ -295,7 +315,7 @@ void NonlinearEstimator::Solver::AddTangential() {
 
 // Takes the state to the loads of the fit. Returns the longest motion of a node.
 double NonlinearEstimator::Solver::Advance() {
-  step = settle;
+  step = settle.col(0);
   struct Force {
     double inward = 0;
     Vec2 sideways = Vec2::Zero();
@@ -306,11 +326,8 @@ double NonlinearEstimator::Solver::Advance() {
     wanted[static_cast<size_t>(at - loads.begin())] = {fit.load_n(k), fit.tangential_n(k)};
   }
   for (size_t i = 0; i < loads.size(); ++i) {
-    step += (wanted[i].inward - loads[i].load_n) * loads[i].motion;
     const Vec2 more = wanted[i].sideways - loads[i].sideways_n;
-    for (size_t d = 0; d < 2; ++d) {
-      if (more[static_cast<int>(d)] != 0) step += more[static_cast<int>(d)] * loads[i].sideways_motion[d];
-    }
+    step.noalias() += loads[i].motions * Vec3(wanted[i].inward - loads[i].load_n, more.x(), more.y());
   }
   double longest = 0;
   for (int node = 0; node < shell.node_count(); ++node) {
@@ -323,7 +340,7 @@ double NonlinearEstimator::Solver::Advance() {
     loads[i].load_n += share * (wanted[i].inward - loads[i].load_n);
     loads[i].sideways_n += share * (wanted[i].sideways - loads[i].sideways_n);
   }
-  std::erase_if(loads, [](const Load& load) { return load.load_n <= 0; });
+  RemoveGone();
   return longest;
 }
 
