@@ -26,37 +26,49 @@ if(TACLINK_FUZZ)
   target_compile_options(taclink_flags INTERFACE -fsanitize=fuzzer-no-link -Wno-error)
 endif()
 
-# Headers that most sources read take half of their compile time: they are compiled once for sensing, once for the other
-# libraries, and once, with GoogleTest, for test programs. Sources include what they need all the same: the presets
-# `tsan` and `fuzz` go without. All but sensing is then compiled with -pthread, for gRPC brings it and one set of headers
-# has one set of flags.
+# Headers that most sources read take half of their compile time. Sets of them are compiled once: `library` for sensing,
+# `thread` for all other libraries, `test` with GoogleTest, `rpc` and `rpc_test` where gRPC is in most sources. Sources
+# include what they need all the same: the presets `tsan` and `fuzz` go without. All but sensing is then compiled with
+# -pthread, for gRPC brings it and one set of headers has one set of flags.
 option(TACLINK_PRECOMPILE "Precompile common headers" OFF)
 set(TACLINK_COMMON_HEADERS <Eigen/Core> <algorithm> <array> <atomic> <chrono> <cmath> <condition_variable> <filesystem>
     <functional> <map> <memory> <mutex> <optional> <set> <span> <sstream> <string> <string_view> <thread> <utility>
     <variant> <vector>)
+set(TACLINK_TEST_HEADERS <gmock/gmock.h> <gtest/gtest.h>)
+set(TACLINK_RPC_HEADERS <grpcpp/grpcpp.h> <taclink/v1/operations.grpc.pb.h> <taclink/v1/recording.grpc.pb.h>
+    <taclink/v1/tactile.grpc.pb.h>)
+
+# taclink_header_set(NAME [PROGRAM] HEADERS ... LINKS ...): programs are compiled another way than libraries.
+function(taclink_header_set set)
+  cmake_parse_arguments(arg "PROGRAM" "" "HEADERS;LINKS" ${ARGN})
+  if(arg_PROGRAM)
+    add_executable(taclink_${set}_headers EXCLUDE_FROM_ALL "${PROJECT_BINARY_DIR}/precompiled.cpp")
+  else()
+    add_library(taclink_${set}_headers OBJECT "${PROJECT_BINARY_DIR}/precompiled.cpp")
+  endif()
+  if(NOT set STREQUAL library)
+    target_compile_options(taclink_${set}_headers PRIVATE -pthread)
+  endif()
+  target_link_libraries(taclink_${set}_headers PRIVATE taclink_flags Eigen3::Eigen ${arg_LINKS})
+  target_precompile_headers(taclink_${set}_headers PRIVATE ${TACLINK_COMMON_HEADERS} ${arg_HEADERS})
+endfunction()
 
 function(taclink_precompiled_headers)
   if(NOT TACLINK_PRECOMPILE)
     return()
   endif()
   file(WRITE "${PROJECT_BINARY_DIR}/precompiled.cpp" "int main() { return 0; }\n")
-  add_library(taclink_library_headers OBJECT "${PROJECT_BINARY_DIR}/precompiled.cpp")
-  target_link_libraries(taclink_library_headers PRIVATE taclink_flags Eigen3::Eigen)
-  target_precompile_headers(taclink_library_headers PRIVATE ${TACLINK_COMMON_HEADERS})
-  add_library(taclink_thread_headers OBJECT "${PROJECT_BINARY_DIR}/precompiled.cpp")
-  target_compile_options(taclink_thread_headers PRIVATE -pthread)
-  target_link_libraries(taclink_thread_headers PRIVATE taclink_flags Eigen3::Eigen)
-  target_precompile_headers(taclink_thread_headers PRIVATE ${TACLINK_COMMON_HEADERS})
+  taclink_header_set(library)
+  taclink_header_set(thread)
+  taclink_header_set(rpc HEADERS ${TACLINK_RPC_HEADERS} LINKS taclink_proto)
   if(TACLINK_BUILD_TESTS)
-    # A program, since programs are compiled another way than libraries.
-    add_executable(taclink_test_headers EXCLUDE_FROM_ALL "${PROJECT_BINARY_DIR}/precompiled.cpp")
-    target_compile_options(taclink_test_headers PRIVATE -pthread)
-    target_link_libraries(taclink_test_headers PRIVATE taclink_flags Eigen3::Eigen GTest::gtest GTest::gmock)
-    target_precompile_headers(taclink_test_headers PRIVATE ${TACLINK_COMMON_HEADERS} <gmock/gmock.h> <gtest/gtest.h>)
+    taclink_header_set(test PROGRAM HEADERS ${TACLINK_TEST_HEADERS} LINKS GTest::gtest GTest::gmock)
+    taclink_header_set(rpc_test PROGRAM HEADERS ${TACLINK_TEST_HEADERS} ${TACLINK_RPC_HEADERS}
+                       LINKS GTest::gtest GTest::gmock taclink_proto)
   endif()
 endfunction()
 
-function(taclink_use_precompiled name headers)
+function(taclink_use_precompiled name set)
   if(TACLINK_PRECOMPILE)
     if(TACLINK_THREADS)
       target_compile_options(${name} PRIVATE -pthread)
@@ -64,19 +76,21 @@ function(taclink_use_precompiled name headers)
     # At -O2 GCC 12 warns of what std::string does inside precompiled headers.
     target_compile_options(${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds -Wno-restrict
                            -Wno-stringop-overflow -Wno-stringop-overread>)
-    target_precompile_headers(${name} REUSE_FROM ${headers})
+    target_precompile_headers(${name} REUSE_FROM taclink_${set}_headers)
   endif()
 endfunction()
 
-# taclink_library(NAME SOURCES ... LINKS ...): one static library a folder; LINKS are public.
+# taclink_library(NAME SOURCES ... LINKS ... [HEADERS set]): one static library a folder; LINKS are public.
 function(taclink_library name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(arg "" "HEADERS" "SOURCES;LINKS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
   target_link_libraries(${name} PUBLIC taclink_flags ${arg_LINKS})
-  if(TACLINK_THREADS)
-    taclink_use_precompiled(${name} taclink_thread_headers)
+  if(arg_HEADERS)
+    taclink_use_precompiled(${name} ${arg_HEADERS})
+  elseif(TACLINK_THREADS)
+    taclink_use_precompiled(${name} thread)
   else()
-    taclink_use_precompiled(${name} taclink_library_headers)
+    taclink_use_precompiled(${name} library)
   endif()
 endfunction()
 
@@ -84,17 +98,20 @@ endfunction()
 add_custom_target(slow_tests)
 add_custom_target(quick_tests)
 
-# taclink_test(NAME SOURCES ... LINKS ... [LABELS ...] [TIMEOUT seconds]): one GoogleTest program, its cases known to
+# taclink_test(NAME SOURCES ... LINKS ... [HEADERS set] [LABELS ...] [TIMEOUT seconds]): one GoogleTest program, its cases known to
 # ctest. Under a sanitizer all of them run in one process, for each start would take longer than most cases.
 function(taclink_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "" "HEADERS;TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  if(NOT arg_HEADERS)
+    set(arg_HEADERS test)
+  endif()
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
   endif()
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE taclink_flags ${arg_LINKS} GTest::gtest_main GTest::gmock)
   target_compile_definitions(${name} PRIVATE TACLINK_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
-  taclink_use_precompiled(${name} taclink_test_headers)
+  taclink_use_precompiled(${name} ${arg_HEADERS})
   if("slow" IN_LIST arg_LABELS)
     add_dependencies(slow_tests ${name})
   else()

@@ -14,7 +14,10 @@ class Lanes {
       : low_{all, all}, high_{all, all} {}  // NOLINT(google-explicit-constructor): a number is one
 
   double operator[](size_t point) const { return point < 2 ? low_[point] : high_[point - 2]; }
-  void Set(size_t point, double value) { (point < 2 ? low_[point] : high_[point - 2]) = value; }
+  void Set(size_t point, double value) {
+    Pair& pair = point < 2 ? low_ : high_;
+    pair[point % 2] = value;
+  }
   void Write(double* to) const {
     for (size_t point = 0; point < 2; ++point) {
       to[point] = low_[point];
