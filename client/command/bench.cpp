@@ -181,33 +181,30 @@ Result<void> Vision(const VisionOptions& options) {
 
 }  // namespace
 
-void AddBench(CLI::App& app, Selected& selected) {
+void AddBench(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<VisionOptions>();
-  CLI::App* bench = app.add_subcommand("bench", "Measure accuracy and time on simulated scenes");
-  bench->require_subcommand(1);
-  CLI::App* vision =
-      bench->add_subcommand("vision", "From two pictures to marker positions, against the truth");
-  vision->add_option("--scenes", options->scenes, "How many")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  vision->add_flag("--quick", options->quick, "One scene of each category and model");
-  vision->add_option("--seed", options->seed, "Of all scenes")->capture_default_str();
-  vision->add_option("--model", options->model, "cylinder, barrel, all, or a YAML file")
-      ->capture_default_str();
-  vision->add_option("--methods", options->methods, "Some of them, comma-separated; half only if named")
-      ->delimiter(',');
-  vision->add_option("--scene", options->scene, "One scene by its name, frame by frame");
-  vision->add_option("--keep", options->keep, "Folder for the pictures of --scene")->needs("--scene");
-  vision->add_option("--json", options->json, "File for all numbers");
-  vision->add_option("--markdown", options->markdown,
-                     "File for the tables, or a page with marks to put them between");
-  vision->add_option("--svg", options->svg, "File for the plot of error against time");
-  vision->add_option("--jobs", options->jobs, "Scenes at the same time")->check(CLI::Range(1, 256));
-  vision->callback([options, &selected] { selected = [options] { return Vision(*options); }; });
-  AddBenchAccuracy(*bench, selected);
-  AddBenchStability(*bench, selected);
-  AddBenchServer(*bench, selected);
-  AddBenchLog(*bench, selected);
+  const Arguments bench = app.AddCommand("bench", "Measure accuracy and time on simulated scenes");
+  bench.RequireCommand();
+  const Arguments vision =
+      bench.AddCommand("vision", "From two pictures to marker positions, against the truth");
+  vision.AddOption("--scenes", options->scenes, "How many").Must(Between(1, 100000)).ShowDefault();
+  vision.AddFlag("--quick", options->quick, "One scene of each category and model");
+  vision.AddOption("--seed", options->seed, "Of all scenes").ShowDefault();
+  vision.AddOption("--model", options->model, "cylinder, barrel, all, or a YAML file").ShowDefault();
+  vision.AddOption("--methods", options->methods, "Some of them, comma-separated; half only if named")
+      .Delimiter(',');
+  vision.AddOption("--scene", options->scene, "One scene by its name, frame by frame");
+  vision.AddOption("--keep", options->keep, "Folder for the pictures of --scene").Needs("--scene");
+  vision.AddOption("--json", options->json, "File for all numbers");
+  vision.AddOption("--markdown", options->markdown,
+                   "File for the tables, or a page with marks to put them between");
+  vision.AddOption("--svg", options->svg, "File for the plot of error against time");
+  vision.AddOption("--jobs", options->jobs, "Scenes at the same time").Must(Between(1, 256));
+  vision.OnChosen([options, &selected] { selected = [options] { return Vision(*options); }; });
+  AddBenchAccuracy(bench, selected);
+  AddBenchStability(bench, selected);
+  AddBenchServer(bench, selected);
+  AddBenchLog(bench, selected);
 }
 
 }  // namespace taclink::command

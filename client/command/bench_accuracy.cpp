@@ -203,50 +203,47 @@ Result<void> Accuracy(const Options& options) {
   return WriteText(options.json, json.dump(1) + "\n");
 }
 
-void AddScenes(CLI::App& command, Options& options) {
-  command.add_option("--model", options.model, "cylinder, barrel, all, or a YAML file")
-      ->capture_default_str();
-  command.add_option("--pressures-kpa", options.pressures_kpa, "Gauge pressures of the scenes")
-      ->delimiter(',')
-      ->check(Within(-5, 5))
-      ->capture_default_str();
-  command.add_option("--kinds", options.kinds, "Some kinds of scenes, comma-separated")->delimiter(',');
-  command.add_flag("--quick", options.quick, "A few scenes at 0 and 1 kPa");
-  command.add_option("--truth-refinement", options.truth_refinement, "Of the truth's mesh")
-      ->check(CLI::Range(1, 8))
-      ->capture_default_str();
-  command.add_option("--truth", options.truth,
-                     "Folder that keeps the truth; delete it when the solver changed");
+void AddScenes(const Arguments& command, Options& options) {
+  command.AddOption("--model", options.model, "cylinder, barrel, all, or a YAML file").ShowDefault();
+  command.AddOption("--pressures-kpa", options.pressures_kpa, "Gauge pressures of the scenes")
+      .Delimiter(',')
+      .Must(Within(-5, 5))
+      .ShowDefault();
+  command.AddOption("--kinds", options.kinds, "Some kinds of scenes, comma-separated").Delimiter(',');
+  command.AddFlag("--quick", options.quick, "A few scenes at 0 and 1 kPa");
+  command.AddOption("--truth-refinement", options.truth_refinement, "Of the truth's mesh")
+      .Must(Between(1, 8))
+      .ShowDefault();
+  command.AddOption("--truth", options.truth,
+                    "Folder that keeps the truth; delete it when the solver changed");
 }
 
 }  // namespace
 
-void AddBenchAccuracy(CLI::App& bench, Selected& selected) {
+void AddBenchAccuracy(const Arguments& bench, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* accuracy = bench.add_subcommand(
+  const Arguments accuracy = bench.AddCommand(
       "accuracy", "From marker displacements to contact forces, against the nonlinear forward solver");
-  AddScenes(*accuracy, *options);
-  accuracy->add_option("--force-models", options->force_models, "Some of them, comma-separated")
-      ->delimiter(',');
-  accuracy->add_option("--refinements", options->refinements, "Elements per interval of the marker grid")
-      ->delimiter(',')
-      ->check(CLI::Range(1, 4))
-      ->capture_default_str();
-  accuracy->add_option("--noise", options->noises_mm, "Standard deviations of the markers, mm; 0: exact")
-      ->delimiter(',')
-      ->check(Within(0, 5))
-      ->capture_default_str();
-  accuracy->add_option("--frames", options->frames, "Noisy frames a scene")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  accuracy->add_option("--jobs", options->jobs, "Paths or force models at the same time")
-      ->check(CLI::Range(1, 256));
-  accuracy->add_option("--seed", options->seed, "Of the noise")->capture_default_str();
-  accuracy->add_option("--markdown", options->markdown,
-                       "File for the tables, or a page with marks to put them between");
-  accuracy->add_option("--svg", options->svg, "File for the plot of error against time");
-  accuracy->add_option("--json", options->json, "File for all numbers");
-  accuracy->callback([options, &selected] { selected = [options] { return Accuracy(*options); }; });
+  AddScenes(accuracy, *options);
+  accuracy.AddOption("--force-models", options->force_models, "Some of them, comma-separated").Delimiter(',');
+  accuracy.AddOption("--refinements", options->refinements, "Elements per interval of the marker grid")
+      .Delimiter(',')
+      .Must(Between(1, 4))
+      .ShowDefault();
+  accuracy.AddOption("--noise", options->noises_mm, "Standard deviations of the markers, mm; 0: exact")
+      .Delimiter(',')
+      .Must(Within(0, 5))
+      .ShowDefault();
+  accuracy.AddOption("--frames", options->frames, "Noisy frames a scene")
+      .Must(Between(1, 1000))
+      .ShowDefault();
+  accuracy.AddOption("--jobs", options->jobs, "Paths or force models at the same time").Must(Between(1, 256));
+  accuracy.AddOption("--seed", options->seed, "Of the noise").ShowDefault();
+  accuracy.AddOption("--markdown", options->markdown,
+                     "File for the tables, or a page with marks to put them between");
+  accuracy.AddOption("--svg", options->svg, "File for the plot of error against time");
+  accuracy.AddOption("--json", options->json, "File for all numbers");
+  accuracy.OnChosen([options, &selected] { selected = [options] { return Accuracy(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -5,8 +5,8 @@
 namespace taclink::command {
 
 /// `taclink bench accuracy`.
-void AddBenchAccuracy(CLI::App& bench, Selected& selected);
+void AddBenchAccuracy(const Arguments& bench, Selected& selected);
 /// `taclink bench stability`.
-void AddBenchStability(CLI::App& bench, Selected& selected);
+void AddBenchStability(const Arguments& bench, Selected& selected);
 
 }  // namespace taclink::command

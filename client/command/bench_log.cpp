@@ -105,24 +105,24 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddBenchLog(CLI::App& bench, Selected& selected) {
+void AddBenchLog(const Arguments& bench, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* log = bench.add_subcommand("log", "Writing, reading and recording of logs");
-  log->add_flag("--quick", options->quick, "One round of each");
-  log->add_option("--megabytes", options->megabytes, "Of messages, for each way of writing")
-      ->check(Within(1, 1e5))
-      ->capture_default_str();
-  log->add_option("--max-gb", options->max_gb, "Size of the largest log that is read")
-      ->check(Within(0, 1000))
-      ->capture_default_str();
-  log->add_option("--seconds", options->seconds, "Length of each recording")
-      ->check(Within(0.5, 3600))
-      ->capture_default_str();
-  log->add_option("--folder", options->folder, "On the disk to measure (default: that of temporary files)");
-  log->add_option("--taclinkd", options->taclinkd, "The server's program (default: beside this one)");
-  log->add_option("--markdown", options->markdown,
-                  "File for the tables, or a page with marks to put them between");
-  log->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+  const Arguments log = bench.AddCommand("log", "Writing, reading and recording of logs");
+  log.AddFlag("--quick", options->quick, "One round of each");
+  log.AddOption("--megabytes", options->megabytes, "Of messages, for each way of writing")
+      .Must(Within(1, 1e5))
+      .ShowDefault();
+  log.AddOption("--max-gb", options->max_gb, "Size of the largest log that is read")
+      .Must(Within(0, 1000))
+      .ShowDefault();
+  log.AddOption("--seconds", options->seconds, "Length of each recording")
+      .Must(Within(0.5, 3600))
+      .ShowDefault();
+  log.AddOption("--folder", options->folder, "On the disk to measure (default: that of temporary files)");
+  log.AddOption("--taclinkd", options->taclinkd, "The server's program (default: beside this one)");
+  log.AddOption("--markdown", options->markdown,
+                "File for the tables, or a page with marks to put them between");
+  log.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

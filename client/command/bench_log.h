@@ -5,6 +5,6 @@
 namespace taclink::command {
 
 /// `taclink bench log`.
-void AddBenchLog(CLI::App& bench, Selected& selected);
+void AddBenchLog(const Arguments& bench, Selected& selected);
 
 }  // namespace taclink::command

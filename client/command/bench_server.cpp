@@ -184,34 +184,32 @@ Result<void> Server(Options options) {
 
 }  // namespace
 
-void AddBenchServer(CLI::App& bench, Selected& selected) {
+void AddBenchServer(const Arguments& bench, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* server = bench.add_subcommand(
+  const Arguments server = bench.AddCommand(
       "server", "A server of its own under links x clients x detail: rates, drops, latency, CPU, memory");
-  server->add_flag("--quick", options->quick, "Fewer rows of 3 s");
-  server->add_option("--seconds", options->seconds, "Of each measurement")
-      ->check(Within(0.5, 600))
-      ->capture_default_str();
-  CLI::Option* links = server->add_option("--links", options->one.links, "One load only: so many links")
-                           ->check(CLI::Range(1, 64));
-  server->add_option("--clients", options->one.clients, "Of the one load")
-      ->check(CLI::Range(1, 1000))
-      ->needs(links)
-      ->capture_default_str();
-  server->add_option("--rate", options->one.rate_hz, "Frames a second of each link of the one load")
-      ->check(Within(1, 1000))
-      ->needs(links)
-      ->capture_default_str();
-  server->add_option("--detail", options->detail, "Of the one load: contacts, geometry or full")
-      ->check(CLI::IsMember({"contacts", "geometry", "full"}))
-      ->needs(links)
-      ->capture_default_str();
-  server->add_option("--taclinkd", options->taclinkd, "The server's program (the one beside this)");
-  server->add_option("--json", options->json, "File for all numbers");
-  server->add_option("--markdown", options->markdown,
-                     "File for the tables, or a page with marks to put them between");
-  server->add_option("--svg", options->svg, "File for the plot of latency against links and clients");
-  server->callback([options, &selected] { selected = [options] { return Server(*options); }; });
+  server.AddFlag("--quick", options->quick, "Fewer rows of 3 s");
+  server.AddOption("--seconds", options->seconds, "Of each measurement").Must(Within(0.5, 600)).ShowDefault();
+  const Option links =
+      server.AddOption("--links", options->one.links, "One load only: so many links").Must(Between(1, 64));
+  server.AddOption("--clients", options->one.clients, "Of the one load")
+      .Must(Between(1, 1000))
+      .Needs(links)
+      .ShowDefault();
+  server.AddOption("--rate", options->one.rate_hz, "Frames a second of each link of the one load")
+      .Must(Within(1, 1000))
+      .Needs(links)
+      .ShowDefault();
+  server.AddOption("--detail", options->detail, "Of the one load: contacts, geometry or full")
+      .Must(OneOf({"contacts", "geometry", "full"}))
+      .Needs(links)
+      .ShowDefault();
+  server.AddOption("--taclinkd", options->taclinkd, "The server's program (the one beside this)");
+  server.AddOption("--json", options->json, "File for all numbers");
+  server.AddOption("--markdown", options->markdown,
+                   "File for the tables, or a page with marks to put them between");
+  server.AddOption("--svg", options->svg, "File for the plot of latency against links and clients");
+  server.OnChosen([options, &selected] { selected = [options] { return Server(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -5,6 +5,6 @@
 namespace taclink::command {
 
 /// `taclink bench server`.
-void AddBenchServer(CLI::App& bench, Selected& selected);
+void AddBenchServer(const Arguments& bench, Selected& selected);
 
 }  // namespace taclink::command

@@ -97,18 +97,16 @@ Result<void> Stability(const Options& options) {
 
 }  // namespace
 
-void AddBenchStability(CLI::App& bench, Selected& selected) {
+void AddBenchStability(const Arguments& bench, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* stability =
-      bench.add_subcommand("stability", "The mechanics at extreme skins, loads and inputs, case by case");
-  stability->add_option("--only", options->only, "Skins whose name holds this");
-  stability->add_option("--refinement", options->refinement, "Of the mesh")
-      ->check(CLI::Range(1, 4))
-      ->capture_default_str();
-  stability->add_option("--jobs", options->jobs, "Cases at the same time")->check(CLI::Range(1, 256));
-  stability->add_option("--markdown", options->markdown,
-                        "File for the tables, or a page with marks to put them between");
-  stability->callback([options, &selected] { selected = [options] { return Stability(*options); }; });
+  const Arguments stability =
+      bench.AddCommand("stability", "The mechanics at extreme skins, loads and inputs, case by case");
+  stability.AddOption("--only", options->only, "Skins whose name holds this");
+  stability.AddOption("--refinement", options->refinement, "Of the mesh").Must(Between(1, 4)).ShowDefault();
+  stability.AddOption("--jobs", options->jobs, "Cases at the same time").Must(Between(1, 256));
+  stability.AddOption("--markdown", options->markdown,
+                      "File for the tables, or a page with marks to put them between");
+  stability.OnChosen([options, &selected] { selected = [options] { return Stability(*options); }; });
 }
 
 }  // namespace taclink::command

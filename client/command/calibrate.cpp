@@ -202,49 +202,48 @@ Result<void> Calibrate(const CalibrateOptions& options) {
 
 }  // namespace
 
-void AddCalibrate(CLI::App& app, Selected& selected) {
+void AddCalibrate(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App* command = app.add_subcommand("calibrate",
-                                         "Camera parameters from pictures of the untouched skin, or of a "
-                                         "server's link as it is now; `material`: "
-                                         "the skin's");
-  command->add_option("--model", options->model, "Link model: a shipped name or a YAML file");
+  const Arguments command = app.AddCommand("calibrate",
+                                           "Camera parameters from pictures of the untouched skin, or of a "
+                                           "server's link as it is now; `material`: "
+                                           "the skin's");
+  command.AddOption("--model", options->model, "Link model: a shipped name or a YAML file");
   command
-      ->add_option(
+      .AddOption(
           "--rest", options->rest,
           "TOP and BOTTOM picture of the untouched, unpressurised skin; again for more pairs, which are "
           "averaged")
-      ->expected(2, 2 * 1000);
-  command->add_option("--lens", options->lens, "Lens model to fit; without, the link model's")
-      ->check(CLI::IsMember({"division", "kannala_brandt"}));
-  command->add_option("-o,--out", options->out, "Calibration file to write (YAML)");
-  CLI::Option* link =
-      command->add_option("--link", options->live.options.link,
-                          "Instead of pictures: a link of a running server, which then uses the result");
-  AddServerOption(*command, options->live.server);
-  command->add_option("--pairs", options->live.options.pairs, "Rest pairs that the server takes")
-      ->check(Within(1, 300))
-      ->capture_default_str()
-      ->needs(link);
+      .Expected(2, 2 * 1000);
+  command.AddOption("--lens", options->lens, "Lens model to fit; without, the link model's")
+      .Must(OneOf({"division", "kannala_brandt"}));
+  command.AddOption("-o,--out", options->out, "Calibration file to write (YAML)");
+  const Option link =
+      command.AddOption("--link", options->live.options.link,
+                        "Instead of pictures: a link of a running server, which then uses the result");
+  AddServerOption(command, options->live.server);
+  command.AddOption("--pairs", options->live.options.pairs, "Rest pairs that the server takes")
+      .Must(Within(1, 300))
+      .ShowDefault()
+      .Needs(link);
   command
-      ->add_flag("--save", options->live.options.save,
-                 "The server writes the link's configured calibration file")
-      ->needs(link);
-  command->add_flag("--force", options->live.options.force, "Even while the link shows contacts")
-      ->needs(link);
-  command->add_option("--residuals", options->residuals,
-                      "Picture of the residuals to write (PNG); without, beside the calibration file");
+      .AddFlag("--save", options->live.options.save,
+               "The server writes the link's configured calibration file")
+      .Needs(link);
+  command.AddFlag("--force", options->live.options.force, "Even while the link shows contacts").Needs(link);
+  command.AddOption("--residuals", options->residuals,
+                    "Picture of the residuals to write (PNG); without, beside the calibration file");
   command
-      ->add_option("--mould-tolerance-mm", options->mould_tolerance_mm,
-                   "How far markers may be off the model, standard deviation per axis")
-      ->check(Within(0.001, 5))
-      ->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON object, with every marker's residuals");
-  AddCalibrateMaterial(*command, selected);
-  command->callback([options, command, &selected] {
-    if (!command->get_subcommands().empty()) return;
+      .AddOption("--mould-tolerance-mm", options->mould_tolerance_mm,
+                 "How far markers may be off the model, standard deviation per axis")
+      .Must(Within(0.001, 5))
+      .ShowDefault();
+  command.AddFlag("--json", options->json, "One JSON object, with every marker's residuals");
+  AddCalibrateMaterial(command, selected);
+  command.OnChosen([options, command, &selected] {
+    if (command.HasCommand()) return;
     if (options->rest.size() % kCameraCount != 0)
-      throw CLI::ValidationError("--rest", "needs a TOP and a BOTTOM picture each time");
+      RefuseOption("--rest", "needs a TOP and a BOTTOM picture each time");
     selected = [options] { return Calibrate(*options); };
   });
 }

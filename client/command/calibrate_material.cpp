@@ -142,56 +142,57 @@ Result<void> CalibrateMaterial(const MaterialOptions& options) {
 
 void CheckWords(const MaterialOptions& options) {
   if (options.inflations.empty() && options.pictures.empty() && options.probe.empty())
-    throw CLI::RequiredError("--inflation, --pictures or --probe");
+    RefuseMissing("--inflation, --pictures or --probe");
   if (options.inflations.size() % kInflationWords != 0)
-    throw CLI::ValidationError("--inflation", "needs a pressure in kPa and a FILE each time");
+    RefuseOption("--inflation", "needs a pressure in kPa and a FILE each time");
   if (options.pictures.size() % kPictureWords != 0)
-    throw CLI::ValidationError("--pictures", "needs a pressure in kPa, a TOP and a BOTTOM picture each time");
+    RefuseOption("--pictures", "needs a pressure in kPa, a TOP and a BOTTOM picture each time");
 }
 
 }  // namespace
 
-void AddCalibrateMaterial(CLI::App& calibrate, Selected& selected) {
+void AddCalibrateMaterial(const Arguments& calibrate, Selected& selected) {
   auto options = std::make_shared<MaterialOptions>();
-  CLI::App* command = calibrate.add_subcommand(
+  const Arguments command = calibrate.AddCommand(
       "material",
       "Young's modulus and law of a skin from inflation at known pressures and from probe forces");
-  command->add_option("--model", options->model, "Link model: a shipped name or a YAML file")->required();
+  command.AddOption("--model", options->model, "Link model: a shipped name or a YAML file").Required();
   command
-      ->add_option("--inflation", options->inflations,
-                   "KPA FILE: gauge pressure and the untouched skin's markers at it (CSV with columns "
-                   "path,ring,ux,uy,uz); again for more pressures")
-      ->expected(static_cast<int>(kInflationWords), 2000);
-  auto* pictures = command
-                       ->add_option("--pictures", options->pictures,
-                                    "KPA TOP BOTTOM: gauge pressure and the untouched skin's pictures at it; "
-                                    "again for more pressures")
-                       ->expected(static_cast<int>(kPictureWords), 3000);
-  auto* rest = command
-                   ->add_option("--rest", options->rest,
-                                "TOP and BOTTOM picture of the untouched skin without pressure")
-                   ->expected(2)
-                   ->needs(pictures);
-  pictures->needs(rest);
-  command->add_option("--calibration", options->calibration, "Camera parameters; without, found from --rest")
-      ->needs(rest);
-  command->add_option("--probe", options->probe,
-                      "CSV of forces on a flat disc pressed against markers: columns ring (or j), depth_mm "
-                      "(from the uninflated radius), pressure_kpa, force_n");
-  command->add_option("--probe-diameter-mm", options->probe_diameter_mm, "Of the disc")
-      ->check(Within(0.1, 1e3))
-      ->capture_default_str();
+      .AddOption("--inflation", options->inflations,
+                 "KPA FILE: gauge pressure and the untouched skin's markers at it (CSV with columns "
+                 "path,ring,ux,uy,uz); again for more pressures")
+      .Expected(static_cast<int>(kInflationWords), 2000);
+  const Option pictures =
+      command
+          .AddOption("--pictures", options->pictures,
+                     "KPA TOP BOTTOM: gauge pressure and the untouched skin's pictures at it; "
+                     "again for more pressures")
+          .Expected(static_cast<int>(kPictureWords), 3000);
+  const Option rest =
+      command
+          .AddOption("--rest", options->rest, "TOP and BOTTOM picture of the untouched skin without pressure")
+          .Expected(2)
+          .Needs(pictures);
+  pictures.Needs(rest);
+  command.AddOption("--calibration", options->calibration, "Camera parameters; without, found from --rest")
+      .Needs(rest);
+  command.AddOption("--probe", options->probe,
+                    "CSV of forces on a flat disc pressed against markers: columns ring (or j), depth_mm "
+                    "(from the uninflated radius), pressure_kpa, force_n");
+  command.AddOption("--probe-diameter-mm", options->probe_diameter_mm, "Of the disc")
+      .Must(Within(0.1, 1e3))
+      .ShowDefault();
   command
-      ->add_option("--sigma-mm", options->sigma_mm,
-                   "With --inflation: the markers' standard deviation in x and y; z: 3 times")
-      ->check(Within(1e-4, 10))
-      ->capture_default_str();
-  command->add_option("--law", options->law, "The law to fit; both are compared")
-      ->check(CLI::IsMember({"both", "saint_venant_kirchhoff", "neo_hookean"}))
-      ->capture_default_str();
-  command->add_option("-o,--out", options->out, "Model file to write: --model's with the new material");
-  command->add_flag("--json", options->json, "One JSON object, with every record's residuals");
-  command->callback([options, &selected] {
+      .AddOption("--sigma-mm", options->sigma_mm,
+                 "With --inflation: the markers' standard deviation in x and y; z: 3 times")
+      .Must(Within(1e-4, 10))
+      .ShowDefault();
+  command.AddOption("--law", options->law, "The law to fit; both are compared")
+      .Must(OneOf({"both", "saint_venant_kirchhoff", "neo_hookean"}))
+      .ShowDefault();
+  command.AddOption("-o,--out", options->out, "Model file to write: --model's with the new material");
+  command.AddFlag("--json", options->json, "One JSON object, with every record's residuals");
+  command.OnChosen([options, &selected] {
     CheckWords(*options);
     selected = [options] { return CalibrateMaterial(*options); };
   });

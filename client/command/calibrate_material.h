@@ -5,6 +5,6 @@
 namespace taclink::command {
 
 /// Registers `taclink calibrate material` under `calibrate`.
-void AddCalibrateMaterial(CLI::App& calibrate, Selected& selected);
+void AddCalibrateMaterial(const Arguments& calibrate, Selected& selected);
 
 }  // namespace taclink::command

@@ -68,12 +68,12 @@ void PrintJson(const std::vector<FoundCamera>& cameras) {
 
 }  // namespace
 
-void AddCameras(CLI::App& app, Selected& selected) {
+void AddCameras(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("cameras", "List this machine's cameras, as the configuration can name them");
-  command->add_flag("--json", options->json, "One JSON list");
-  command->callback([options, &selected] {
+  const Arguments command =
+      app.AddCommand("cameras", "List this machine's cameras, as the configuration can name them");
+  command.AddFlag("--json", options->json, "One JSON list");
+  command.OnChosen([options, &selected] {
     selected = [options]() -> Result<void> {
       const auto cameras = ListCameras();
       options->json ? PrintJson(cameras) : PrintText(cameras);

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
 
+#include "client/command/arguments.h"
 #include "sensing/core/result.h"
 
 namespace taclink::command {
@@ -11,35 +11,32 @@ namespace taclink::command {
 /// Set by the subcommand that was chosen; main runs it and prints its error.
 using Selected = std::function<Result<void>()>;
 
-/// A number from `min` to `max`; CLI11's own check lets "nan" through.
-CLI::Validator Within(double min, double max);
-
 /// Each registers one subcommand with its options.
-void AddCameras(CLI::App& app, Selected& selected);
-void AddList(CLI::App& app, Selected& selected);
-void AddLog(CLI::App& app, Selected& selected);
-void AddRecord(CLI::App& app, Selected& selected);
-void AddRestart(CLI::App& app, Selected& selected);
-void AddWatch(CLI::App& app, Selected& selected);
-void AddDetect(CLI::App& app, Selected& selected);
-void AddSolve(CLI::App& app, Selected& selected);
-void AddCalibrate(CLI::App& app, Selected& selected);
-void AddSimulate(CLI::App& app, Selected& selected);
-void AddSkin(CLI::App& app, Selected& selected);
-void AddBench(CLI::App& app, Selected& selected);
-void AddContacts(CLI::App& app, Selected& selected);
-void AddJoints(CLI::App& app, Selected& selected);
-void AddShow(CLI::App& app, Selected& selected);
-void AddToken(CLI::App& app, Selected& selected);
-void AddTare(CLI::App& app, Selected& selected);
-void AddEvents(CLI::App& app, Selected& selected);
-void AddThresholds(CLI::App& app, Selected& selected);
+void AddCameras(const Arguments& app, Selected& selected);
+void AddList(const Arguments& app, Selected& selected);
+void AddLog(const Arguments& app, Selected& selected);
+void AddRecord(const Arguments& app, Selected& selected);
+void AddRestart(const Arguments& app, Selected& selected);
+void AddWatch(const Arguments& app, Selected& selected);
+void AddDetect(const Arguments& app, Selected& selected);
+void AddSolve(const Arguments& app, Selected& selected);
+void AddCalibrate(const Arguments& app, Selected& selected);
+void AddSimulate(const Arguments& app, Selected& selected);
+void AddSkin(const Arguments& app, Selected& selected);
+void AddBench(const Arguments& app, Selected& selected);
+void AddContacts(const Arguments& app, Selected& selected);
+void AddJoints(const Arguments& app, Selected& selected);
+void AddShow(const Arguments& app, Selected& selected);
+void AddToken(const Arguments& app, Selected& selected);
+void AddTare(const Arguments& app, Selected& selected);
+void AddEvents(const Arguments& app, Selected& selected);
+void AddThresholds(const Arguments& app, Selected& selected);
 
 /// Likewise, below `record`.
-void AddPlay(CLI::App& record, Selected& selected);
+void AddPlay(const Arguments& record, Selected& selected);
 
 /// `--server`, or the environment variable TACLINK_SERVER, or the local default; and the options that
 /// ConnectTo (connect.h) takes beside it.
-void AddServerOption(CLI::App& command, std::string& address);
+void AddServerOption(const Arguments& command, std::string& address);
 
 }  // namespace taclink::command

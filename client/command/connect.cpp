@@ -13,23 +13,22 @@ client::Credentials& ChosenCredentials() {
 
 }  // namespace
 
-void AddServerOption(CLI::App& command, std::string& address) {
-  command.add_option("--server", address, "Address of the server, host:port")
-      ->envname("TACLINK_SERVER")
-      ->check([](const std::string& text) {
+void AddServerOption(const Arguments& command, std::string& address) {
+  command.AddOption("--server", address, "Address of the server, host:port")
+      .FromEnvironment("TACLINK_SERVER")
+      .Must(Check([](const std::string& text) {
         return text.empty() ? std::string("must be host:port") : std::string();
-      })
-      ->capture_default_str();
+      }))
+      .ShowDefault();
   client::Credentials& credentials = ChosenCredentials();
-  command.add_option("--token", credentials.token, "Token that the server knows (better in TACLINK_TOKEN)")
-      ->envname("TACLINK_TOKEN");
-  command
-      .add_option("--tls-ca", credentials.ca_file, "Certificates that the server's must be signed by: TLS")
-      ->envname("TACLINK_TLS_CA");
-  command.add_option("--tls-certificate", credentials.certificate_file, "This client's own certificate")
-      ->envname("TACLINK_TLS_CERTIFICATE");
-  command.add_option("--tls-key", credentials.key_file, "The key of this client's certificate")
-      ->envname("TACLINK_TLS_KEY");
+  command.AddOption("--token", credentials.token, "Token that the server knows (better in TACLINK_TOKEN)")
+      .FromEnvironment("TACLINK_TOKEN");
+  command.AddOption("--tls-ca", credentials.ca_file, "Certificates that the server's must be signed by: TLS")
+      .FromEnvironment("TACLINK_TLS_CA");
+  command.AddOption("--tls-certificate", credentials.certificate_file, "This client's own certificate")
+      .FromEnvironment("TACLINK_TLS_CERTIFICATE");
+  command.AddOption("--tls-key", credentials.key_file, "The key of this client's certificate")
+      .FromEnvironment("TACLINK_TLS_KEY");
 }
 
 Result<client::Client> ConnectTo(const std::string& server) {

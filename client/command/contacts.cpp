@@ -59,17 +59,17 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddContacts(CLI::App& app, Selected& selected) {
+void AddContacts(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("contacts", "Show all contacts of the arm in its base frame, and joint torques");
-  AddServerOption(*command, options->server);
-  command->add_option("--rate", options->rate_hz, "At most so many a second")
-      ->check(Within(0.001, 1000))
-      ->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON object a line");
-  command->add_option("--count", options->count, "End after so many")->check(CLI::PositiveNumber);
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+  const Arguments command =
+      app.AddCommand("contacts", "Show all contacts of the arm in its base frame, and joint torques");
+  AddServerOption(command, options->server);
+  command.AddOption("--rate", options->rate_hz, "At most so many a second")
+      .Must(Within(0.001, 1000))
+      .ShowDefault();
+  command.AddFlag("--json", options->json, "One JSON object a line");
+  command.AddOption("--count", options->count, "End after so many").Must(Positive());
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -160,19 +160,19 @@ Result<void> Detect(const DetectOptions& options) {
 
 }  // namespace
 
-void AddDetect(CLI::App& app, Selected& selected) {
+void AddDetect(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<DetectOptions>();
-  CLI::App* command = app.add_subcommand("detect", "Find markers in any picture");
-  command->add_option("picture", options->picture, "PNG or JPEG")->required();
-  command->add_option("--draw", options->draw, "Write the picture with the markers drawn into it (PNG)");
-  command->add_option("--model", options->model,
-                      "Link model: a shipped one's name or a file. Only markers of its grid are kept, with "
-                      "their path and ring; path 1 is the one nearest to where the model's rig sees it");
-  command->add_option("--camera", options->camera, "Whose picture it is, with --model")
-      ->check(CLI::IsMember({"auto", "top", "bottom"}))
-      ->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON object, pixels");
-  command->callback([options, &selected] { selected = [options] { return Detect(*options); }; });
+  const Arguments command = app.AddCommand("detect", "Find markers in any picture");
+  command.AddOption("picture", options->picture, "PNG or JPEG").Required();
+  command.AddOption("--draw", options->draw, "Write the picture with the markers drawn into it (PNG)");
+  command.AddOption("--model", options->model,
+                    "Link model: a shipped one's name or a file. Only markers of its grid are kept, with "
+                    "their path and ring; path 1 is the one nearest to where the model's rig sees it");
+  command.AddOption("--camera", options->camera, "Whose picture it is, with --model")
+      .Must(OneOf({"auto", "top", "bottom"}))
+      .ShowDefault();
+  command.AddFlag("--json", options->json, "One JSON object, pixels");
+  command.OnChosen([options, &selected] { selected = [options] { return Detect(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -77,28 +77,27 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddEvents(CLI::App& app, Selected& selected) {
+void AddEvents(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
+  const Arguments command = app.AddCommand(
       "events", "Show what happens to a server's links: contacts, force levels, status, tares, drift");
-  AddServerOption(*command, options->server);
-  command->add_option("--links", options->stream.links, "Names of links, separated by commas (all)")
-      ->delimiter(',');
+  AddServerOption(command, options->server);
+  command.AddOption("--links", options->stream.links, "Names of links, separated by commas (all)")
+      .Delimiter(',');
   const auto check = [](const std::string& name) {
     return client::EventKindOf(name) ? std::string() : "'" + name + "' is no kind of event";
   };
   command
-      ->add_option("--kinds", options->kinds,
-                   "Kinds of events, separated by commas (all): contact_begin, ...")
-      ->delimiter(',')
-      ->check(check);
-  CLI::Option* run =
-      command->add_option("--run", options->run_id, "With --after: the run that the number belongs to");
-  command->add_option("--after", options->after, "Resume after this event's number")->needs(run);
-  command->add_flag("--all", options->all, "Begin with all that the server still has");
-  command->add_flag("--json", options->json, "One JSON object a line for each event");
-  command->add_option("--count", options->count, "End after so many events")->check(CLI::PositiveNumber);
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+      .AddOption("--kinds", options->kinds, "Kinds of events, separated by commas (all): contact_begin, ...")
+      .Delimiter(',')
+      .Must(Check(check));
+  const Option run =
+      command.AddOption("--run", options->run_id, "With --after: the run that the number belongs to");
+  command.AddOption("--after", options->after, "Resume after this event's number").Needs(run);
+  command.AddFlag("--all", options->all, "Begin with all that the server still has");
+  command.AddFlag("--json", options->json, "One JSON object a line for each event");
+  command.AddOption("--count", options->count, "End after so many events").Must(Positive());
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -84,20 +84,20 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddJoints(CLI::App& app, Selected& selected) {
+void AddJoints(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("joints", "Tell a server where the arm's joints are");
-  AddServerOption(*command, options->server);
+  const Arguments command = app.AddCommand("joints", "Tell a server where the arm's joints are");
+  AddServerOption(command, options->server);
   command
-      ->add_option(
+      .AddOption(
           "file", options->file,
           "Lines of joint positions, '-' for the standard input: CSV with a first line "
           "'time_s,JOINT,...', or JSON {\"time_s\": 0.1, \"positions\": {\"JOINT\": 0.5}}, or \"names\" and "
           "\"positions\" as two lists. rad, m; "
           "without time_s each line is of the moment it is read")
-      ->required();
-  command->add_flag("--loop", options->loop, "Begin again at the file's end");
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+      .Required();
+  command.AddFlag("--loop", options->loop, "Begin again at the file's end");
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

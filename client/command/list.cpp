@@ -109,12 +109,12 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddList(CLI::App& app, Selected& selected) {
+void AddList(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("list", "Show the links of a server");
-  AddServerOption(*command, options->server);
-  command->add_flag("--json", options->json, "One JSON object");
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+  const Arguments command = app.AddCommand("list", "Show the links of a server");
+  AddServerOption(command, options->server);
+  command.AddFlag("--json", options->json, "One JSON object");
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -145,34 +145,35 @@ Result<void> Recover(const Options& options) {
   return {};
 }
 
-CLI::App* AddOne(CLI::App& log, const std::string& name, const std::string& what,
+Arguments AddOne(const Arguments& log, const std::string& name, const std::string& what,
                  const std::shared_ptr<Options>& options, Selected& selected,
                  Result<void> (*run)(const Options&)) {
-  CLI::App* command = log.add_subcommand(name, what);
-  command->add_option("file", options->file, "The log, MCAP")->required();
-  command->callback([options, run, &selected] { selected = [options, run] { return run(*options); }; });
+  const Arguments command = log.AddCommand(name, what);
+  command.AddOption("file", options->file, "The log, MCAP").Required();
+  command.OnChosen([options, run, &selected] { selected = [options, run] { return run(*options); }; });
   return command;
 }
 
 }  // namespace
 
-void AddLog(CLI::App& app, Selected& selected) {
-  CLI::App* log = app.add_subcommand("log", "Look into logs, check, mend, cut, merge, export and draw them");
-  log->require_subcommand(1);
+void AddLog(const Arguments& app, Selected& selected) {
+  const Arguments log =
+      app.AddCommand("log", "Look into logs, check, mend, cut, merge, export and draw them");
+  log.RequireCommand();
   auto options = std::make_shared<Options>();
-  AddOne(*log, "info", "What a log holds", options, selected, Info)
-      ->add_flag("--json", options->json, "One JSON object");
-  AddOne(*log, "check", "Whether a log is whole: every record, index and checksum", options, selected,
+  AddOne(log, "info", "What a log holds", options, selected, Info)
+      .AddFlag("--json", options->json, "One JSON object");
+  AddOne(log, "check", "Whether a log is whole: every record, index and checksum", options, selected,
          CheckLog);
-  AddOne(*log, "recover", "Write all that is intact in a damaged or unfinished log to a new one", options,
+  AddOne(log, "recover", "Write all that is intact in a damaged or unfinished log to a new one", options,
          selected, Recover)
-      ->add_option("-o,--output", options->output, "The new log")
-      ->required();
-  AddLogCut(*log, selected);
-  AddLogMerge(*log, selected);
-  AddLogExport(*log, selected);
-  AddLogPlot(*log, selected);
-  AddLogSolve(*log, selected);
+      .AddOption("-o,--output", options->output, "The new log")
+      .Required();
+  AddLogCut(log, selected);
+  AddLogMerge(log, selected);
+  AddLogExport(log, selected);
+  AddLogPlot(log, selected);
+  AddLogSolve(log, selected);
 }
 
 }  // namespace taclink::command

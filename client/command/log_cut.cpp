@@ -113,17 +113,17 @@ Result<void> Cut(const Options& options) {
 
 }  // namespace
 
-void AddLogCut(CLI::App& log, Selected& selected) {
+void AddLogCut(const Arguments& log, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* cut = log.add_subcommand("cut", "Write a part of a log to a new one, message for message");
-  cut->add_option("file", options->input, "The log, MCAP")->required();
-  cut->add_option("-o,--output", options->output, "The new log")->required();
-  AddPartOptions(*cut, options->part);
-  cut->add_flag("--without-pictures", options->without_pictures, "Leave the cameras' pictures out");
-  cut->add_option("--only-topics", options->topics,
-                  "Leave all other topics out; as 'taclink log info' names them");
-  AddCompressionOption(*cut, options->compression);
-  cut->callback([options, &selected] { selected = [options] { return Cut(*options); }; });
+  const Arguments cut = log.AddCommand("cut", "Write a part of a log to a new one, message for message");
+  cut.AddOption("file", options->input, "The log, MCAP").Required();
+  cut.AddOption("-o,--output", options->output, "The new log").Required();
+  AddPartOptions(cut, options->part);
+  cut.AddFlag("--without-pictures", options->without_pictures, "Leave the cameras' pictures out");
+  cut.AddOption("--only-topics", options->topics,
+                "Leave all other topics out; as 'taclink log info' names them");
+  AddCompressionOption(cut, options->compression);
+  cut.OnChosen([options, &selected] { selected = [options] { return Cut(*options); }; });
 }
 
 }  // namespace taclink::command

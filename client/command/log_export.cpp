@@ -39,20 +39,20 @@ Result<void> Export(const Options& options) {
 
 }  // namespace
 
-void AddLogExport(CLI::App& log, Selected& selected) {
+void AddLogExport(const Arguments& log, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = log.add_subcommand("export", "Write a log's content for other programs; SI units");
-  command->add_option("file", options->input, "The log, MCAP")->required();
-  command->add_option("-o,--output", options->folder, "Folder for the new files")->required();
+  const Arguments command = log.AddCommand("export", "Write a log's content for other programs; SI units");
+  command.AddOption("file", options->input, "The log, MCAP").Required();
+  command.AddOption("-o,--output", options->folder, "Folder for the new files").Required();
   command
-      ->add_option("--format", options->format,
-                   "csv: tables of contacts, frames, events and joints; jsonl: every message; npz: arrays of "
-                   "each link")
-      ->required()
-      ->check(CLI::IsMember({"csv", "jsonl", "npz"}));
-  AddPartOptions(*command, options->part);
-  command->add_flag("--with-pictures", options->with_pictures, "jsonl: also the pictures' bytes, in base64");
-  command->callback([options, &selected] { selected = [options] { return Export(*options); }; });
+      .AddOption("--format", options->format,
+                 "csv: tables of contacts, frames, events and joints; jsonl: every message; npz: arrays of "
+                 "each link")
+      .Required()
+      .Must(OneOf({"csv", "jsonl", "npz"}));
+  AddPartOptions(command, options->part);
+  command.AddFlag("--with-pictures", options->with_pictures, "jsonl: also the pictures' bytes, in base64");
+  command.OnChosen([options, &selected] { selected = [options] { return Export(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -184,13 +184,13 @@ Result<void> Merge(const Options& options) {
 
 }  // namespace
 
-void AddLogMerge(CLI::App& log, Selected& selected) {
+void AddLogMerge(const Arguments& log, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* merge = log.add_subcommand("merge", "Write several logs to one, in order of log time");
-  merge->add_option("files", options->inputs, "The logs, MCAP")->required();
-  merge->add_option("-o,--output", options->output, "The new log")->required();
-  AddCompressionOption(*merge, options->compression);
-  merge->callback([options, &selected] { selected = [options] { return Merge(*options); }; });
+  const Arguments merge = log.AddCommand("merge", "Write several logs to one, in order of log time");
+  merge.AddOption("files", options->inputs, "The logs, MCAP").Required();
+  merge.AddOption("-o,--output", options->output, "The new log").Required();
+  AddCompressionOption(merge, options->compression);
+  merge.OnChosen([options, &selected] { selected = [options] { return Merge(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -79,13 +79,13 @@ Result<void> Plot(const Options& options) {
 
 }  // namespace
 
-void AddLogPlot(CLI::App& log, Selected& selected) {
+void AddLogPlot(const Arguments& log, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* plot = log.add_subcommand("plot", "Draw the forces of a log over time, a panel for each link");
-  plot->add_option("file", options->input, "The log, MCAP")->required();
-  plot->add_option("-o,--output", options->output, "The new SVG file")->required();
-  AddPartOptions(*plot, options->part);
-  plot->callback([options, &selected] { selected = [options] { return Plot(*options); }; });
+  const Arguments plot = log.AddCommand("plot", "Draw the forces of a log over time, a panel for each link");
+  plot.AddOption("file", options->input, "The log, MCAP").Required();
+  plot.AddOption("-o,--output", options->output, "The new SVG file").Required();
+  AddPartOptions(plot, options->part);
+  plot.OnChosen([options, &selected] { selected = [options] { return Plot(*options); }; });
 }
 
 }  // namespace taclink::command

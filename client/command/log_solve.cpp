@@ -180,37 +180,36 @@ Result<void> Solve(const Options& options) {
 
 }  // namespace
 
-void AddLogSolve(CLI::App& log, Selected& selected) {
+void AddLogSolve(const Arguments& log, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = log.add_subcommand(
+  const Arguments command = log.AddCommand(
       "solve", "Solve a log's pictures again, as they were or in another way, and say what changed");
-  command->add_option("file", options->solve.input, "The log, MCAP")->required();
-  command->add_option("-o,--output", options->solve.output, "The new log")->required();
-  command->add_option("--link", options->solve.links,
-                      "Names of links (default: all); others stay as they are");
+  command.AddOption("file", options->solve.input, "The log, MCAP").Required();
+  command.AddOption("-o,--output", options->solve.output, "The new log").Required();
+  command.AddOption("--link", options->solve.links, "Names of links (default: all); others stay as they are");
   command
-      ->add_option("--force-model", options->force_model,
-                   "In place of the recorded one; auto: cheapest that is good enough")
-      ->check(CLI::IsMember({"auto", "literal", "linear", "pressurised", "nonlinear"}));
+      .AddOption("--force-model", options->force_model,
+                 "In place of the recorded one; auto: cheapest that is good enough")
+      .Must(OneOf({"auto", "literal", "linear", "pressurised", "nonlinear"}));
   command
-      ->add_option("--force-refinement", options->force_refinement,
-                   "Elements per interval of the marker grid; 0: auto")
-      ->check(CLI::Range(0, 3));
+      .AddOption("--force-refinement", options->force_refinement,
+                 "Elements per interval of the marker grid; 0: auto")
+      .Must(Between(0, 3));
   // One value each time: what follows may be the log's name.
   command
-      ->add_option("--model", options->solve.models,
-                   "Link model in place of the recorded one: FILE or LINK=FILE; may be repeated")
-      ->allow_extra_args(false);
+      .AddOption("--model", options->solve.models,
+                 "Link model in place of the recorded one: FILE or LINK=FILE; may be repeated")
+      .OneValueEach();
   command
-      ->add_option("--calibration", options->solve.calibrations,
-                   "Cameras in place of those recorded, or found in the first pictures: FILE or LINK=FILE; "
-                   "may be repeated")
-      ->allow_extra_args(false);
-  command->add_option("--jobs", options->solve.jobs, "Links solved at the same time (default: one a CPU)")
-      ->check(CLI::Range(1, 1024));
-  command->add_flag("--without-pictures", options->without_pictures, "Leave the pictures out of the new log");
-  command->add_flag("--json", options->json, "One JSON object");
-  command->callback([options, &selected] { selected = [options] { return Solve(*options); }; });
+      .AddOption("--calibration", options->solve.calibrations,
+                 "Cameras in place of those recorded, or found in the first pictures: FILE or LINK=FILE; "
+                 "may be repeated")
+      .OneValueEach();
+  command.AddOption("--jobs", options->solve.jobs, "Links solved at the same time (default: one a CPU)")
+      .Must(Between(1, 1024));
+  command.AddFlag("--without-pictures", options->without_pictures, "Leave the pictures out of the new log");
+  command.AddFlag("--json", options->json, "One JSON object");
+  command.OnChosen([options, &selected] { selected = [options] { return Solve(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -156,11 +156,11 @@ std::optional<mcap::Message> LogMessages::Next() {
   }
 }
 
-void AddPartOptions(CLI::App& command, PartOptions& options) {
+void AddPartOptions(const Arguments& command, PartOptions& options) {
   constexpr const char* kForm = "seconds from the log's start, or 2026-11-22T12:01:37.250Z";
-  command.add_option("--from", options.from, std::string("Log time of the first message: ") + kForm);
-  command.add_option("--to", options.to, "Log time that all messages are before; as --from");
-  command.add_option("--link", options.links, "Names of links (default: all)");
+  command.AddOption("--from", options.from, std::string("Log time of the first message: ") + kForm);
+  command.AddOption("--to", options.to, "Log time that all messages are before; as --from");
+  command.AddOption("--link", options.links, "Names of links (default: all)");
 }
 
 Result<LogPart> ChoosePart(const LogSource& source, const PartOptions& options) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -8,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "client/command/arguments.h"
 #include "wire/mcap/cursor.h"
 #include "wire/mcap/reader.h"
 
@@ -62,7 +62,7 @@ struct PartOptions {
   std::string from, to;            ///< as ParseLogTime; empty: the log's ends
   std::vector<std::string> links;  ///< empty: all
 };
-void AddPartOptions(CLI::App& command, PartOptions& options);
+void AddPartOptions(const Arguments& command, PartOptions& options);
 
 struct LogPart {
   uint64_t start_ns = 0;         ///< the first log time

@@ -1,3 +1,4 @@
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -18,44 +19,31 @@ int Complain(std::string message, int code) {
 
 }  // namespace
 
-namespace taclink::command {
-
-CLI::Validator Within(double min, double max) {
-  return {[=](std::string& text) -> std::string {
-            double value = 0;
-            if (CLI::detail::lexical_cast(text, value) && value >= min && value <= max) return {};
-            return "'" + text + "' is not a number from " + std::to_string(min) + " to " +
-                   std::to_string(max);
-          },
-          "NUMBER"};
-}
-
-}  // namespace taclink::command
-
 int main(int argc, char** argv) {
   CLI::App app("Looks at soft tactile links: live from a server, or offline from files", "taclink");
   app.set_version_flag("--version", std::string(TACLINK_VERSION));
   app.require_subcommand(1);
+  const taclink::command::Arguments arguments(app);
   taclink::command::Selected selected;
-  taclink::command::AddCameras(app, selected);
-  taclink::command::AddList(app, selected);
-  taclink::command::AddLog(app, selected);
-  taclink::command::AddRecord(app, selected);
-  taclink::command::AddRestart(app, selected);
-  taclink::command::AddWatch(app, selected);
-  taclink::command::AddDetect(app, selected);
-  taclink::command::AddSolve(app, selected);
-  taclink::command::AddCalibrate(app, selected);
-  taclink::command::AddSimulate(app, selected);
-  taclink::command::AddSkin(app, selected);
-  taclink::command::AddBench(app, selected);
-  taclink::command::AddContacts(app, selected);
-  taclink::command::AddJoints(app, selected);
-  taclink::command::AddShow(app, selected);
-  taclink::command::AddToken(app, selected);
-  taclink::command::AddTare(app, selected);
-  taclink::command::AddEvents(app, selected);
-  taclink::command::AddThresholds(app, selected);
+  taclink::command::AddCameras(arguments, selected);
+  taclink::command::AddList(arguments, selected);
+  taclink::command::AddLog(arguments, selected);
+  taclink::command::AddRecord(arguments, selected);
+  taclink::command::AddRestart(arguments, selected);
+  taclink::command::AddWatch(arguments, selected);
+  taclink::command::AddDetect(arguments, selected);
+  taclink::command::AddSolve(arguments, selected);
+  taclink::command::AddCalibrate(arguments, selected);
+  taclink::command::AddSimulate(arguments, selected);
+  taclink::command::AddSkin(arguments, selected);
+  taclink::command::AddBench(arguments, selected);
+  taclink::command::AddContacts(arguments, selected);
+  taclink::command::AddJoints(arguments, selected);
+  taclink::command::AddShow(arguments, selected);
+  taclink::command::AddToken(arguments, selected);
+  taclink::command::AddTare(arguments, selected);
+  taclink::command::AddEvents(arguments, selected);
+  taclink::command::AddThresholds(arguments, selected);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

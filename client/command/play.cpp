@@ -137,31 +137,31 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddPlay(CLI::App& record, Selected& selected) {
+void AddPlay(const Arguments& record, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = record.add_subcommand("play", "Show a log of the server at its pace, as 'watch' does");
-  AddServerOption(*command, options->server);
-  command->add_option("log", options->replay.log, "Name of the log, as 'list' shows it")->required();
-  command->add_option("--link", options->replay.links, "Names of links (default: all)");
-  command->add_option("--detail", options->detail, "contacts, geometry or full")
-      ->check(CLI::IsMember({"contacts", "geometry", "full"}))
-      ->capture_default_str();
+  const Arguments command =
+      record.AddCommand("play", "Show a log of the server at its pace, as 'watch' does");
+  AddServerOption(command, options->server);
+  command.AddOption("log", options->replay.log, "Name of the log, as 'list' shows it").Required();
+  command.AddOption("--link", options->replay.links, "Names of links (default: all)");
+  command.AddOption("--detail", options->detail, "contacts, geometry or full")
+      .Must(OneOf({"contacts", "geometry", "full"}))
+      .ShowDefault();
   const auto check = [](const std::string& text) {
-    const std::string outside = Within(kSlowest, kFastest)(text);
+    const std::string outside = Within(kSlowest, kFastest).Problem(text);
     return text == "0" ? std::string() : outside;
   };
-  command
-      ->add_option("--speed", options->replay.speed, "0.1 to 100 times as it happened; 0: as fast as it can")
-      ->check(check)
-      ->capture_default_str();
-  command->add_option("--from", options->from_s, "Begin so many seconds after the log's first message")
-      ->check(Within(0, 1e9));
-  command->add_option("--to", options->to_s, "End there; 0: at its last one")->check(Within(0, 1e9));
-  command->add_flag("--loop", options->replay.loop, "Begin anew at the end");
-  command->add_flag("--events", options->events, "Also events, as 'events' prints them");
-  command->add_flag("--contacts", options->contacts, "Also the arm's contacts, as 'contacts' prints them");
-  command->add_flag("--json", options->json, "One JSON object a line");
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.AddOption("--speed", options->replay.speed, "0.1 to 100 times as it happened; 0: as fast as it can")
+      .Must(Check(check))
+      .ShowDefault();
+  command.AddOption("--from", options->from_s, "Begin so many seconds after the log's first message")
+      .Must(Within(0, 1e9));
+  command.AddOption("--to", options->to_s, "End there; 0: at its last one").Must(Within(0, 1e9));
+  command.AddFlag("--loop", options->replay.loop, "Begin anew at the end");
+  command.AddFlag("--events", options->events, "Also events, as 'events' prints them");
+  command.AddFlag("--contacts", options->contacts, "Also the arm's contacts, as 'contacts' prints them");
+  command.AddFlag("--json", options->json, "One JSON object a line");
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

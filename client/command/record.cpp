@@ -192,43 +192,45 @@ Result<void> Delete(const Options& options) {
   return recordings->Delete(options.log);
 }
 
-CLI::App* AddOne(CLI::App& record, const char* name, const char* what,
+Arguments AddOne(const Arguments& record, const char* name, const char* what,
                  const std::shared_ptr<Options>& options, Selected& selected,
                  Result<void> (*run)(const Options&)) {
-  CLI::App* command = record.add_subcommand(name, what);
-  AddServerOption(*command, options->server);
-  command->callback([options, run, &selected] { selected = [options, run] { return run(*options); }; });
+  const Arguments command = record.AddCommand(name, what);
+  AddServerOption(command, options->server);
+  command.OnChosen([options, run, &selected] { selected = [options, run] { return run(*options); }; });
   return command;
 }
 
 }  // namespace
 
-void AddRecord(CLI::App& app, Selected& selected) {
-  CLI::App* record = app.add_subcommand("record", "Record what a server's links feel, on the server");
-  record->require_subcommand(1);
+void AddRecord(const Arguments& app, Selected& selected) {
+  const Arguments record = app.AddCommand("record", "Record what a server's links feel, on the server");
+  record.RequireCommand();
   auto options = std::make_shared<Options>();
-  CLI::App* start = AddOne(*record, "start", "Begin a recording", options, selected, Start);
-  start->add_option("--name", options->recording.name, "Part of the logs' names (default: the arm's name)");
-  start->add_option("--link", options->recording.links, "Names of links (default: all)");
-  start->add_flag("--pictures", options->recording.pictures, "Also the cameras' pictures, as they sent them");
-  start->add_option("--compression", options->compression)
-      ->check(CLI::IsMember({"configured", "none", "zstd", "lz4"}));
-  start->add_option("--note", options->recording.note, "Text kept in the logs");
+  const Arguments start = AddOne(record, "start", "Begin a recording", options, selected, Start);
+  start.AddOption("--name", options->recording.name, "Part of the logs' names (default: the arm's name)");
+  start.AddOption("--link", options->recording.links, "Names of links (default: all)");
+  start.AddFlag("--pictures", options->recording.pictures, "Also the cameras' pictures, as they sent them");
+  start.AddOption("--compression", options->compression, "Of the logs")
+      .Must(OneOf({"configured", "none", "zstd", "lz4"}));
+  start.AddOption("--note", options->recording.note, "Text kept in the logs");
   start
-      ->add_option("--duration", options->duration_s,
-                   "Stop after so many seconds, or with ^C; 0: later, by 'stop'")
-      ->check(Within(0, 1e9));
-  CLI::App* stop = AddOne(*record, "stop", "End it", options, selected, Stop);
-  CLI::App* status = AddOne(*record, "status", "How the server's recorder does", options, selected, Status);
-  CLI::App* list = AddOne(*record, "list", "The server's logs", options, selected, List);
-  for (CLI::App* command : {start, stop, status, list}) command->add_flag("--json", options->json, "JSON");
-  CLI::App* fetch = AddOne(*record, "fetch", "Copy a log from the server; goes on where it broke off",
-                           options, selected, Download);
-  fetch->add_option("-o,--output", options->output, "File or folder (default: its name, here)");
-  CLI::App* remove = AddOne(*record, "delete", "Delete a log on the server", options, selected, Delete);
-  for (CLI::App* command : {fetch, remove})
-    command->add_option("log", options->log, "Name of the log, as 'list' shows it")->required();
-  AddPlay(*record, selected);
+      .AddOption("--duration", options->duration_s,
+                 "Stop after so many seconds, or with ^C; 0: later, by 'stop'")
+      .Must(Within(0, 1e9));
+  const Arguments stop = AddOne(record, "stop", "End it", options, selected, Stop);
+  const Arguments status =
+      AddOne(record, "status", "How the server's recorder does", options, selected, Status);
+  const Arguments list = AddOne(record, "list", "The server's logs", options, selected, List);
+  for (const Arguments& command : {start, stop, status, list})
+    command.AddFlag("--json", options->json, "JSON");
+  const Arguments fetch = AddOne(record, "fetch", "Copy a log from the server; goes on where it broke off",
+                                 options, selected, Download);
+  fetch.AddOption("-o,--output", options->output, "File or folder (default: its name, here)");
+  const Arguments remove = AddOne(record, "delete", "Delete a log on the server", options, selected, Delete);
+  for (const Arguments& command : {fetch, remove})
+    command.AddOption("log", options->log, "Name of the log, as 'list' shows it").Required();
+  AddPlay(record, selected);
 }
 
 }  // namespace taclink::command

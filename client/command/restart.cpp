@@ -25,12 +25,12 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddRestart(CLI::App& app, Selected& selected) {
+void AddRestart(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("restart", "Give a link of a server a fresh source and processor");
-  AddServerOption(*command, options->server);
-  command->add_option("--link", options->link, "Name of the link")->required();
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+  const Arguments command = app.AddCommand("restart", "Give a link of a server a fresh source and processor");
+  AddServerOption(command, options->server);
+  command.AddOption("--link", options->link, "Name of the link").Required();
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

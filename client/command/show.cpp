@@ -22,18 +22,18 @@ Result<void> Print(std::string_view text, const std::string& kind, const std::st
 
 }  // namespace
 
-void AddShow(CLI::App& app, Selected& selected) {
+void AddShow(const Arguments& app, Selected& selected) {
   auto name = std::make_shared<std::string>();
-  CLI::App* show = app.add_subcommand("show", "Print a shipped file, to copy and change");
-  show->require_subcommand(1);
-  CLI::App* model = show->add_subcommand("model", "A link model");
-  model->add_option("name", *name, "Its name")->required();
-  model->callback([name, &selected] {
+  const Arguments show = app.AddCommand("show", "Print a shipped file, to copy and change");
+  show.RequireCommand();
+  const Arguments model = show.AddCommand("model", "A link model");
+  model.AddOption("name", *name, "Its name").Required();
+  model.OnChosen([name, &selected] {
     selected = [name] { return Print(ShippedModelText(*name), "model", *name, ShippedModelNames()); };
   });
-  CLI::App* scene = show->add_subcommand("scene", "A scene of the simulation");
-  scene->add_option("name", *name, "Its name")->required();
-  scene->callback([name, &selected] {
+  const Arguments scene = show.AddCommand("scene", "A scene of the simulation");
+  scene.AddOption("name", *name, "Its name").Required();
+  scene.OnChosen([name, &selected] {
     selected = [name] { return Print(ShippedSceneText(*name), "scene", *name, ShippedSceneNames()); };
   });
 }

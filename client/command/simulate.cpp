@@ -92,16 +92,15 @@ Result<void> Simulate(const SimulateOptions& options) {
 
 }  // namespace
 
-void AddSimulate(CLI::App& app, Selected& selected) {
+void AddSimulate(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<SimulateOptions>();
-  CLI::App* command =
-      app.add_subcommand("simulate", "Write the pictures of both cameras and the truth of a scene");
-  command->add_option("--scene", options->scene, "Scene: a shipped name or a YAML file")->required();
-  command->add_option("--out", options->out, "Folder, made if it is not there")->required();
-  command->add_option("--model", options->model, "Link model instead of the scene's");
-  command->add_option("--frames", options->frames, "So many instead of the scene's duration")
-      ->check(CLI::PositiveNumber);
-  command->callback([options, &selected] { selected = [options] { return Simulate(*options); }; });
+  const Arguments command =
+      app.AddCommand("simulate", "Write the pictures of both cameras and the truth of a scene");
+  command.AddOption("--scene", options->scene, "Scene: a shipped name or a YAML file").Required();
+  command.AddOption("--out", options->out, "Folder, made if it is not there").Required();
+  command.AddOption("--model", options->model, "Link model instead of the scene's");
+  command.AddOption("--frames", options->frames, "So many instead of the scene's duration").Must(Positive());
+  command.OnChosen([options, &selected] { selected = [options] { return Simulate(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -57,28 +57,27 @@ Result<void> Push(const PushOptions& options) {
 
 }  // namespace
 
-void AddSkin(CLI::App& app, Selected& selected) {
+void AddSkin(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<PushOptions>();
-  CLI::App* skin = app.add_subcommand("skin", "Evaluate a skin's design");
-  skin->require_subcommand(1);
-  CLI::App* push = skin->add_subcommand("push", "Push the simulated skin with a flat disc at a marker");
-  push->add_option("--model", options->model, "Link model: a shipped name or a YAML file")->required();
-  push->add_option("--node", options->node, "PATH,RING of the marker, from 1")
-      ->required()
-      ->delimiter(',')
-      ->expected(2);
-  push->add_option("--depth-mm", options->depth_mm, "Of the disc, from the uninflated radius")
-      ->required()
-      ->check(Within(-1e3, 1e3));
-  push->add_option("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin")
-      ->check(Within(-20, 20));
-  push->add_option("--patch-diameter-mm", options->patch_diameter_mm, "Of the disc")->check(Within(0, 1e3));
-  push->add_option("--refinement", options->refinement, "Elements per marker interval")
-      ->check(CLI::Range(1, 8));
-  push->add_option("--force-model", options->force_model, "nonlinear, or linear: small displacements only")
-      ->check(CLI::IsMember({"nonlinear", "linear"}));
-  push->add_flag("--json", options->json, "One JSON object");
-  push->callback([options, &selected] { selected = [options] { return Push(*options); }; });
+  const Arguments skin = app.AddCommand("skin", "Evaluate a skin's design");
+  skin.RequireCommand();
+  const Arguments push = skin.AddCommand("push", "Push the simulated skin with a flat disc at a marker");
+  push.AddOption("--model", options->model, "Link model: a shipped name or a YAML file").Required();
+  push.AddOption("--node", options->node, "PATH,RING of the marker, from 1")
+      .Required()
+      .Delimiter(',')
+      .Expected(2);
+  push.AddOption("--depth-mm", options->depth_mm, "Of the disc, from the uninflated radius")
+      .Required()
+      .Must(Within(-1e3, 1e3));
+  push.AddOption("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin")
+      .Must(Within(-20, 20));
+  push.AddOption("--patch-diameter-mm", options->patch_diameter_mm, "Of the disc").Must(Within(0, 1e3));
+  push.AddOption("--refinement", options->refinement, "Elements per marker interval").Must(Between(1, 8));
+  push.AddOption("--force-model", options->force_model, "nonlinear, or linear: small displacements only")
+      .Must(OneOf({"nonlinear", "linear"}));
+  push.AddFlag("--json", options->json, "One JSON object");
+  push.OnChosen([options, &selected] { selected = [options] { return Push(*options); }; });
 }
 
 }  // namespace taclink::command

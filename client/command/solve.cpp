@@ -126,37 +126,37 @@ Result<void> Solve(const SolveOptions& options) {
 
 }  // namespace
 
-void AddSolve(CLI::App& app, Selected& selected) {
+void AddSolve(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<SolveOptions>();
-  CLI::App* command =
-      app.add_subcommand("solve", "Contacts and forces from marker displacements or from pictures");
-  command->add_option("--model", options->model, "Link model: a shipped name or a YAML file")->required();
-  auto* markers = command->add_option("--markers", options->markers,
-                                      "CSV with columns path,ring,ux,uy,uz (from 1; mm, link frame)");
-  auto* rest = command->add_option("--rest", options->rest, "TOP and BOTTOM picture of the untouched skin")
-                   ->expected(2);
-  auto* images =
-      command->add_option("--images", options->images, "TOP and BOTTOM picture to solve")->expected(2);
-  command->add_option("--calibration", options->calibration, "Camera parameters; without, found from --rest")
-      ->needs(rest);
-  rest->needs(images)->excludes(markers);
-  images->needs(rest)->excludes(markers);
-  command->add_option("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin")
-      ->check(Within(-20, 20));
+  const Arguments command =
+      app.AddCommand("solve", "Contacts and forces from marker displacements or from pictures");
+  command.AddOption("--model", options->model, "Link model: a shipped name or a YAML file").Required();
+  const Option markers = command.AddOption("--markers", options->markers,
+                                           "CSV with columns path,ring,ux,uy,uz (from 1; mm, link frame)");
+  const Option rest =
+      command.AddOption("--rest", options->rest, "TOP and BOTTOM picture of the untouched skin").Expected(2);
+  const Option images =
+      command.AddOption("--images", options->images, "TOP and BOTTOM picture to solve").Expected(2);
+  command.AddOption("--calibration", options->calibration, "Camera parameters; without, found from --rest")
+      .Needs(rest);
+  rest.Needs(images).Excludes(markers);
+  images.Needs(rest).Excludes(markers);
+  command.AddOption("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin")
+      .Must(Within(-20, 20));
   command
-      ->add_option("--sigma-mm", options->sigma_mm,
-                   "With --markers: their standard deviation in x and y; z: 3 times")
-      ->check(Within(1e-4, 10));
-  command->add_option("--force-model", options->force_model, "auto: the cheapest that is good enough")
-      ->check(CLI::IsMember({"auto", "literal", "linear", "pressurised", "nonlinear"}));
+      .AddOption("--sigma-mm", options->sigma_mm,
+                 "With --markers: their standard deviation in x and y; z: 3 times")
+      .Must(Within(1e-4, 10));
+  command.AddOption("--force-model", options->force_model, "auto: the cheapest that is good enough")
+      .Must(OneOf({"auto", "literal", "linear", "pressurised", "nonlinear"}));
   command
-      ->add_option("--force-refinement", options->force_refinement,
-                   "Elements per interval of the marker grid; 0: what the model does best with")
-      ->check(CLI::Range(0, 3));
-  command->add_flag("--json", options->json, "One JSON object");
-  command->callback([options, markers, images, &selected] {
-    if (markers->count() == 0 && images->count() == 0) {
-      throw CLI::RequiredError("--markers, or --rest and --images");
+      .AddOption("--force-refinement", options->force_refinement,
+                 "Elements per interval of the marker grid; 0: what the model does best with")
+      .Must(Between(0, 3));
+  command.AddFlag("--json", options->json, "One JSON object");
+  command.OnChosen([options, markers, images, &selected] {
+    if (!markers.IsGiven() && !images.IsGiven()) {
+      RefuseMissing("--markers, or --rest and --images");
     }
     selected = [options] { return Solve(*options); };
   });

@@ -65,18 +65,18 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddTare(CLI::App& app, Selected& selected) {
+void AddTare(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
+  const Arguments command = app.AddCommand(
       "tare", "Take what links of a server show now as their untouched skins; nothing may touch them");
-  AddServerOption(*command, options->server);
-  command->add_option("links", options->request.links, "Names of links (all)");
-  command->add_flag("--force", options->request.force, "Even while touched, moved or with few markers");
-  command->add_option("--frames", options->request.frames, "To average over")
-      ->check(Within(1, 300))
-      ->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON object");
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+  AddServerOption(command, options->server);
+  command.AddOption("links", options->request.links, "Names of links (all)");
+  command.AddFlag("--force", options->request.force, "Even while touched, moved or with few markers");
+  command.AddOption("--frames", options->request.frames, "To average over")
+      .Must(Within(1, 300))
+      .ShowDefault();
+  command.AddFlag("--json", options->json, "One JSON object");
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -85,22 +85,22 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddThresholds(CLI::App& app, Selected& selected) {
+void AddThresholds(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
+  const Arguments command = app.AddCommand(
       "thresholds",
       "Show the force thresholds of a server's links, or set those of one until the server ends");
-  AddServerOption(*command, options->server);
-  CLI::Option* link = command->add_option("--link", options->link, "The link whose thresholds are set");
-  command->add_option("--region", options->region, "A region of it (the whole link)")->needs(link);
+  AddServerOption(command, options->server);
+  const Option link = command.AddOption("--link", options->link, "The link whose thresholds are set");
+  command.AddOption("--region", options->region, "A region of it (the whole link)").Needs(link);
   const auto force = [&](const char* name, std::optional<double>& value, const char* help) {
-    command->add_option(name, value, help)->check(Within(0, 10000))->needs(link);
+    command.AddOption(name, value, help).Must(Within(0, 10000)).Needs(link);
   };
   force("--warning", options->warning_n, "N; 0: none");
   force("--alarm", options->alarm_n, "N; 0: none");
   force("--hysteresis", options->hysteresis_n, "N below a threshold where its level is left");
-  command->add_flag("--json", options->json, "One JSON object");
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.AddFlag("--json", options->json, "One JSON object");
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

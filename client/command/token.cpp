@@ -39,19 +39,19 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddToken(CLI::App& app, Selected& selected) {
+void AddToken(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
+  const Arguments command = app.AddCommand(
       "token",
       "Make a token: itself to standard error, the line for the server's security.tokens to standard output");
-  command->add_option("name", options->name, "Whose it is")->required()->check([](const std::string& name) {
+  command.AddOption("name", options->name, "Whose it is").Required().Must(Check([](const std::string& name) {
     const bool good = !name.empty() && name.find_first_of(" \t\r\n#") == std::string::npos;
     return good ? std::string() : std::string("a name without spaces and '#'");
-  });
-  command->add_option("--role", options->role, "viewer: sees everything; operator: also changes things")
-      ->check(CLI::IsMember({"viewer", "operator"}))
-      ->capture_default_str();
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+  }));
+  command.AddOption("--role", options->role, "viewer: sees everything; operator: also changes things")
+      .Must(OneOf({"viewer", "operator"}))
+      .ShowDefault();
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command

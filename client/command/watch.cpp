@@ -75,27 +75,27 @@ Result<void> Run(const Options& options) {
 
 }  // namespace
 
-void AddWatch(CLI::App& app, Selected& selected) {
+void AddWatch(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("watch", "Show contacts and forces live");
-  AddServerOption(*command, options->server);
-  command->add_option("--links", options->links, "Names of links, separated by commas (all)")->delimiter(',');
-  command->add_option("--rate", options->rate_hz, "At most so many frames a second of each link (all)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--detail", options->detail, "contacts, geometry or full")
-      ->check(CLI::IsMember({"contacts", "geometry", "full"}))
-      ->capture_default_str();
-  command->add_option("--deadband-force", options->deadband_n, "Pass over forces that change by less, N")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--deadband-move", options->deadband_mm, "Pass over markers that move by less, mm")
-      ->check(CLI::PositiveNumber);
-  command->add_flag("--every", options->every, "Every frame in order, not only the newest");
-  command->add_flag("--json", options->json, "One JSON object a line for each frame");
-  command->add_option("--patience", options->patience_s, "Seconds without any word before it gives up")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command->add_option("--count", options->count, "End after so many frames")->check(CLI::PositiveNumber);
-  command->callback([options, &selected] { selected = [options] { return Run(*options); }; });
+  const Arguments command = app.AddCommand("watch", "Show contacts and forces live");
+  AddServerOption(command, options->server);
+  command.AddOption("--links", options->links, "Names of links, separated by commas (all)").Delimiter(',');
+  command.AddOption("--rate", options->rate_hz, "At most so many frames a second of each link (all)")
+      .Must(Positive());
+  command.AddOption("--detail", options->detail, "contacts, geometry or full")
+      .Must(OneOf({"contacts", "geometry", "full"}))
+      .ShowDefault();
+  command.AddOption("--deadband-force", options->deadband_n, "Pass over forces that change by less, N")
+      .Must(Positive());
+  command.AddOption("--deadband-move", options->deadband_mm, "Pass over markers that move by less, mm")
+      .Must(Positive());
+  command.AddFlag("--every", options->every, "Every frame in order, not only the newest");
+  command.AddFlag("--json", options->json, "One JSON object a line for each frame");
+  command.AddOption("--patience", options->patience_s, "Seconds without any word before it gives up")
+      .Must(Positive())
+      .ShowDefault();
+  command.AddOption("--count", options->count, "End after so many frames").Must(Positive());
+  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
 }
 
 }  // namespace taclink::command
