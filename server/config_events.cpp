@@ -26,14 +26,11 @@ Region ReadRegion(YamlMap& map) {
   Region region;
   region.name = map.Text("name");
   if (region.name.empty() || region.name.size() > 64) map.Fail("name", "must have 1 to 64 letters");
-  const auto rings = map.Numbers("rings", 2, kGridNumber), paths = map.Numbers("paths", 2, kGridNumber);
-  const auto from_zero = [](double number) { return static_cast<int>(number) - 1; };
-  if (rings.size() == 2 && paths.size() == 2) {
-    region.first_ring = from_zero(rings[0]);
-    region.last_ring = from_zero(rings[1]);
-    region.first_path = from_zero(paths[0]);
-    region.last_path = from_zero(paths[1]);
-  }
+  const auto rings = map.Integers("rings", 2, kGridNumber), paths = map.Integers("paths", 2, kGridNumber);
+  region.first_ring = rings[0] - 1;
+  region.last_ring = rings[1] - 1;
+  region.first_path = paths[0] - 1;
+  region.last_path = paths[1] - 1;
   region.thresholds = ReadThresholds(map);
   map.Done();
   return region;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <set>
 
 namespace taclink::server {
@@ -57,10 +56,7 @@ RealtimeOptions ReadRealtime(YamlMap& map, const RealtimeOptions& inherited) {
   options.priority = realtime.Integer("priority", options.priority, {.min = 0, .max = 99});
   if (realtime.Has("cpus")) {
     std::set<int> cpus;  // in order, each once
-    for (const double cpu : realtime.Numbers("cpus", 0, {.min = 0, .max = CPU_SETSIZE - 1})) {
-      if (cpu != std::floor(cpu)) realtime.Fail("cpus", "must be a list of CPU numbers, from 0");
-      cpus.insert(static_cast<int>(cpu));
-    }
+    for (const int cpu : realtime.Integers("cpus", 0, {.min = 0, .max = CPU_SETSIZE - 1})) cpus.insert(cpu);
     options.cpus.assign(cpus.begin(), cpus.end());
   }
   realtime.Done();

@@ -157,9 +157,9 @@ Result<LinkModel> ReadLinkModel(YamlFile file) {
 
 CameraModel ReadCamera(YamlMap map, CameraId id) {
   CameraModel camera;
-  const auto size = map.Numbers("image_size_px", 2, {.min = 16, .max = 8192});
-  camera.width_px = static_cast<int>(size[0]);
-  camera.height_px = static_cast<int>(size[1]);
+  const auto size = map.Integers("image_size_px", 2, {.min = 16, .max = 8192});
+  camera.width_px = size[0];
+  camera.height_px = size[1];
   camera.lens.focal_px = map.Number("focal_px", kPositive);
   const auto center = map.Numbers("principal_point_px", 2);
   camera.lens.principal_point_px = Vec2(center[0], center[1]);

@@ -1,5 +1,6 @@
 #include "sensing/yaml/yaml_reader.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -22,6 +23,14 @@ std::string Shown(double value) {
   std::ostringstream out;
   out << value;
   return out.str();
+}
+
+// After a failure readers go on to the end: with numbers that they can count with.
+int Within(Range range, int value) {
+  return static_cast<int>(std::clamp<double>(value, range.min, range.max));
+}
+double Within(Range range, double value) {
+  return std::isfinite(value) ? std::clamp(value, range.min, range.max) : 0;
 }
 
 }  // namespace
@@ -106,7 +115,7 @@ int YamlMap::Integer(const std::string& key, Range range) {
   const bool known = node.IsDefined() && !context_->error;
   const int value = Scalar<int>(key, node, "a whole number");
   if (known && !context_->error) CheckRange(key, value, range);
-  return value;
+  return Within(range, value);
 }
 
 int YamlMap::Integer(const std::string& key, int fallback, Range range) {
@@ -143,19 +152,30 @@ size_t YamlMap::Choice(const std::string& key, const std::vector<std::string_vie
   return Has(key) ? Choice(key, choices) : fallback;
 }
 
-std::vector<double> YamlMap::Numbers(const std::string& key, size_t count, Range range) {
+template <typename T>
+std::vector<T> YamlMap::List(const std::string& key, size_t count, Range range, const std::string& expected) {
   const YAML::Node node = Find(key, true);
-  std::vector<double> values;
-  if (!node.IsDefined()) return std::vector<double>(count, 0.0);
+  std::vector<T> values;
+  if (!node.IsDefined()) return std::vector<T>(count);
   if (node.IsSequence() && (count == 0 || node.size() == count)) {
-    for (const auto& item : node)
-      values.push_back(CheckRange(key, Scalar<double>(key, item, "numbers"), range));
+    for (const auto& item : node) {
+      const T value = Scalar<T>(key, item, expected.c_str());
+      CheckRange(key, value, range);
+      values.push_back(Within(range, value));
+    }
   } else {
-    FailAt(node, key,
-           "must be a list of " + (count == 0 ? std::string("numbers") : std::to_string(count) + " numbers"));
-    values.assign(count, 0.0);
+    FailAt(node, key, "must be a list of " + (count == 0 ? "" : std::to_string(count) + " ") + expected);
+    values.assign(count, T());
   }
   return values;
+}
+
+std::vector<double> YamlMap::Numbers(const std::string& key, size_t count, Range range) {
+  return List<double>(key, count, range, "numbers");
+}
+
+std::vector<int> YamlMap::Integers(const std::string& key, size_t count, Range range) {
+  return List<int>(key, count, range, "whole numbers");
 }
 
 std::vector<std::string> YamlMap::Texts(const std::string& key) {

@@ -41,8 +41,9 @@ class YamlMap {
   /// One of `choices`; returns its position.
   size_t Choice(const std::string& key, const std::vector<std::string_view>& choices);
   size_t Choice(const std::string& key, const std::vector<std::string_view>& choices, size_t fallback);
-  /// A list of exactly `count` numbers (any number if 0).
+  /// A list of exactly `count` numbers (as many as there are if 0).
   std::vector<double> Numbers(const std::string& key, size_t count = 0, Range range = {});
+  std::vector<int> Integers(const std::string& key, size_t count = 0, Range range = {});
   std::vector<std::string> Texts(const std::string& key);
   /// A mapping; an empty one where the key is missing.
   YamlMap Map(const std::string& key);
@@ -68,6 +69,8 @@ class YamlMap {
   YAML::Node Find(const std::string& key, bool required);
   template <typename T>
   T Scalar(const std::string& key, const YAML::Node& node, const char* expected);
+  template <typename T>
+  std::vector<T> List(const std::string& key, size_t count, Range range, const std::string& expected);
   double CheckRange(const std::string& key, double value, Range range);
   void FailAt(const YAML::Node& node, const std::string& key, const std::string& what);
 

@@ -78,9 +78,9 @@ void HttpRequestParser::CheckHead() {
   }
   if (head.version() == 11 && head.count(http::field::host) == 0)
     failure_ = {400, "the request has no 'host' header"};
-  if (const auto expect = head[http::field::expect]; !expect.empty() && !Done()) {
-    wants_continue_ = Lower(expect) == "100-continue";
-    if (!wants_continue_) failure_ = {417, "what the request expects is not offered here"};
+  if (const auto expect = head[http::field::expect]; !expect.empty()) {
+    if (Lower(expect) != "100-continue") failure_ = {417, "what the request expects is not offered here"};
+    wants_continue_ = !failure_ && !Done();
   }
 }
 

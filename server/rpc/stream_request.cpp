@@ -17,7 +17,7 @@ Error Invalid(std::string message) {
 
 Result<Deadband> ParseDeadband(const v1::StreamFramesRequest& request) {
   for (const double limit : {request.deadband_force_n(), request.deadband_move_m()}) {
-    if (!std::isfinite(limit) || limit < 0)
+    if (!std::isfinite(limit / wire::kMetresPerMm) || limit < 0)
       return Invalid(
           "deadband_force_n and deadband_move_m must be positive numbers of N and m, or 0 for none");
   }
