@@ -50,12 +50,26 @@ void HttpRequestParser::Reset() {
   parser_ = std::make_unique<Parser>();
   parser_->beast.header_limit(static_cast<std::uint32_t>(limits_.header_bytes));
   parser_->beast.body_limit(limits_.body_bytes);
-  parser_->beast.eager(true);
+  head_ = {};
   begun_ = head_seen_ = wants_continue_ = false;
 }
 
 size_t HttpRequestParser::Feed(std::string_view bytes) {
+  size_t used = FeedOnce(bytes);
+  // The head comes alone, that trailers are no part of it.
+  if (head_seen_ && !parser_->beast.eager()) {
+    parser_->beast.eager(true);
+    used += FeedOnce(bytes.substr(used));
+    wants_continue_ = wants_continue_ && !Done();
+  }
+  return used;
+}
+
+size_t HttpRequestParser::FeedOnce(std::string_view bytes) {
+  // Boost.Beast asserts that the end of a chunked body comes with at least so many bytes.
+  constexpr size_t kShortestEnd = 5;
   if (failure_ || Done() || bytes.empty()) return 0;
+  if (head_seen_ && parser_->beast.chunked() && bytes.size() < kShortestEnd) return 0;
   boost::system::error_code error;
   begun_ = true;
   const size_t used = parser_->beast.put(boost::asio::const_buffer(bytes.data(), bytes.size()), error);
@@ -65,12 +79,12 @@ size_t HttpRequestParser::Feed(std::string_view bytes) {
     failure_ = FailureOf(http::error::header_limit, limits_);  // one line of that length
   } else if (parser_->beast.is_header_done() && !head_seen_) {
     head_seen_ = true;
-    CheckHead();
+    KeepHead();
   }
   return used;
 }
 
-void HttpRequestParser::CheckHead() {
+void HttpRequestParser::KeepHead() {
   const auto& head = parser_->beast.get();
   for (const http::field once : {http::field::host, http::field::authorization, http::field::content_type}) {
     if (head.count(once) > 1)
@@ -80,8 +94,15 @@ void HttpRequestParser::CheckHead() {
     failure_ = {400, "the request has no 'host' header"};
   if (const auto expect = head[http::field::expect]; !expect.empty()) {
     if (Lower(expect) != "100-continue") failure_ = {417, "what the request expects is not offered here"};
-    wants_continue_ = !failure_ && !Done();
+    wants_continue_ = !failure_;
   }
+  head_ = {.method = std::string(head.method_string()),
+           .target = std::string(head.target()),
+           .http_1_0 = head.version() == 10,
+           .keep_alive = head.keep_alive(),
+           .headers = {},
+           .body = {}};
+  for (const auto& field : head) head_.headers.emplace_back(Lower(field.name_string()), field.value());
 }
 
 bool HttpRequestParser::TakeWantsContinue() {
@@ -93,14 +114,8 @@ bool HttpRequestParser::Done() const {
 }
 
 HttpRequest HttpRequestParser::Take() {
-  auto message = parser_->beast.release();
-  HttpRequest out{.method = std::string(message.method_string()),
-                  .target = std::string(message.target()),
-                  .http_1_0 = message.version() == 10,
-                  .keep_alive = message.keep_alive(),
-                  .headers = {},
-                  .body = std::move(message.body())};
-  for (const auto& field : message) out.headers.emplace_back(Lower(field.name_string()), field.value());
+  HttpRequest out = std::move(head_);
+  out.body = std::move(parser_->beast.get().body());
   Reset();
   return out;
 }

@@ -17,7 +17,8 @@ struct HttpRequest {
   std::string target;  ///< as sent
   bool http_1_0 = false;
   bool keep_alive = true;
-  std::vector<std::pair<std::string, std::string>> headers;  ///< names in lower case
+  /// Names in lower case. Trailers are read, but no part of it.
+  std::vector<std::pair<std::string, std::string>> headers;
   std::string body;
 
   /// Empty: not sent.
@@ -58,10 +59,12 @@ class HttpRequestParser {
  private:
   struct Parser;
   void Reset();
-  void CheckHead();
+  size_t FeedOnce(std::string_view bytes);
+  void KeepHead();
 
   const HttpLimits limits_;
   std::unique_ptr<Parser> parser_;
+  HttpRequest head_;
   std::optional<HttpFailure> failure_;
   bool begun_ = false;
   bool head_seen_ = false;

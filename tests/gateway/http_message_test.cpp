@@ -66,6 +66,20 @@ TEST(HttpMessage, ChunkedBodies) {
   EXPECT_EQ(fed.parser.Take().body, "abcde");
 }
 
+TEST(HttpMessage, TrailersAreNoHeaders) {
+  const std::string bytes =
+      "POST /a HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n"
+      "0\r\nHost: b\r\nAuthorization: Bearer c\r\n\r\n";
+  for (const size_t step : {bytes.size(), size_t{1}, size_t{4}}) {
+    Fed fed(bytes, step);
+    ASSERT_TRUE(fed.parser.Done()) << step;
+    const HttpRequest request = fed.parser.Take();
+    EXPECT_EQ(request.Header("host"), "a");
+    EXPECT_EQ(request.Header("authorization"), "");
+    EXPECT_EQ(request.body, "");
+  }
+}
+
 TEST(HttpMessage, BadRequestsAreRefused) {
   EXPECT_EQ(FailureOf("nonsense\r\n\r\n"), 400);
   EXPECT_EQ(FailureOf(std::string("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 11) + "\r\n\r\n"), 400)
