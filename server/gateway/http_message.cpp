@@ -56,7 +56,7 @@ void HttpRequestParser::Reset() {
 
 size_t HttpRequestParser::Feed(std::string_view bytes) {
   size_t used = FeedOnce(bytes);
-  // The head comes alone, that trailers are no part of it.
+  // The head is judged before the body is looked at.
   if (head_seen_ && !parser_->beast.eager()) {
     parser_->beast.eager(true);
     used += FeedOnce(bytes.substr(used));
@@ -66,10 +66,7 @@ size_t HttpRequestParser::Feed(std::string_view bytes) {
 }
 
 size_t HttpRequestParser::FeedOnce(std::string_view bytes) {
-  // Boost.Beast asserts that the end of a chunked body comes with at least so many bytes.
-  constexpr size_t kShortestEnd = 5;
   if (failure_ || Done() || bytes.empty()) return 0;
-  if (head_seen_ && parser_->beast.chunked() && bytes.size() < kShortestEnd) return 0;
   boost::system::error_code error;
   begun_ = true;
   const size_t used = parser_->beast.put(boost::asio::const_buffer(bytes.data(), bytes.size()), error);
@@ -92,6 +89,10 @@ void HttpRequestParser::KeepHead() {
   }
   if (head.version() == 11 && head.count(http::field::host) == 0)
     failure_ = {400, "the request has no 'host' header"};
+  // Boost.Beast's reading of chunks depends on how the network cuts them: they are not for any client to
+  // send.
+  if (head.count(http::field::transfer_encoding) > 0)
+    failure_ = {411, "bodies have to come with a content-length, not in chunks"};
   if (const auto expect = head[http::field::expect]; !expect.empty()) {
     if (Lower(expect) != "100-continue") failure_ = {417, "what the request expects is not offered here"};
     wants_continue_ = !failure_;

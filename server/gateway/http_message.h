@@ -17,8 +17,7 @@ struct HttpRequest {
   std::string target;  ///< as sent
   bool http_1_0 = false;
   bool keep_alive = true;
-  /// Names in lower case. Trailers are read, but no part of it.
-  std::vector<std::pair<std::string, std::string>> headers;
+  std::vector<std::pair<std::string, std::string>> headers;  ///< names in lower case
   std::string body;
 
   /// Empty: not sent.
