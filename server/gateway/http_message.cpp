@@ -48,9 +48,11 @@ HttpRequestParser::~HttpRequestParser() = default;
 
 void HttpRequestParser::Reset() {
   parser_ = std::make_unique<Parser>();
-  parser_->beast.header_limit(static_cast<std::uint32_t>(limits_.header_bytes));
+  parser_->beast.header_limit(
+      static_cast<std::uint32_t>(2 * limits_.header_bytes));  // FeedOnce counts exactly
   parser_->beast.body_limit(limits_.body_bytes);
   head_ = {};
+  head_bytes_ = 0;
   begun_ = head_seen_ = wants_continue_ = false;
 }
 
@@ -70,10 +72,12 @@ size_t HttpRequestParser::FeedOnce(std::string_view bytes) {
   boost::system::error_code error;
   begun_ = true;
   const size_t used = parser_->beast.put(boost::asio::const_buffer(bytes.data(), bytes.size()), error);
+  if (!head_seen_) head_bytes_ += used;
+  const size_t waiting = parser_->beast.is_header_done() ? 0 : bytes.size() - used;
   if (error && error != http::error::need_more) {
     failure_ = FailureOf(error, limits_);
-  } else if (!parser_->beast.is_header_done() && bytes.size() - used > limits_.header_bytes) {
-    failure_ = FailureOf(http::error::header_limit, limits_);  // one line of that length
+  } else if (head_bytes_ + waiting > limits_.header_bytes) {
+    failure_ = FailureOf(http::error::header_limit, limits_);
   } else if (parser_->beast.is_header_done() && !head_seen_) {
     head_seen_ = true;
     KeepHead();

@@ -65,6 +65,7 @@ class HttpRequestParser {
   std::unique_ptr<Parser> parser_;
   HttpRequest head_;
   std::optional<HttpFailure> failure_;
+  size_t head_bytes_ = 0;
   bool begun_ = false;
   bool head_seen_ = false;
   bool wants_continue_ = false;
