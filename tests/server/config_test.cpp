@@ -243,7 +243,7 @@ TEST(Config, MistakesAreNamedWithFileAndLine) {
   EXPECT_THAT(Complaint(Replaced(kGood, "quiet_s: 20", "go_n: 0.5")), HasSubstr("must be below stop_n"));
   EXPECT_THAT(Complaint(Replaced(kGood, "alarm_n: 1.5", "alarm_n: 0.1")),
               HasSubstr("alarm_n must not be below warning_n"));
-  EXPECT_THAT(Complaint(Replaced(kGood, "paths: [18, 2]", "paths: [18]")), HasSubstr("2 numbers"));
+  EXPECT_THAT(Complaint(Replaced(kGood, "paths: [18, 2]", "paths: [18]")), HasSubstr("2 whole numbers"));
   EXPECT_THAT(Complaint(Replaced(kGood, "format: mjpeg", "format: h264")),
               HasSubstr("auto, yuyv, mjpeg, grey"));
   EXPECT_THAT(Complaint(Replaced(kGood, "name: lower", "name: upper")), HasSubstr("used by another link"));

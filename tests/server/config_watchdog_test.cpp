@@ -63,7 +63,7 @@ TEST(ConfigWatchdog, MistakesAreNamed) {
   EXPECT_THAT(Complaint("watchdog: {frame: 1}\n"), HasSubstr("'watchdog.frame' is not a known key"));
   EXPECT_THAT(Complaint("watchdog: {abandon_s: 0.5}\n"), HasSubstr("must not be shorter"));
   EXPECT_THAT(Complaint("realtime: {priority: 100}\n"), HasSubstr("realtime.priority"));
-  EXPECT_THAT(Complaint("realtime: {cpus: [0.5]}\n"), HasSubstr("CPU numbers"));
+  EXPECT_THAT(Complaint("realtime: {cpus: [0.5]}\n"), HasSubstr("whole numbers"));
   EXPECT_THAT(Complaint("realtime: {cpus: [-1]}\n"), HasSubstr("realtime.cpus"));
   EXPECT_THAT(Complaint("", ", realtime: {cpus: all}"), HasSubstr("arm.links[0].realtime.cpus"));
 }
