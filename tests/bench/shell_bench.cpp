@@ -1,4 +1,5 @@
-// What a frame of the nonlinear model is made of: the shell's gradient and Hessian, the factor and its use. One core.
+// What a frame of the nonlinear model is made of: the shell's gradient and Hessian, the factor and its use.
+// One core.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/SparseCore>
