@@ -98,8 +98,8 @@ endfunction()
 add_custom_target(slow_tests)
 add_custom_target(quick_tests)
 
-# taclink_test(NAME SOURCES ... LINKS ... [HEADERS set] [LABELS ...] [TIMEOUT seconds]): one GoogleTest program, its cases known to
-# ctest. Under a sanitizer all of them run in one process, for each start would take longer than most cases.
+# taclink_test(NAME SOURCES ... LINKS ... [HEADERS set] [LABELS ...] [TIMEOUT seconds]): one GoogleTest program, its cases
+# known to ctest. Under a sanitizer all of them run in one process, for each start would take longer than most cases.
 function(taclink_test name)
   cmake_parse_arguments(arg "" "HEADERS;TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
   if(NOT arg_HEADERS)

@@ -11,10 +11,10 @@ class Option;
 class Validator;
 }  // namespace CLI
 
+// Wraps CLI11, whose headers take seconds to compile wherever they are included.
 namespace taclink::command {
 
-/// What a value has to be. All of this wraps CLI11, whose headers take seconds to compile wherever they are
-/// included.
+/// What a value has to be.
 class Check {
  public:
   /// `problem`: empty, or what is wrong with the text.

@@ -10,8 +10,8 @@ namespace taclink {
 class Lanes {
  public:
   Lanes() = default;
-  Lanes(double all)
-      : low_{all, all}, high_{all, all} {}  // NOLINT(google-explicit-constructor): a number is one
+  /// Not explicit: a number is the same at all points.
+  Lanes(double all) : low_{all, all}, high_{all, all} {}
 
   double operator[](size_t point) const { return point < 2 ? low_[point] : high_[point - 2]; }
   void Set(size_t point, double value) {
