@@ -1,10 +1,22 @@
-# Writes a C++ source that holds text files: -DOUTPUT -DFUNCTION -DFILES=a,b,...
+# Writes a C++ source that holds files, as the assembler reads them: -DOUTPUT -DFUNCTION -DFILES=a,b,...
 string(REPLACE "," ";" FILES "${FILES}")
-set(text "#include \"sensing/core/embedded_file.h\"\n\nnamespace taclink {\nnamespace {\nconstexpr EmbeddedFile kFiles[] = {\n")
+set(symbols "")
+set(entries "")
+set(number 0)
 foreach(file IN LISTS FILES)
   get_filename_component(name "${file}" NAME)
-  file(READ "${file}" content)
-  string(APPEND text "    {\"${name}\", R\"embedded(${content})embedded\"},\n")
+  file(SIZE "${file}" size)
+  set(symbol "embedded_${FUNCTION}_${number}")
+  string(APPEND symbols "__asm__(\".section .rodata\\n${symbol}: .incbin \\\"${file}\\\"\\n.byte 0\\n.previous\\n\");\n"
+                        "extern \"C\" const char ${symbol}[] __attribute__((visibility(\"hidden\")));\n")
+  string(APPEND entries "    {\"${name}\", {${symbol}, ${size}}},\n")
+  math(EXPR number "${number} + 1")
 endforeach()
-string(APPEND text "};\n}  // namespace\n\nstd::span<const EmbeddedFile> ${FUNCTION}() { return kFiles; }\n}  // namespace taclink\n")
-file(WRITE "${OUTPUT}" "${text}")
+file(WRITE "${OUTPUT}" "#include \"sensing/core/embedded_file.h\"\n\n${symbols}
+namespace taclink {
+std::span<const EmbeddedFile> ${FUNCTION}() {
+  static const EmbeddedFile kFiles[] = {\n${entries}  };
+  return kFiles;
+}
+}  // namespace taclink
+")

@@ -125,13 +125,14 @@ function(taclink_test name)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
 endfunction()
 
-# taclink_embed(TARGET FUNCTION NAME FILES ...): text files become `std::span<const EmbeddedFile> FUNCTION()`.
+# taclink_embed(TARGET FUNCTION NAME FILES ...): files become `std::span<const EmbeddedFile> FUNCTION()`.
 function(taclink_embed target)
   cmake_parse_arguments(arg "" "FUNCTION" "FILES" ${ARGN})
   set(output "${CMAKE_CURRENT_BINARY_DIR}/${arg_FUNCTION}.cpp")
   set(paths "")
   foreach(file IN LISTS arg_FILES)
-    list(APPEND paths "${CMAKE_CURRENT_SOURCE_DIR}/${file}")
+    cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE OUTPUT_VARIABLE path)
+    list(APPEND paths "${path}")
   endforeach()
   string(REPLACE ";" "," joined "${paths}")
   add_custom_command(

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "sensing/core/link_state.h"
+#include "sensing/core/markers.h"
 #include "server/deadband.h"
 #include "wire/detail.h"
 
@@ -62,7 +63,11 @@ class Publication {
 };
 using PublicationPtr = std::shared_ptr<const Publication>;
 /// What a state was made of; kept only for those who want it.
-using PicturesPtr = std::shared_ptr<const RawPictures>;
+struct FramePictures {
+  RawPictures raw;
+  LabelledMarkers labels;  ///< found in them; empty where nothing was measured
+};
+using PicturesPtr = std::shared_ptr<const FramePictures>;
 
 /// What happens to states that a subscriber is too slow for.
 enum class Delivery : uint8_t {

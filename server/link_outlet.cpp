@@ -25,7 +25,8 @@ void LinkOutlet::Close() {
   hub_ = nullptr;
 }
 
-bool LinkOutlet::PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, StereoFrame& frame) {
+bool LinkOutlet::PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, StereoFrame& frame,
+                              const LabelledMarkers* labels) {
   const std::lock_guard lock(mutex_);
   if (life != life_ || hub_ == nullptr) return false;
   // Before anyone can see it.
@@ -38,7 +39,11 @@ bool LinkOutlet::PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, S
   PicturesPtr pictures;
   if (hub_->WantsPictures(link_)) {
     auto taken = picture_pool_.Acquire();
-    std::swap(*taken, frame.images);
+    std::swap(taken->raw, frame.images);
+    for (size_t i = 0; i < kCameraCount; ++i) {
+      taken->labels.cameras[i].clear();
+      if (labels != nullptr) taken->labels.cameras[i] = labels->cameras[i];
+    }
     pictures = picture_pool_.Share(std::move(taken));
   }
   Send(std::move(state), pictures);

@@ -32,9 +32,10 @@ class LinkOutlet {
   void Close();
 
   /// Stamps and publishes what worker `life` made of a frame, and counts it. Where somebody wants the
-  /// pictures too, those of `frame` are taken and old buffers left in their place. False: refused, for there
-  /// is a newer worker.
-  bool PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, StereoFrame& frame);
+  /// pictures too, those of `frame` are taken and old buffers left in their place, with a copy of `labels`
+  /// (null: none). False: refused, for there is a newer worker.
+  bool PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, StereoFrame& frame,
+                    const LabelledMarkers* labels = nullptr);
   /// The same for a mere report of the worker's, which bears the last frame's number.
   bool PublishReport(uint64_t life, std::unique_ptr<LinkState> state);
   /// In place of the worker. False: the worker is publishing at this moment.
@@ -57,7 +58,7 @@ class LinkOutlet {
   Clock& clock_;
 
   StatePool pool_;
-  SharedPool<RawPictures> picture_pool_;
+  SharedPool<FramePictures> picture_pool_;
   LinkStatisticsCollector statistics_;
   LinkHistograms histograms_;
   std::atomic<uint64_t> life_ = 0;

@@ -8,7 +8,9 @@
 #include "sensing/core/baseline.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/link_state.h"
+#include "sensing/core/markers.h"
 #include "sensing/core/result.h"
+#include "sensing/force/force_estimator.h"
 
 namespace taclink::server {
 
@@ -56,6 +58,13 @@ class LinkProcessor {
   /// After each Process since BeginTare, until it has told the end. An error leaves the link as it was.
   virtual std::optional<Result<TareSummary>> TakeTareEnd() { return {}; }
   virtual void CancelTare() {}
+
+  /// What was found in the pictures of the last frame that was measured; null: not known.
+  virtual const LabelledMarkers* labels() const { return nullptr; }
+  /// Computes the forces so from the next frame on. Not null. Errors: kUnsupported.
+  virtual Result<void> UseEstimator(std::unique_ptr<ForceEstimator>) {
+    return Error{ErrorCode::kUnsupported, "this link computes no forces"};
+  }
 };
 
 }  // namespace taclink::server

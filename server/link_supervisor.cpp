@@ -350,6 +350,21 @@ Result<void> LinkSupervisor::Tare(const TareOptions& options, TareObserver obser
   return NoWorker();
 }
 
+Result<void> LinkSupervisor::SetCamera(const CameraOrder& order, CameraObserver observer) {
+  if (const auto worker = current()) return worker->SetCamera(order, std::move(observer));
+  return NoWorker();
+}
+
+Result<void> LinkSupervisor::SetForceModel(ForceModel model) {
+  if (!factories_.estimator)
+    return Error{ErrorCode::kFailedPrecondition, "link '" + name_ + "' computes no forces here"};
+  auto estimator = factories_.estimator(model);
+  const auto worker = current();
+  if (!worker) return NoWorker();
+  worker->UseEstimator(std::move(estimator));
+  return {};
+}
+
 Error LinkSupervisor::NoWorker() const {
   return {ErrorCode::kUnavailable, "link '" + name_ + "' has no worker now: " + supervision().reason};
 }

@@ -41,6 +41,9 @@ struct WatchdogOptions {
 struct LinkFactories {
   std::function<Result<std::unique_ptr<FrameSource>>()> source = {};
   std::function<Result<std::unique_ptr<LinkProcessor>>()> processor = {};
+  /// Makes the forces' part of a processor by another model, which processors made later then have, too.
+  /// None: the link has no forces to compute.
+  std::function<std::unique_ptr<ForceEstimator>(ForceModel)> estimator = {};
 };
 
 /// How a link's worker does, for those who report it.
@@ -95,6 +98,11 @@ class LinkSupervisor {
   Result<void> Calibrate(const CalibrationOrder& order, CalibrationObserver observer);
   /// Likewise.
   Result<void> Tare(const TareOptions& options, TareObserver observer);
+  /// Likewise.
+  Result<void> SetCamera(const CameraOrder& order, CameraObserver observer);
+  /// Computes the forces by `model` from the next frame on, also after a restart. Takes up to seconds.
+  /// Errors: kUnavailable (no worker now), kFailedPrecondition (nothing is computed here).
+  Result<void> SetForceModel(ForceModel model);
 
  private:
   enum class Phase { kRunning, kEnding, kBackoff, kBuilding, kResting };

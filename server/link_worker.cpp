@@ -76,6 +76,7 @@ void LinkWorker::Died(const std::string& reason) {
   const Error error{ErrorCode::kInternal, "the link's worker failed: " + reason};
   EndCalibrationFromOutside(error);
   tare_.EndFromOutside(error);
+  cameras_.End(error);
   const std::lock_guard lock(end_mutex_);
   if (!failure_) failure_ = reason;
 }
@@ -97,6 +98,7 @@ void LinkWorker::Abandon() {
   const Error error{ErrorCode::kUnavailable, "the link's worker hangs and was given up"};
   EndCalibrationFromOutside(error);
   tare_.EndFromOutside(error);
+  cameras_.End(error);
   if (capture_.joinable()) capture_.detach();
   if (solve_.joinable()) solve_.detach();
 }
@@ -116,12 +118,14 @@ void LinkWorker::Capture(const std::stop_token& stop) {
   StereoFrame frame;
   while (!stop.stop_requested()) {
     capture_mark_.Begin(WorkStage::kWait, clock_.MonotonicNs());
+    cameras_.CarryOut(supervisor_);
     if (!supervisor_.Next(frame, options_.poll)) continue;
     if (options_.pressure) options_.pressure->Apply(frame);
     frame.pressure.mpa = ExactInPascals(frame.pressure.mpa);
     if (frame.pressure_mpa) frame.pressure_mpa = ExactInPascals(*frame.pressure_mpa);
     mailbox_.Put(frame);
   }
+  cameras_.End({ErrorCode::kUnavailable, "the link is stopping"});
 }
 
 void LinkWorker::Solve(const std::stop_token& stop) {
@@ -130,6 +134,7 @@ void LinkWorker::Solve(const std::stop_token& stop) {
     fem_mark_.Begin(WorkStage::kWait, clock_.MonotonicNs());
     const bool any = mailbox_.Take(frame, options_.poll);
     TakeCalibrationOrder();
+    TakeEstimator();
     tare_.Begin(*processor_, clock_.MonotonicNs());
     if (any) {
       SolveOne(frame);
@@ -162,6 +167,22 @@ Result<void> LinkWorker::Calibrate(const CalibrationOrder& order, CalibrationObs
   watching_ = observer;
   ordered_ = CalibrationJob{order, std::move(observer)};
   return {};
+}
+
+void LinkWorker::UseEstimator(std::unique_ptr<ForceEstimator> estimator) {
+  const std::lock_guard lock(estimator_mutex_);
+  estimator_ = std::move(estimator);
+}
+
+void LinkWorker::TakeEstimator() {
+  std::unique_ptr<ForceEstimator> estimator;
+  {
+    const std::lock_guard lock(estimator_mutex_);
+    estimator = std::move(estimator_);
+  }
+  if (!estimator) return;
+  if (const auto used = processor_->UseEstimator(std::move(estimator)); !used)
+    spdlog::error("link {}: force model: {}", name_, used.error().message);
 }
 
 void LinkWorker::TakeCalibrationOrder() {
@@ -231,7 +252,8 @@ void LinkWorker::SolveOne(StereoFrame& frame) {
   }
   state->sequence = frame.sequence;
   fem_mark_.Begin(WorkStage::kPublish, clock_.MonotonicNs());
-  outlet_->PublishFrame(life_, std::move(state), frame);
+  const LabelledMarkers* const labels = state->measured() ? processor_->labels() : nullptr;
+  outlet_->PublishFrame(life_, std::move(state), frame, labels);
 }
 
 void LinkWorker::PublishStatusIfDue() {

@@ -14,6 +14,7 @@
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
 #include "sensing/core/link_state.h"
+#include "server/camera_desk.h"
 #include "server/hub.h"
 #include "server/link_outlet.h"
 #include "server/link_processor.h"
@@ -78,6 +79,13 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
     return tare_.Order(options, std::move(observer));
   }
 
+  Result<void> SetCamera(const CameraOrder& order, CameraObserver observer) {
+    return cameras_.Order(order, std::move(observer));
+  }
+
+  /// From the next frame on. Not null. Any thread.
+  void UseEstimator(std::unique_ptr<ForceEstimator> estimator);
+
   LinkStatistics Statistics() const { return outlet_->Statistics(); }
   SourceCondition source_condition() const { return supervisor_.condition(); }
 
@@ -92,6 +100,7 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   void SolveOne(StereoFrame& frame);
   void PublishStatusIfDue();
   void TakeCalibrationOrder();
+  void TakeEstimator();
   void TellCalibration();
   CalibrationObserver ForgetCalibration();
   void EndCalibrationWithout(const Error& error);
@@ -108,6 +117,7 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   SourceSupervisor supervisor_;
   Mailbox<StereoFrame> mailbox_;
   TareDesk tare_;
+  CameraDesk cameras_;
 
   mutable std::mutex end_mutex_;
   std::condition_variable ended_;
@@ -126,6 +136,10 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
       watching_;              // of the one ordered or under way, for when the FEM thread can't tell its end
   bool calibrating_ = false;  // ordered or under way
   bool calibration_closed_ = false;
+
+  std::mutex estimator_mutex_;
+  std::unique_ptr<ForceEstimator>
+      estimator_;  // guarded by estimator_mutex_: to be used from the next frame on
 
   // Used by the FEM thread only.
   const std::unique_ptr<LinkProcessor> processor_;

@@ -144,6 +144,15 @@ void SourceSupervisor::SetCondition(SourceCondition::State state, std::string re
   }
 }
 
+Result<void> SourceSupervisor::SetCamera(CameraId id, const CameraSettings& settings) {
+  if (!started_) return Error{ErrorCode::kUnavailable, "the link's cameras are not there now"};
+  try {
+    return source_->SetCamera(id, settings);
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInternal, std::string("the camera could not be set: ") + e.what()};
+  }
+}
+
 SourceCondition SourceSupervisor::condition() const {
   const std::lock_guard lock(mutex_);
   return condition_;

@@ -44,6 +44,9 @@ class SourceSupervisor {
   /// about `timeout` at most, as far as the source keeps to it. True: `frame` is filled. One thread.
   bool Next(StereoFrame& frame, std::chrono::milliseconds timeout);
 
+  /// As FrameSource::SetCamera. Next's thread.
+  Result<void> SetCamera(CameraId id, const CameraSettings& settings);
+
   SourceCondition condition() const;
 
  private:

@@ -10,9 +10,10 @@ size_t Capacity(size_t links, const SubscriberOptions& options) {
   return options.delivery == Delivery::kLatest ? links : std::max<size_t>(options.queue_capacity, 1);
 }
 
-size_t Bytes(const RawPictures& pictures) {
+size_t Bytes(const FramePictures& pictures) {
   size_t bytes = sizeof pictures;
-  for (const RawImage& image : pictures) bytes += image.bytes.capacity();
+  for (const RawImage& image : pictures.raw) bytes += image.bytes.capacity();
+  for (const auto& camera : pictures.labels.cameras) bytes += camera.capacity() * sizeof(MarkerObservation);
   return bytes;
 }
 

@@ -21,7 +21,8 @@ bool IsContact(EventKind kind) {
 
 bool IsOperation(EventKind kind) {
   return kind == EventKind::kTare || kind == EventKind::kCalibration || kind == EventKind::kBaseline ||
-         kind == EventKind::kThresholds || kind == EventKind::kRecording;
+         kind == EventKind::kThresholds || kind == EventKind::kRecording || kind == EventKind::kForceModel ||
+         kind == EventKind::kCamera;
 }
 
 std::string Place(const client::Event& event) {

@@ -71,6 +71,8 @@ enum class EventKind {
   kThresholds,
   kFramesLost,
   kRecording,
+  kForceModel,
+  kCamera,
 };
 const char* Name(EventKind kind);  ///< "contact_begin", ...
 std::optional<EventKind> EventKindOf(const std::string& name);

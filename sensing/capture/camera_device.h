@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "sensing/capture/frame_source.h"
 #include "sensing/core/camera_model.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/result.h"
@@ -42,6 +43,10 @@ class CameraDevice {
   /// closing it helps.
   virtual Result<std::optional<DriverPicture>> Dequeue() = 0;
   virtual Result<void> Requeue(int buffer) = 0;
+  /// As FrameSource::SetCamera.
+  virtual Result<void> Set(const CameraSettings&) {
+    return Error{ErrorCode::kUnsupported, description() + " can't be set"};
+  }
 
   virtual CameraFormat format() const = 0;
   virtual std::string description() const = 0;  ///< "/dev/video0 (usb:1-2, serial:A1)"
@@ -61,6 +66,8 @@ class CameraSystem {
   /// Closes `old` if there is one, then opens the camera and starts it. Returns at once: a camera that does
   /// not answer can hold the kernel up for seconds, and the other one must not wait.
   virtual std::future<OpenedCamera> Open(CameraId id, std::unique_ptr<CameraDevice> old) = 0;
+  /// Of what will be opened from now on.
+  virtual void Remember(CameraId, const CameraSettings&) {}
 
   /// Until a device (null: not there) has a picture or trouble, or until that time. What the trouble is, by
   /// camera; empty: none.

@@ -40,6 +40,7 @@ class CameraPair final : public FrameSource {
 
   Result<void> Start() override;
   Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override;
+  Result<void> SetCamera(CameraId id, const CameraSettings& settings) override;
   SourceInfo Info() const override;
   SourceCounters Counters() const override;
 
@@ -360,6 +361,15 @@ Error CameraPair::BothLost() const {
             (Of(id).trouble.empty() ? options_.names[Index(id)] + ": does not answer" : Of(id).trouble);
   }
   return {Of(CameraId::kTop).code, text};
+}
+
+Result<void> CameraPair::SetCamera(CameraId id, const CameraSettings& settings) {
+  const Camera& camera = Of(id);
+  if (!camera.device)
+    return Error{ErrorCode::kUnavailable, options_.names[Index(id)] + ": the camera is not there now"};
+  auto set = camera.device->Set(settings);
+  if (set) system_->Remember(id, settings);
+  return set;
 }
 
 SourceInfo CameraPair::Info() const {

@@ -3,6 +3,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,13 @@ struct SourceCamera {
   std::string device;      ///< what was found: "/dev/video0 (usb:1-2, serial:A1)"; empty: not open
   std::string format;      ///< "YUYV 640x480"; empty: not open
   std::string trouble;     ///< why it gives no pictures now; empty: it does
+};
+
+/// How a camera exposes; what is not set stays as it is.
+struct CameraSettings {
+  bool automatic_exposure = false;         ///< the camera decides; then without a time
+  std::optional<int> exposure_100us = {};  ///< exposure time, 0.1 ms
+  std::optional<int> gain = {};            ///< camera's own units
 };
 
 /// What a source delivers, known after Start.
@@ -56,6 +64,12 @@ class FrameSource {
   /// it is late. While a source has only one of its cameras the other image is not valid. Errors: kTimeout
   /// (nothing yet, call again), kUnavailable (lost: Start again), kEndOfData.
   virtual Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) = 0;
+
+  /// From the next pictures on, also after another Start. Errors: kUnsupported (nothing to set),
+  /// kInvalidArgument (what the camera takes is in the message), kUnavailable (the camera is not there now).
+  virtual Result<void> SetCamera(CameraId, const CameraSettings&) {
+    return Error{ErrorCode::kUnsupported, "this link's pictures come from no camera that can be set"};
+  }
 
   virtual SourceInfo Info() const = 0;
   virtual SourceCounters Counters() const { return {}; }

@@ -27,6 +27,7 @@ class V4l2Camera final : public CameraDevice {
 
   Result<std::optional<DriverPicture>> Dequeue() override;
   Result<void> Requeue(int buffer) override { return device_.Requeue(buffer); }
+  Result<void> Set(const CameraSettings& settings) override { return device_.Set(settings); }
   CameraFormat format() const override {
     return {device_.format(), width_px_, height_px_, device_.bytes_per_line()};
   }
@@ -74,7 +75,8 @@ OpenedCamera OpenStreaming(const V4l2DeviceOptions& asked, const V4l2Options& op
       std::make_unique<V4l2Camera>(std::move(*device), DescribeNode(asked.path), options, clock));
 }
 
-OpenedCamera OpenByName(const V4l2Options& options, CameraId id, Clock& clock) {
+OpenedCamera OpenByName(const V4l2Options& options, CameraId id, const CameraSettings& settings,
+                        Clock& clock) {
   const std::string& name = options.devices[Index(id)];
   const auto node = FindCamera(name);
   if (!node) return node.error();
@@ -83,8 +85,8 @@ OpenedCamera OpenByName(const V4l2Options& options, CameraId id, Clock& clock) {
                           .height_px = options.height_px,
                           .frame_rate_hz = options.frame_rate_hz,
                           .format = options.format,
-                          .exposure_100us = options.exposure_100us,
-                          .gain = options.gain,
+                          .exposure_100us = settings.exposure_100us,
+                          .gain = settings.gain,
                           .buffers = options.buffers};
   auto camera = OpenStreaming(asked, options, clock);
   if (!camera && camera.error().code == ErrorCode::kResourceExhausted && !options.format) {
@@ -98,13 +100,22 @@ OpenedCamera OpenByName(const V4l2Options& options, CameraId id, Clock& clock) {
 
 class V4l2CameraSystem final : public CameraSystem {
  public:
-  V4l2CameraSystem(V4l2Options options, Clock& clock) : options_(std::move(options)), clock_(clock) {}
+  V4l2CameraSystem(V4l2Options options, Clock& clock) : options_(std::move(options)), clock_(clock) {
+    settings_.fill({.exposure_100us = options_.exposure_100us, .gain = options_.gain});
+  }
 
   std::future<OpenedCamera> Open(CameraId id, std::unique_ptr<CameraDevice> old) override {
-    return std::async(std::launch::async, [this, id, old = std::move(old)]() mutable {
-      old.reset();
-      return OpenByName(options_, id, clock_);
-    });
+    return std::async(std::launch::async,
+                      [this, id, settings = settings_[Index(id)], old = std::move(old)]() mutable {
+                        old.reset();
+                        return OpenByName(options_, id, settings, clock_);
+                      });
+  }
+  void Remember(CameraId id, const CameraSettings& settings) override {
+    CameraSettings& kept = settings_[Index(id)];
+    if (settings.automatic_exposure) kept.exposure_100us.reset();
+    if (settings.exposure_100us) kept.exposure_100us = settings.exposure_100us;
+    if (settings.gain) kept.gain = settings.gain;
   }
 
   std::array<std::string, kCameraCount> Wait(const CameraDevices& devices, int64_t until_ns) override;
@@ -112,6 +123,7 @@ class V4l2CameraSystem final : public CameraSystem {
  private:
   const V4l2Options options_;
   Clock& clock_;
+  std::array<CameraSettings, kCameraCount> settings_;
 };
 
 std::array<std::string, kCameraCount> V4l2CameraSystem::Wait(const CameraDevices& devices, int64_t until_ns) {

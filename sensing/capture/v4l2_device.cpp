@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <tuple>
 #include <utility>
 
 #include "sensing/capture/camera_finder.h"
@@ -265,6 +266,22 @@ Result<void> V4l2Device::SetExposureAndGain() {
     if (auto set = SetControl(V4L2_CID_GAIN, "gain", *options_.gain); !set) return set;
   }
   return {};
+}
+
+Result<void> V4l2Device::Set(const CameraSettings& settings) {
+  if (settings.automatic_exposure) {
+    // Of the two automatic modes a camera often has one only.
+    auto set = SetControl(V4L2_CID_EXPOSURE_AUTO, "automatic exposure", V4L2_EXPOSURE_APERTURE_PRIORITY);
+    if (!set) set = SetControl(V4L2_CID_EXPOSURE_AUTO, "automatic exposure", V4L2_EXPOSURE_AUTO);
+    if (!set) return set;
+    options_.exposure_100us.reset();
+  }
+  const auto before = std::pair(options_.exposure_100us, options_.gain);
+  if (settings.exposure_100us) options_.exposure_100us = settings.exposure_100us;
+  if (settings.gain) options_.gain = settings.gain;
+  auto set = SetExposureAndGain();
+  if (!set) std::tie(options_.exposure_100us, options_.gain) = before;
+  return set;
 }
 
 bool V4l2Device::HasControl(uint32_t id) const {

@@ -50,6 +50,8 @@ class V4l2Device {
   Result<std::optional<DriverPicture>> Dequeue();
   Result<void> Requeue(int buffer);
 
+  /// As FrameSource::SetCamera.
+  Result<void> Set(const CameraSettings& settings);
   /// Any control of the camera by its V4L2 number. `name` is for the error message.
   Result<void> SetControl(uint32_t id, const char* name, int value);
   Result<int> GetControl(uint32_t id, const char* name) const;

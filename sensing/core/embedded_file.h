@@ -5,7 +5,7 @@
 
 namespace taclink {
 
-/// A text file of the source tree that the build puts into the program.
+/// A file that the build puts into the program.
 struct EmbeddedFile {
   std::string_view name;
   std::string_view content;

@@ -275,6 +275,10 @@ void LinkPipeline::Restart() {
   stages_->finder = ContactFinder(stages_->model, stages_->options.contact);
 }
 
+void LinkPipeline::UseEstimator(std::unique_ptr<ForceEstimator> estimator) {
+  stages_->estimator = std::move(estimator);
+}
+
 const LinkModel& LinkPipeline::model() const {
   return stages_->model;
 }

@@ -76,6 +76,10 @@ class LinkPipeline {
   /// stays.
   std::optional<Result<TareSummary>> TakeTareEnd();
 
+  /// Computes the forces so from the next frame on; baseline and contacts stay. Not null, and made for the
+  /// same model.
+  void UseEstimator(std::unique_ptr<ForceEstimator> estimator);
+
   const LinkModel& model() const;
   /// Of the last pair that was measured: which detection is which marker.
   const LabelledMarkers& labels() const;

@@ -7,6 +7,18 @@
 #include <utility>
 
 namespace taclink {
+namespace {
+
+constexpr int kNominalExposure100us = 50, kNominalGain = 1;
+constexpr int kLongestExposure100us = 1000, kLargestGain = 16;
+
+/// Of all levels, against the nominal ones.
+double Brightness(const CameraSettings& settings) {
+  return settings.exposure_100us.value() * settings.gain.value() /
+         static_cast<double>(kNominalExposure100us * kNominalGain);
+}
+
+}  // namespace
 
 Result<std::unique_ptr<SimulatedSource>> SimulatedSource::Make(const LinkModel& model, const Scene& scene,
                                                                Clock& clock) {
@@ -32,6 +44,7 @@ SimulatedSource::SimulatedSource(const LinkModel& model, Scene scene, Clock& clo
     info_.description += " (" + prepared + took + ")";
   }
   truth_.contacts.reserve(kMaxSceneContacts);
+  settings_.fill({.exposure_100us = kNominalExposure100us, .gain = kNominalGain});
 }
 
 Result<void> SimulatedSource::Start() {
@@ -39,6 +52,21 @@ Result<void> SimulatedSource::Start() {
   started_ = true;
   start_ns_ = clock_.MonotonicNs();
   next_frame_ = 0;
+  return {};
+}
+
+Result<void> SimulatedSource::SetCamera(CameraId id, const CameraSettings& settings) {
+  const int exposure = settings.exposure_100us.value_or(kNominalExposure100us);
+  const int gain = settings.gain.value_or(kNominalGain);
+  if (settings.automatic_exposure)
+    return Error{ErrorCode::kUnsupported, name_ + ": a simulated camera has no automatic exposure"};
+  if (exposure < 1 || exposure > kLongestExposure100us)
+    return Error{ErrorCode::kInvalidArgument, name_ + ": exposure must be 0.1 to 100 ms"};
+  if (gain < 1 || gain > kLargestGain)
+    return Error{ErrorCode::kInvalidArgument, name_ + ": gain must be 1 to 16"};
+  CameraSettings& kept = settings_[Index(id)];
+  if (settings.exposure_100us) kept.exposure_100us = exposure;
+  if (settings.gain) kept.gain = gain;
   return {};
 }
 
@@ -76,6 +104,8 @@ void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
   skin_->Evaluate(static_cast<double>(frame_number) / scene_.frame_rate_hz, truth_);
   for (const CameraId id : kBothCameras) {
     renderer_.Render(truth_, id, gray_);
+    if (const double brightness = Brightness(settings_[Index(id)]); brightness != 1)
+      gray_.convertTo(gray_, CV_8U, brightness);
     PackYuyv(gray_, renderer_.chroma(id), frame.images[Index(id)]);
   }
   frame.sequence = sequence_offset_ + frame_number;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
@@ -25,6 +26,8 @@ class SimulatedSource final : public FrameSource {
 
   Result<void> Start() override;  ///< from the scene's beginning
   Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override;
+  /// As a camera that exposes for 5 ms with gain 1 at first; there is no automatic exposure.
+  Result<void> SetCamera(CameraId id, const CameraSettings& settings) override;
   SourceInfo Info() const override;
 
   /// Of the last frame.
@@ -50,6 +53,7 @@ class SimulatedSource final : public FrameSource {
   uint64_t sequence_offset_ = 0;  // frames of earlier starts: the count goes on
   SkinTruth truth_;
   cv::Mat gray_;
+  std::array<CameraSettings, kCameraCount> settings_;  // as set; all is set from the beginning
 };
 
 Result<std::unique_ptr<FrameSource>> MakeSimulatedSource(const LinkModel& model, const Scene& scene,

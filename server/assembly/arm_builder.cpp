@@ -1,6 +1,9 @@
 #include "server/assembly/arm_builder.h"
 
 #include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -13,13 +16,39 @@
 namespace taclink::server {
 namespace {
 
+/// How a link's forces are computed: as configured, until somebody chooses otherwise.
+class ChosenForceModel {
+ public:
+  explicit ChosenForceModel(std::optional<ForceModel> configured) : model_(configured) {}
+
+  void Set(ForceModel model) {
+    const std::lock_guard lock(mutex_);
+    model_ = model;
+  }
+  LinkConfig In(LinkConfig link) const {
+    const std::lock_guard lock(mutex_);
+    link.force_model = model_;
+    return link;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::optional<ForceModel> model_;  // guarded by mutex_; none: by tolerance, frame by frame
+};
+
 Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
   auto model = LoadLinkModel(link.model);
   if (!model) return model.error();
   if (const auto good = CheckRules(link.rules, model->markers); !good) return good.error();
+  const auto chosen = std::make_shared<ChosenForceModel>(link.force_model);
   const LinkFactories factories = {
       .source = [link, model = *model, &clock] { return MakeSource(link, model, clock); },
-      .processor = [link, model = *model] { return MakeProcessor(link, model); }};
+      .processor = [link, model = *model, chosen] { return MakeProcessor(chosen->In(link), model); },
+      .estimator =
+          [link, model = *model, chosen](ForceModel force_model) {
+            chosen->Set(force_model);
+            return MakeForceEstimator(model, ToPipelineOptions(chosen->In(link)).force);
+          }};
   auto source = factories.source();
   if (!source) return source.error();
   auto processor = factories.processor();

@@ -32,6 +32,12 @@ class PipelineProcessor final : public LinkProcessor {
   std::optional<Result<TareSummary>> TakeTareEnd() override { return pipeline_.TakeTareEnd(); }
   void CancelTare() override { pipeline_.CancelTare(); }
 
+  const LabelledMarkers* labels() const override { return &pipeline_.labels(); }
+  Result<void> UseEstimator(std::unique_ptr<ForceEstimator> estimator) override {
+    pipeline_.UseEstimator(std::move(estimator));
+    return {};
+  }
+
   Result<void> BeginCalibration(const CalibrationOrder& order) override {
     if (touched_ && !order.force)
       return Error{ErrorCode::kFailedPrecondition, "the skin is touched; let go of it, or ask with force"};

@@ -26,8 +26,10 @@ enum class EventKind : uint8_t {
   kThresholds,
   kFramesLost,  ///< the engine was too slow: what happened in them is not told
   kRecording,   ///< begun, ended, in trouble
+  kForceModel,  ///< set
+  kCamera,      ///< exposure or gain set
 };
-inline constexpr size_t kEventKinds = 12;
+inline constexpr size_t kEventKinds = 14;
 
 struct ContactDetail {
   uint64_t id = 0;  ///< the contact's in the frame that began it; lasts

@@ -32,8 +32,9 @@ std::string NewRunId(const Clock& clock) {
 
 const char* Name(EventKind kind) {
   static constexpr std::array<const char*, kEventKinds> kNames = {
-      "contact_begin", "contact_update", "contact_end", "force_level", "link_status", "tare",
-      "calibration",   "baseline",       "drift",       "thresholds",  "frames_lost", "recording"};
+      "contact_begin", "contact_update", "contact_end", "force_level", "link_status",
+      "tare",          "calibration",    "baseline",    "drift",       "thresholds",
+      "frames_lost",   "recording",      "force_model", "camera"};
   return kNames[static_cast<size_t>(kind)];
 }
 

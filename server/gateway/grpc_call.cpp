@@ -36,6 +36,7 @@ class GrpcCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer,
                             std::chrono::duration_cast<std::chrono::microseconds>(*request_.timeout));
     context_.AddMetadata(kForwardedPeer, request_.peer);
     if (!request_.name.empty()) context_.AddMetadata(kForwardedName, request_.name);
+    context_.AddMetadata(kForwardedRole, std::string(1, request_.role));
     stub_.PrepareBidiStreamingCall(&context_, request_.method, {}, this);
     AddHold();  // reads are started from outside gRPC's own callbacks
     StartRead(&response_);

@@ -24,6 +24,7 @@ struct GrpcCallRequest {
   std::vector<std::string> messages;  ///< serialised; a unary method takes one
   std::optional<std::chrono::nanoseconds> timeout;
   std::string peer, name;  ///< who calls (see server/forwarded.h); name empty: not known
+  char role = 0;           ///< likewise
 };
 
 /// One gRPC call by the method's name, bytes through. At most one answer waits here: the next one is read

@@ -75,6 +75,20 @@ std::string_view ContentTypeOf(std::string_view path) {
 }
 
 // As Vite names its files: NAME-HASH.EXTENSION, eight characters of hash.
+bool TakesGzip(std::string_view accept_encoding) {
+  while (!accept_encoding.empty()) {
+    const size_t end = std::min(accept_encoding.find(','), accept_encoding.size());
+    std::string_view item = accept_encoding.substr(0, end);
+    accept_encoding.remove_prefix(std::min(end + 1, accept_encoding.size()));
+    const size_t begin = std::min(item.find_first_not_of(' '), item.size());
+    item.remove_prefix(begin);
+    const std::string_view coding = item.substr(0, item.find_first_of("; "));
+    if (coding == "gzip")
+      return item.find("q=0") == std::string_view::npos || item.find("q=0.") != std::string_view::npos;
+  }
+  return false;
+}
+
 bool NameHoldsHash(std::string_view path) {
   constexpr size_t kHashSize = 8;
   path.remove_prefix(path.rfind('/') == std::string_view::npos ? 0 : path.rfind('/') + 1);

@@ -15,6 +15,9 @@ Result<std::string> PathOfTarget(std::string_view target);
 /// The media type of a file, by its name.
 std::string_view ContentTypeOf(std::string_view path);
 
+/// Whether an `accept-encoding` header ("gzip, deflate;q=0.5") takes gzip.
+bool TakesGzip(std::string_view accept_encoding);
+
 /// Whether a file's name holds a hash of its content ("index-BxX2a9Zk.js"), so that it never changes.
 bool NameHoldsHash(std::string_view path);
 

@@ -224,12 +224,14 @@ Session::Outcome Session::AnswerText(const HttpRequest& request, int status, std
 }
 
 Session::Outcome Session::AnswerFile(const HttpRequest& request, const std::string& path) {
-  auto file = shared_->files.Find(path);
+  auto file = shared_->files.Find(path, TakesGzip(request.Header("accept-encoding")));
   if (!file) co_return co_await AnswerText(request, 404, kPlainText, file.error().message + "\n");
   HttpHeaders headers =
       CommonHeaders(file->type, file->never_changes ? "public, max-age=31536000, immutable" : "no-cache");
   const std::string tag = "\"" + file->tag + "\"";
   headers.emplace_back("ETag", tag);
+  headers.emplace_back("Vary", "Accept-Encoding");
+  if (file->gzip) headers.emplace_back("Content-Encoding", "gzip");
   headers.emplace_back("Content-Security-Policy", kContentPolicy);
   headers.emplace_back("Referrer-Policy", "no-referrer");
   const bool known = request.Header("if-none-match") == tag;
@@ -258,7 +260,8 @@ Result<GrpcCallRequest> Session::ToCall(const HttpRequest& request, WebFormat fo
                        .messages = std::move(*messages),
                        .timeout = {},
                        .peer = peer_,
-                       .name = caller->name.empty() ? connection_->ClientName() : caller->name};
+                       .name = caller->name.empty() ? connection_->ClientName() : caller->name,
+                       .role = static_cast<char>(caller->role)};
   if (const auto timeout = request.Header("grpc-timeout"); !timeout.empty()) {
     call.timeout = ParseGrpcTimeout(timeout);
     if (!call.timeout)

@@ -48,22 +48,25 @@ Result<StaticFiles> StaticFiles::Open(const std::string& root) {
   return out;
 }
 
-Result<StaticFile> StaticFiles::FindBuiltIn(std::string_view name) {
+Result<StaticFile> StaticFiles::FindBuiltIn(std::string_view name, bool gzip) {
+  const std::string compressed = std::string(name) + ".gz";
   for (const EmbeddedFile& file : EmbeddedWeb()) {
-    if (file.name != name) continue;
+    if (file.name != (gzip ? compressed : name)) continue;
     StaticFile out;
     out.type = ContentTypeOf(name);
+    out.gzip = gzip;
     out.size = file.content.size();
     out.tag = std::to_string(std::hash<std::string_view>()(file.content));
     out.content = file.content;
     return out;
   }
+  if (gzip) return FindBuiltIn(name, false);
   return NotFound("/" + std::string(name));
 }
 
-Result<StaticFile> StaticFiles::Find(const std::string& path) const {
+Result<StaticFile> StaticFiles::Find(const std::string& path, bool gzip) const {
   const std::string name = path == "/" ? "index.html" : path.substr(1);
-  if (root_.empty()) return FindBuiltIn(name);
+  if (root_.empty()) return FindBuiltIn(name, gzip);
   std::error_code error;
   const fs::path file = fs::canonical(fs::path(root_) / name, error);
   if (error || !file.string().starts_with(root_ + "/") || !fs::is_regular_file(file, error))

@@ -12,6 +12,7 @@ namespace taclink::server {
 /// A file on its way to a client, read piece by piece.
 struct StaticFile {
   std::string_view type;
+  bool gzip = false;  ///< the content is compressed
   uint64_t size = 0;
   std::string tag;  ///< changes with the content
   bool never_changes = false;
@@ -31,12 +32,12 @@ class StaticFiles {
   /// `root` empty: those built in. Errors: kNotFound (no such folder, or no index.html in it).
   static Result<StaticFiles> Open(const std::string& root);
 
-  /// `path` is PathOfTarget's; "/" is index.html. Errors: kNotFound, also for folders and for links that lead
-  /// out of the root.
-  Result<StaticFile> Find(const std::string& path) const;
+  /// `path` is PathOfTarget's; "/" is index.html. Compressed where that is built in and `gzip` is taken.
+  /// Errors: kNotFound, also for folders and for links that lead out of the root.
+  Result<StaticFile> Find(const std::string& path, bool gzip = false) const;
 
  private:
-  static Result<StaticFile> FindBuiltIn(std::string_view name);
+  static Result<StaticFile> FindBuiltIn(std::string_view name, bool gzip);
 
   std::string root_;  // canonical; empty: built in
 };

@@ -158,8 +158,8 @@ void Recording::TakeFrame(const Publication& publication, const PicturesPtr& pic
       .log_utc_ns = UtcOf(state), .publish_utc_ns = state.times.exposure_utc_ns, .sequence = state.sequence};
   TellLosses(publication.link(), state.sequence);
   wire::log::LogWriter& writer = file_->writer();
-  for (size_t i = 0; pictures && i < pictures->size(); ++i) {
-    const RawImage& image = (*pictures)[i];
+  for (size_t i = 0; pictures && i < pictures->raw.size(); ++i) {
+    const RawImage& image = pictures->raw[i];
     if (!image.valid) continue;
     const auto encoded = wire::log::EncodePicture(image, wire::log::CameraFrameId(link, kBothCameras[i]),
                                                   state.times.exposure_utc_ns);

@@ -23,4 +23,16 @@ grpc::ServerUnaryReactor* OperationsService::RestartLink(grpc::CallbackServerCon
   return reactor;
 }
 
+grpc::ServerUnaryReactor* OperationsService::GetCaller(grpc::CallbackServerContext* context,
+                                                       const v1::GetCallerRequest*,
+                                                       v1::GetCallerResponse* response) {
+  const Caller caller = CallerOf(*context, *security_);
+  response->set_name(caller.name);
+  response->set_role(static_cast<v1::Role>(static_cast<int>(caller.role) + 1));
+  response->set_tokens(security_->needs_token());
+  auto* reactor = context->DefaultReactor();
+  reactor->Finish(grpc::Status::OK);
+  return reactor;
+}
+
 }  // namespace taclink::server

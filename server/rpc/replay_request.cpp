@@ -17,6 +17,7 @@ Result<ReplayOrder> ParseReplayRequest(const grpc::ByteBuffer& bytes) {
   if (const auto good = LogPlayer::CheckSpeed(request.speed()); !good) return good.error();
   return ReplayOrder{.log = request.log(),
                      .selection = {.links = {request.links().begin(), request.links().end()},
+                                   .frames = !request.without_frames(),
                                    .events = !request.without_events(),
                                    .contacts = !request.without_contacts(),
                                    .arm = !request.without_arm()},

@@ -81,6 +81,7 @@ void RpcServer::Shutdown(const std::string& reason, std::chrono::milliseconds pa
   server_->Shutdown(deadline);
   server_->Wait();
   if (recordings_) recordings_->Join();
+  service_.Join();
   senders_->join();
   server_.reset();
 }

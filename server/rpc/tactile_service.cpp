@@ -2,11 +2,14 @@
 
 #include <spdlog/spdlog.h>
 
+#include <boost/asio/post.hpp>
 #include <utility>
 
 #include "server/link_names.h"
 #include "server/rpc/arm_message.h"
 #include "server/rpc/event_calls.h"
+#include "server/rpc/link_calls.h"
+#include "server/rpc/preview_stream.h"
 #include "server/rpc/refused_stream.h"
 #include "server/rpc/status.h"
 #include "server/rpc/stream_request.h"
@@ -133,6 +136,57 @@ grpc::ServerUnaryReactor* TactileService::SetThresholds(grpc::CallbackServerCont
   if (!set) spdlog::info("{}: SetThresholds refused: {}", PeerOf(*context), set.error().message);
   auto* reactor = context->DefaultReactor();
   reactor->Finish(set ? grpc::Status::OK : ToGrpc(set.error()));
+  return reactor;
+}
+
+StreamReactor* TactileService::StreamPreview(grpc::CallbackServerContext* context,
+                                             const grpc::ByteBuffer* request) {
+  const auto options = ParsePreviewRequest(*request, link_names_);
+  if (!options) return RefuseStream(*context, "StreamPreview", options.error());
+  const std::string& link = link_names_[options->link];
+  if (const auto live = FindLiveLink(arm_, link); !live)
+    return RefuseStream(*context, "StreamPreview", live.error());
+  auto stream = std::make_shared<PreviewStream>(*options, link, registry_, aside_);
+  if (auto* refused = AddOrRefuse(*context, "StreamPreview", stream)) return refused;
+  stream->Begin(arm_.hub());
+  return stream.get();  // the registry holds it until gRPC is done
+}
+
+grpc::ServerUnaryReactor* TactileService::SetForceModel(grpc::CallbackServerContext* context,
+                                                        const v1::SetForceModelRequest* request,
+                                                        v1::SetForceModelResponse*) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  const auto link = FindLiveLink(arm_, request->link());
+  const auto model = ParseForceModel(*request);
+  if (!link || !model) {
+    reactor->Finish(ToGrpc(link ? model.error() : link.error()));
+    return reactor;
+  }
+  boost::asio::post(*aside_, [this, reactor, link = *link, model = *model, who = Who(*context, *security_)] {
+    const Result<void> set = arm_.worker(link).SetForceModel(model);
+    arm_.events().Post(EventKind::kForceModel, link, ToOperation(model, set, who));
+    reactor->Finish(set ? grpc::Status::OK : ToGrpc(set.error()));
+  });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* TactileService::SetCamera(grpc::CallbackServerContext* context,
+                                                    const v1::SetCameraRequest* request,
+                                                    v1::SetCameraResponse*) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  const auto link = FindLiveLink(arm_, request->link());
+  const auto order = ParseCameraRequest(*request);
+  if (!link || !order) {
+    reactor->Finish(ToGrpc(link ? order.error() : link.error()));
+    return reactor;
+  }
+  const auto observer = [reactor, request, &arm = arm_, link = *link,
+                         who = Who(*context, *security_)](const Result<void>& end) {
+    arm.events().Post(EventKind::kCamera, link, ToOperation(*request, end, who));
+    reactor->Finish(end ? grpc::Status::OK : ToGrpc(end.error()));
+  };
+  if (const auto ordered = arm_.worker(*link).SetCamera(*order, observer); !ordered)
+    observer(ordered.error());
   return reactor;
 }
 

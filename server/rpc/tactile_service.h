@@ -33,7 +33,10 @@ class TactileService final
                           v1::TactileService::WithCallbackMethod_UpdatePressure<
                               v1::TactileService::WithRawCallbackMethod_StreamEvents<
                                   v1::TactileService::WithCallbackMethod_SetThresholds<
-                                      v1::TactileService::Service>>>>>>>>> {
+                                      v1::TactileService::WithRawCallbackMethod_StreamPreview<
+                                          v1::TactileService::WithCallbackMethod_SetForceModel<
+                                              v1::TactileService::WithCallbackMethod_SetCamera<
+                                                  v1::TactileService::Service>>>>>>>>>>>> {
  public:
   TactileService(Arm& arm, ServiceLimits limits, std::shared_ptr<boost::asio::thread_pool> senders,
                  std::shared_ptr<const Security> security);
@@ -45,6 +48,8 @@ class TactileService final
   void WaitUntilNoStreams(std::chrono::milliseconds patience) const { registry_.WaitUntilEmpty(patience); }
   /// Of streams that begin from now on.
   void SetLimits(ServiceLimits limits);
+  /// Waits for what is done aside. Only once no call can come any more.
+  void Join() { aside_->join(); }
 
  private:
   grpc::ServerUnaryReactor* GetArm(grpc::CallbackServerContext* context, const v1::GetArmRequest* request,
@@ -69,6 +74,15 @@ class TactileService final
                                           const v1::SetThresholdsRequest* request,
                                           v1::SetThresholdsResponse* response) override;
 
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* StreamPreview(grpc::CallbackServerContext* context,
+                                                            const grpc::ByteBuffer* request) override;
+  grpc::ServerUnaryReactor* SetForceModel(grpc::CallbackServerContext* context,
+                                          const v1::SetForceModelRequest* request,
+                                          v1::SetForceModelResponse* response) override;
+  grpc::ServerUnaryReactor* SetCamera(grpc::CallbackServerContext* context,
+                                      const v1::SetCameraRequest* request,
+                                      v1::SetCameraResponse* response) override;
+
   Result<void> OrderCalibration(const std::string& who, const v1::CalibrateRequest& request,
                                 const std::shared_ptr<CalibrateStream>& stream);
   ServiceLimits limits() const;
@@ -81,6 +95,8 @@ class TactileService final
   Arm& arm_;
   const std::shared_ptr<boost::asio::thread_pool> senders_;
   const std::shared_ptr<const Security> security_;
+  /// For what takes long and nobody's frames wait for: pictures for people, force models.
+  const std::shared_ptr<boost::asio::thread_pool> aside_ = std::make_shared<boost::asio::thread_pool>(1);
   std::vector<std::string> link_names_;
 
   StreamRegistry registry_;

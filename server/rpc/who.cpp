@@ -16,24 +16,28 @@ bool IsForwarded(const grpc::ServerContextBase& context) {
   return PeerAddress(context.peer()).empty() && context.client_metadata().contains(kForwardedPeer);
 }
 
-std::string NameOf(const grpc::ServerContextBase& context, const Security& security) {
-  if (IsForwarded(context)) return Metadata(context, kForwardedName);
-  std::string name = security.NameOf(Metadata(context, "authorization"));
-  if (!name.empty()) return name;
-  const auto auth = context.auth_context();
-  if (!auth || !auth->IsPeerAuthenticated()) return name;
-  for (const auto& identity : auth->GetPeerIdentity()) name.assign(identity.data(), identity.size());
-  return name;
-}
-
 }  // namespace
 
 std::string PeerOf(const grpc::ServerContextBase& context) {
   return IsForwarded(context) ? Metadata(context, kForwardedPeer) : context.peer();
 }
 
+Caller CallerOf(const grpc::ServerContextBase& context, const Security& security) {
+  if (IsForwarded(context)) {
+    const std::string role = Metadata(context, kForwardedRole);
+    return {Metadata(context, kForwardedName),
+            role.empty() ? Role::kNobody : static_cast<Role>(role.front())};
+  }
+  Caller caller = security.Identify(Metadata(context, "authorization"));
+  if (!caller.name.empty()) return caller;
+  const auto auth = context.auth_context();
+  if (!auth || !auth->IsPeerAuthenticated()) return caller;
+  for (const auto& identity : auth->GetPeerIdentity()) caller.name.assign(identity.data(), identity.size());
+  return caller;
+}
+
 std::string Who(const grpc::ServerContextBase& context, const Security& security) {
-  const std::string name = NameOf(context, security);
+  const std::string name = CallerOf(context, security).name;
   return name.empty() ? PeerOf(context) : name + " " + PeerOf(context);
 }
 

@@ -12,6 +12,9 @@ namespace taclink::server {
 /// gateway its client's.
 std::string PeerOf(const grpc::ServerContextBase& context);
 
+/// Who the server takes a caller for.
+Caller CallerOf(const grpc::ServerContextBase& context, const Security& security);
+
 /// Who calls, for logs and the audit: the name of the token or of the certificate, if there is any, with the
 /// peer.
 std::string Who(const grpc::ServerContextBase& context, const Security& security);

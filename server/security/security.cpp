@@ -48,7 +48,7 @@ Security::~Security() {
 Result<Caller> Security::Check(std::string_view path, std::string_view authorization) const {
   if (!needs_token()) return Caller{"", Role::kOperator};
   const Role needed = NeededRole(path);
-  if (needed == Role::kNobody) return Caller{};
+  if (needed == Role::kNobody) return Identify(authorization);
   const std::string_view token = BearerToken(authorization);
   if (token.empty())
     return Error{ErrorCode::kUnauthenticated,
@@ -72,11 +72,14 @@ std::optional<Caller> Security::Find(std::string_view token) const {
   return caller == nullptr ? std::nullopt : std::optional(*caller);
 }
 
-std::string Security::NameOf(std::string_view authorization) const {
+Caller Security::Identify(std::string_view authorization) const {
+  if (!needs_token()) return {"", Role::kOperator};
   const std::string_view token = BearerToken(authorization);
-  if (!needs_token() || token.empty()) return {};
-  const auto caller = Find(token);
-  return caller ? caller->name : std::string();
+  return token.empty() ? Caller{} : Find(token).value_or(Caller{});
+}
+
+std::string Security::NameOf(std::string_view authorization) const {
+  return Identify(authorization).name;
 }
 
 std::shared_ptr<const TlsMaterial> Security::tls() const {

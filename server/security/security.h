@@ -29,6 +29,8 @@ class Security {
   /// is. Errors: kUnauthenticated (no token, or not known), kPermissionDenied.
   Result<Caller> Check(std::string_view path, std::string_view authorization) const;
 
+  /// Who sent that header; nobody, where it holds no token that is known.
+  Caller Identify(std::string_view authorization) const;
   /// Whose token that header holds; empty: none that is known.
   std::string NameOf(std::string_view authorization) const;
 

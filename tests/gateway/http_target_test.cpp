@@ -50,6 +50,13 @@ TEST(HttpTarget, NothingLeadsOutOfTheRoot) {
     EXPECT_FALSE(PathOfTarget(bad).ok()) << bad;
 }
 
+TEST(HttpTarget, GzipOnlyForWhoTakesIt) {
+  for (const char* yes : {"gzip", "gzip, deflate, br", "br;q=1.0, gzip;q=0.8", "deflate,gzip"})
+    EXPECT_TRUE(TakesGzip(yes)) << yes;
+  for (const char* no : {"", "br", "gzip;q=0", "x-gzip", "gzipped", "identity, *;q=0"})
+    EXPECT_FALSE(TakesGzip(no)) << no;
+}
+
 TEST(HttpTarget, TypesAndCaching) {
   EXPECT_EQ(ContentTypeOf("/index.html"), "text/html; charset=utf-8");
   EXPECT_EQ(ContentTypeOf("/a/b.js"), "text/javascript; charset=utf-8");

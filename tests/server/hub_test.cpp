@@ -198,9 +198,9 @@ TEST(Hub, PicturesAreKeptOnlyForThoseWhoWantThem) {
       [] {});
   EXPECT_TRUE(hub.WantsPictures(0));
   EXPECT_FALSE(hub.WantsPictures(1));
-  std::vector<std::weak_ptr<const RawPictures>> published;
+  std::vector<std::weak_ptr<const FramePictures>> published;
   for (uint64_t i = 1; i <= 3; ++i) {
-    auto pictures = std::make_shared<RawPictures>();
+    auto pictures = std::make_shared<FramePictures>();
     (*pictures)[0].bytes.assign(100'000, static_cast<uint8_t>(i));
     published.push_back(pictures);
     hub.Publish(0, MakeState(i), pictures);

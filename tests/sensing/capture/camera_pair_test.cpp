@@ -239,6 +239,27 @@ TEST_F(CameraPairTest, ALateCallerGetsTheNewestPair) {
   EXPECT_GE(source_->Counters().skipped_pairs, 1u);
 }
 
+TEST_F(CameraPairTest, SettingsGoToTheCameraAndAreKeptForItsReturn) {
+  Start();
+  ASSERT_TRUE(Next());
+  EXPECT_TRUE(source_->SetCamera(CameraId::kBottom, {.exposure_100us = 80}).ok());
+  EXPECT_TRUE(cameras_[kTop].set.empty());
+  ASSERT_EQ(cameras_[kBottom].set.size(), 1u);
+  EXPECT_EQ(cameras_[kBottom].set[0].exposure_100us, 80);
+  EXPECT_EQ(cameras_[kBottom].kept.size(), 1u);
+
+  cameras_[kBottom].set_error = "gain must be from 0 to 64";
+  const auto refused = source_->SetCamera(CameraId::kBottom, {.gain = 900});
+  EXPECT_EQ(refused.error().message, "gain must be from 0 to 64");
+  EXPECT_EQ(cameras_[kBottom].kept.size(), 1u) << "what was refused is not tried again";
+
+  cameras_[kBottom].plugged = false;
+  ASSERT_TRUE(Until(IsTopAlone));
+  const auto gone = source_->SetCamera(CameraId::kBottom, {.gain = 2});
+  EXPECT_EQ(gone.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(gone.error().message, HasSubstr("usb:2"));
+}
+
 TEST_F(CameraPairTest, InfoChangesAreCounted) {
   Start();
   ASSERT_TRUE(Next());

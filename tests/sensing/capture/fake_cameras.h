@@ -38,6 +38,9 @@ struct FakeCamera {
   uint32_t first_sequence = 0;
   std::set<uint32_t> skipped = {};  ///< exposures that the driver never hands out
   int opened = 0;
+  std::string set_error = {};             ///< empty: takes any setting
+  std::vector<CameraSettings> set = {};   ///< by Set
+  std::vector<CameraSettings> kept = {};  ///< by Remember: for the next opening
 
   int open_devices = 0;
   int buffers_out = 0;  ///< pictures that were taken and not given back
@@ -57,6 +60,10 @@ class FakeCameraSystem final : public CameraSystem {
     auto future = attempt.result.get_future();
     Answer(id);
     return future;
+  }
+
+  void Remember(CameraId id, const CameraSettings& settings) override {
+    cameras_[Index(id)].kept.push_back(settings);
   }
 
   std::array<std::string, kCameraCount> Wait(const CameraDevices& devices, int64_t until_ns) override {
@@ -119,6 +126,11 @@ class FakeCameraSystem final : public CameraSystem {
     }
 
     CameraFormat format() const override { return {PixelFormat::kMjpeg, 640, 480, 0}; }
+    Result<void> Set(const CameraSettings& settings) override {
+      if (!camera_.set_error.empty()) return Error{ErrorCode::kInvalidArgument, camera_.set_error};
+      camera_.set.push_back(settings);
+      return {};
+    }
     std::string description() const override { return "fake"; }
     int buffer_count() const override { return kBuffers; }
     uint64_t damaged() const override { return 0; }

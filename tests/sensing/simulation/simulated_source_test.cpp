@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+
+#include "sensing/capture/decode.h"
 #include "tests/sensing/simulation/scene_text.h"
 
 namespace taclink {
@@ -79,6 +82,29 @@ TEST_F(SimulatedSourceTest, TimesOutAndComesBack) {
   EXPECT_EQ(clock_.now_ns, before + 4 * kMs);
   ASSERT_TRUE(source->Next(frame_, milliseconds(6)).ok());
   EXPECT_EQ(frame_.sequence, 1U);
+}
+
+TEST_F(SimulatedSourceTest, ExposureAndGainBrightenOneCamera) {
+  const auto source = Source("duration_s: 1\ncamera: {sensor_noise_levels: 0, exposure: 0.3}");
+  const auto mean = [&](CameraId id) {
+    StereoFrame frame;
+    EXPECT_TRUE(source->Start().ok());
+    EXPECT_TRUE(source->Next(frame, milliseconds(20)).ok());
+    cv::Mat gray;
+    EXPECT_TRUE(GrayDecoder().Decode(frame.images[Index(id)], gray).ok());
+    return cv::mean(gray)[0];
+  };
+  const double top = mean(CameraId::kTop), bottom = mean(CameraId::kBottom);
+  ASSERT_TRUE(source->SetCamera(CameraId::kTop, {.exposure_100us = 100}).ok());
+  EXPECT_NEAR(mean(CameraId::kTop), 2 * top, 0.1);
+  EXPECT_EQ(mean(CameraId::kBottom), bottom);
+  ASSERT_TRUE(source->SetCamera(CameraId::kTop, {.gain = 2}).ok()) << "and the exposure stays";
+  EXPECT_GT(mean(CameraId::kTop), 3 * top);
+  EXPECT_EQ(source->SetCamera(CameraId::kTop, {.gain = 0}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(source->SetCamera(CameraId::kTop, {.exposure_100us = 5000}).error().code,
+            ErrorCode::kInvalidArgument);
+  EXPECT_EQ(source->SetCamera(CameraId::kTop, {.automatic_exposure = true}).error().code,
+            ErrorCode::kUnsupported);
 }
 
 TEST_F(SimulatedSourceTest, EndsWhereTheSceneDoes) {

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <mutex>
+#include <vector>
+
+#include "sensing/capture/frame_source.h"
+#include "sensing/core/result.h"
+
+namespace taclink::server {
+
+class SourceSupervisor;
+
+/// Which cameras of a link are to be set.
+struct CameraOrder {
+  std::array<bool, kCameraCount> cameras{};
+  CameraSettings settings;
+};
+
+/// Called once, on the capture thread or that which gives it up.
+using CameraObserver = std::function<void(const Result<void>&)>;
+
+/// Where settings of a link's cameras are ordered, and from where its capture thread carries them out.
+class CameraDesk {
+ public:
+  /// Any thread. Errors: kUnavailable, kResourceExhausted (too many wait). All else is told to the observer.
+  Result<void> Order(const CameraOrder& order, CameraObserver observer);
+
+  /// On the capture thread, between two frames. Stops at the first camera that refuses.
+  void CarryOut(SourceSupervisor& source);
+  /// Any thread: the capture thread ends, and will not tell. No order is taken any more.
+  void End(const Error& why);
+
+ private:
+  struct Job {
+    CameraOrder order;
+    CameraObserver observer;
+  };
+  std::vector<Job> TakeJobs();
+
+  std::mutex mutex_;
+  // Guarded by mutex_.
+  std::vector<Job> jobs_;
+  bool closed_ = false;
+};
+
+}  // namespace taclink::server

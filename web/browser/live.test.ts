@@ -1,0 +1,191 @@
+import axe from "axe-core";
+import type { Browser } from "playwright-core";
+import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { launch, Visit } from "./page";
+import { configuration, pressed, Server, untouched } from "./server";
+
+const isBright = (r: number, g: number, b: number) => r > 170 && g > 150 && b < 110;
+
+let browser: Browser;
+const server = new Server();
+
+beforeAll(async () => {
+  const still = server.write("still.yaml", untouched());
+  const held = server.write("held.yaml", pressed(7, 8, 0.3));
+  const config = server.write("arm.yaml", configuration("bench", { still, touched: held, third: still }));
+  await server.start("--config", config);
+  browser = await launch();
+});
+afterAll(async () => {
+  await browser?.close();
+  await server.close();
+});
+
+async function violations(visit: Visit): Promise<string[]> {
+  await visit.page.evaluate(axe.source);
+  const found = await visit.page.evaluate(async () => {
+    const { violations: all } = await (globalThis as unknown as { axe: typeof axe }).axe.run();
+    return all.map((each) => `${each.id}: ${each.nodes.map((node) => node.target.join(" ")).join(", ")}`);
+  });
+  return found;
+}
+
+describe("the arm", () => {
+  test("is there with its links, forces and their colours", async () => {
+    const visit = await Visit.open(browser, `${server.url}?link=touched`);
+    const { page } = visit;
+    await visit.row("touched").getByText("OK").waitFor();
+    await visit.row("still").getByText("OK").waitFor();
+    expect(await page.locator("tbody tr[data-link]").count()).toBe(3);
+    await page.locator(".label.force", { hasText: "N" }).first().waitFor();
+    const force = visit.row("touched").locator("td").nth(1);
+    const forceN = async () => Number.parseFloat(await force.innerText());
+    await expect.poll(forceN, { timeout: 10_000 }).toBeGreaterThan(0.24); // 0.3 N press
+    expect(await forceN()).toBeLessThan(0.36);
+    await page.waitForTimeout(1500);
+    await visit.picture("live");
+    await page.getByRole("button", { name: /^Focus/ }).click();
+    await page.waitForTimeout(1000);
+    const touched = await visit.shareOfPixels(isBright);
+    await visit.row("still").click();
+    await page.getByRole("button", { name: /^Focus/ }).click();
+    await page.waitForTimeout(1000);
+    const still = await visit.shareOfPixels(isBright);
+    expect(touched).toBeGreaterThan(0.0005);
+    expect(still).toBeLessThan(touched / 10);
+    await visit.close();
+  });
+
+  test("a link's address selects it", async () => {
+    const visit = await Visit.open(browser, `${server.url}?link=third`);
+    await visit.row("third").waitFor();
+    await expect.poll(() => visit.row("third").getAttribute("class")).toBe("selected");
+    await visit.row("touched").click();
+    await expect.poll(() => new URL(visit.page.url()).search).toBe("?link=touched");
+    await visit.close();
+  });
+
+  test("the map tells values under the pointer and by keys", async () => {
+    const visit = await Visit.open(browser, `${server.url}?link=touched`);
+    const map = visit.page.locator(".map canvas");
+    const readout = visit.page.locator(".readout");
+    await visit.page.locator(".label.force").first().waitFor();
+    const box = (await map.boundingBox())!;
+    await visit.page.mouse.move(box.x + (7.5 / 20) * box.width, box.y + (1 - 8.5 / 12) * box.height);
+    await expect.poll(() => readout.innerText()).toMatch(/path 7, ring 8: [1-9]/);
+    const pressure = Number(/: ([\d.]+) kPa/.exec(await readout.innerText())![1]);
+    expect(pressure).toBeGreaterThan(1);
+    await map.focus();
+    await visit.page.keyboard.press("ArrowRight");
+    await visit.page.keyboard.press("ArrowUp");
+    await expect.poll(() => readout.innerText()).toContain("path 8, ring 9");
+    await visit.picture("map");
+    await visit.close();
+  });
+
+  test("the cameras show pictures with the markers found in them", async () => {
+    const visit = await Visit.open(browser, `${server.url}?link=touched`);
+    await visit.page.getByRole("tab", { name: "Cameras" }).click();
+    const caption = visit.page.locator("figcaption").first();
+    await expect.poll(() => caption.innerText(), { timeout: 15_000 }).toMatch(/top: [12]\d\d markers/);
+    await visit.page.getByLabel("labels (path.ring)").check();
+    await visit.page.waitForTimeout(800);
+    await visit.picture("cameras");
+    await visit.close();
+  });
+
+  test("is usable by keys alone", async () => {
+    const visit = await Visit.open(browser, server.url);
+    const { page } = visit;
+    await visit.row("still").waitFor();
+    await page.locator(".scene canvas").waitFor();
+    await page.locator(".scene canvas").focus();
+    const frames = () => page.locator(".scene canvas").getAttribute("data-frames").then(Number);
+    for (const key of ["ArrowLeft", "ArrowUp", "+", "-", "Home"]) {
+      const before = await frames();
+      await page.keyboard.press(key);
+      await expect.poll(frames).toBeGreaterThan(before);
+    }
+    await page.getByRole("tab", { name: "Map" }).focus();
+    await page.keyboard.press("ArrowRight");
+    await page.keyboard.press("ArrowRight");
+    expect(await page.getByRole("tab", { name: "Settings" }).getAttribute("aria-selected")).toBe("true");
+    await visit.close();
+  });
+
+  test.each(["dark", "light"] as const)("has no fault that axe finds, %s", async (colorScheme) => {
+    const visit = await Visit.open(browser, `${server.url}?link=touched`, { colorScheme });
+    await visit.page.locator(".label.force").first().waitFor();
+    expect(await violations(visit)).toEqual([]);
+    for (const tab of ["Cameras", "Settings"]) {
+      await visit.page.getByRole("tab", { name: tab }).click();
+      await visit.page.waitForTimeout(700);
+      expect(await violations(visit)).toEqual([]);
+    }
+    await visit.page.getByRole("button", { name: /Record/ }).click();
+    expect(await violations(visit)).toEqual([]);
+    await visit.picture(`settings-${colorScheme}`);
+    await visit.close();
+  });
+
+  test("fits a phone", async () => {
+    const visit = await Visit.open(browser, server.url, { viewport: { width: 390, height: 844 } });
+    await visit.row("touched").waitFor();
+    await visit.page.locator(".label.force").first().waitFor();
+    const width = await visit.page.evaluate(() => document.documentElement.scrollWidth);
+    expect(width).toBeLessThanOrEqual(390);
+    await visit.picture("phone");
+    expect(await violations(visit)).toEqual([]);
+    await visit.close();
+  });
+});
+
+describe("the forces' curves", () => {
+  test("stand still while paused, and the stream goes on", async () => {
+    const visit = await Visit.open(browser, server.url);
+    const { page } = visit;
+    await page.locator(".u-over").waitFor();
+    await page.getByRole("button", { name: "Pause" }).click();
+    await page.waitForTimeout(400);
+    const chart = page.locator(".chart canvas");
+    const picture = () => chart.evaluate((canvas: HTMLCanvasElement) => canvas.toDataURL());
+    const before = await picture();
+    const frames = () => page.locator(".scene canvas").getAttribute("data-frames").then(Number);
+    const drawn = await frames();
+    await expect.poll(frames).toBeGreaterThan(drawn + 1);
+    expect(await picture()).toBe(before);
+    await page.getByRole("button", { name: "Go on" }).click();
+    await expect.poll(picture).not.toBe(before);
+    await visit.close();
+  });
+
+  test("can be those of each contact", async () => {
+    const visit = await Visit.open(browser, `${server.url}?link=touched`);
+    await visit.page.locator(".label.force").first().waitFor();
+    await visit.page.getByRole("button", { name: "Contacts of touched" }).click();
+    await expect.poll(() => visit.page.locator(".u-legend").innerText()).toMatch(/#\d+/);
+    await visit.close();
+  });
+});
+
+describe("a server that ends", () => {
+  test("is seen to be gone, and taken up again when it is back", async () => {
+    const own = new Server();
+    const config = own.write(
+      "arm.yaml",
+      configuration("away", { only: own.write("still.yaml", untouched()) }),
+    );
+    await own.start("--config", config);
+    const visit = await Visit.open(browser, own.url);
+    await visit.row("only").getByText("OK").waitFor();
+    await own.kill();
+    const banner = visit.page.getByRole("alert").filter({ hasText: "Connection lost" });
+    await banner.waitFor({ timeout: 10_000 });
+    await visit.picture("lost");
+    await own.start("--config", config);
+    await banner.waitFor({ state: "detached", timeout: 15_000 });
+    await visit.row("only").getByText("OK").waitFor({ timeout: 15_000 });
+    await visit.close();
+    await own.close();
+  });
+});

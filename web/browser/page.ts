@@ -1,0 +1,91 @@
+import { mkdirSync } from "node:fs";
+import { join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { chromium, type Browser, type Page } from "playwright-core";
+import { expect } from "vitest";
+
+const PICTURES =
+  process.env.TACLINK_PICTURES ?? fileURLToPath(new URL("../../build/web-pictures", import.meta.url));
+
+export function launch(): Promise<Browser> {
+  return chromium.launch({
+    executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+    args: [
+      "--no-sandbox",
+      "--use-angle=swiftshader",
+      "--enable-unsafe-swiftshader",
+      "--disable-dev-shm-usage",
+    ],
+  });
+}
+
+/** A page of the server's; whatever it asks elsewhere, or complains of, fails the test at `close`. */
+export class Visit {
+  readonly troubles: string[] = [];
+
+  private constructor(readonly page: Page) {}
+
+  static async open(
+    browser: Browser,
+    url: string,
+    options: Parameters<Browser["newPage"]>[0] = {},
+  ): Promise<Visit> {
+    const page = await browser.newPage({
+      viewport: { width: 1440, height: 900 },
+      colorScheme: "dark",
+      ...options,
+    });
+    const visit = new Visit(page);
+    const origin = new URL(url).origin;
+    page.on("request", (request) => {
+      const address = new URL(request.url());
+      if (address.origin !== origin && !["data:", "blob:"].includes(address.protocol))
+        visit.troubles.push(`a request left for ${request.url()}`);
+    });
+    page.on("pageerror", (error) => visit.troubles.push(`error in the page: ${error.message}`));
+    await page.goto(url);
+    return visit;
+  }
+
+  async close(): Promise<void> {
+    await this.page.close();
+    expect(this.troubles).toEqual([]);
+  }
+
+  picture(name: string): Promise<Buffer> {
+    mkdirSync(PICTURES, { recursive: true });
+    return this.page.screenshot({ path: join(PICTURES, `${name}.png`) });
+  }
+
+  row(link: string) {
+    return this.page.locator(`tr[data-link="${link}"]`);
+  }
+
+  /** Share of the scene's pixels that `is` holds for; r, g, b: 0 to 255. Only the canvas counts, no text over it. */
+  async shareOfPixels(is: (r: number, g: number, b: number) => boolean): Promise<number> {
+    const style = await this.page.addStyleTag({
+      content: ".labels, .legend, .tools { visibility: hidden !important; }",
+    });
+    const png = await this.page.locator(".scene canvas").screenshot();
+    await style.evaluate((element) => (element as Element).remove());
+    const source = `data:image/png;base64,${png.toString("base64")}`;
+    return this.page.evaluate(
+      async ([address, text]) => {
+        const holds = new Function(`return (${text})`)() as (r: number, g: number, b: number) => boolean;
+        const image = new Image();
+        image.src = address;
+        await image.decode();
+        const canvas = document.createElement("canvas");
+        canvas.width = image.width;
+        canvas.height = image.height;
+        const context = canvas.getContext("2d")!;
+        context.drawImage(image, 0, 0);
+        const { data } = context.getImageData(0, 0, image.width, image.height);
+        let count = 0;
+        for (let i = 0; i < data.length; i += 4) if (holds(data[i], data[i + 1], data[i + 2])) ++count;
+        return count / (data.length / 4);
+      },
+      [source, is.toString()] as const,
+    );
+  }
+}

@@ -1,0 +1,67 @@
+import { AppContext, useApp, type AppState } from "./app_state";
+import { ConnectionBanner } from "./views/connection_banner";
+import { EventList } from "./views/event_list";
+import { Header } from "./views/header";
+import { LinkPanel } from "./views/link_panel";
+import { LinkTable } from "./views/link_table";
+import { LogsPage } from "./views/logs_page";
+import { ReplayBar } from "./views/replay_bar";
+import { SceneView } from "./views/scene_view";
+import { TimeView } from "./views/time_view";
+
+export function App({ state }: { state: AppState }) {
+  return (
+    <AppContext.Provider value={state}>
+      <Page />
+    </AppContext.Provider>
+  );
+}
+
+function Page() {
+  const app = useApp();
+  const old = app.feed.value.connection.value.state === "lost";
+  return (
+    <>
+      <a class="skip" href="#content">
+        To the arm
+      </a>
+      <Header />
+      <ConnectionBanner />
+      <ReplayBar />
+      {app.page.value === "logs" ? (
+        <LogsPage />
+      ) : (
+        <main id="content" class={old ? "arm old" : "arm"}>
+          <SceneView />
+          <LinkPanel />
+          <LinkTable />
+          <TimeView />
+          <EventList />
+        </main>
+      )}
+      <Notice />
+    </>
+  );
+}
+
+function Notice() {
+  const app = useApp();
+  const notice = app.notice.value;
+  return (
+    <div class="notices" role={notice?.bad ? "alert" : "status"}>
+      {notice && (
+        <p class={notice.bad ? "notice bad" : "notice"}>
+          {notice.text}{" "}
+          <button
+            type="button"
+            class="plain"
+            aria-label="Dismiss"
+            onClick={() => (app.notice.value = undefined)}
+          >
+            ✕
+          </button>
+        </p>
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,119 @@
+import { effect, signal, type Signal } from "@preact/signals";
+import { createContext } from "preact";
+import { useContext } from "preact/hooks";
+import { Session } from "./api/session";
+import { formatAddress, parseAddress } from "./model/address";
+import { ArmStore } from "./model/arm_store";
+import type { Feed } from "./model/feed";
+import { LiveFeed } from "./model/live_feed";
+import { ReplayFeed } from "./model/replay_feed";
+import { COLOUR_MAPS, type ColourMapName } from "./skin/colour_map";
+import type { Quantity } from "./skin/fields";
+
+export type Theme = "system" | "dark" | "light";
+
+/** All that the views share. */
+export class AppState {
+  readonly session = new Session();
+  /** Of the live arm; of a log while one is played. */
+  readonly store: Signal<ArmStore>;
+  readonly feed: Signal<Feed>;
+
+  readonly page = signal<"live" | "logs">("live");
+  readonly link = signal("");
+  readonly log = signal("");
+  readonly quantity = signal<Quantity>("pressure");
+  readonly colourMap = signal<ColourMapName>("cividis");
+  readonly theme = signal<Theme>("system");
+  readonly askSignIn = signal(false);
+  /** For people, at the foot of the page for a while. */
+  readonly notice = signal<{ text: string; bad: boolean } | undefined>(undefined);
+
+  private noticeTimer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor() {
+    const address = parseAddress(location.search);
+    this.page.value = address.page;
+    this.link.value = address.link;
+    this.log.value = address.log;
+    this.loadChoices();
+    const [store, feed] = this.open(address.log, address.timeS);
+    this.store = signal(store);
+    this.feed = signal(feed);
+    effect(() => this.keepChoices());
+    effect(() => {
+      const page = this.page.value;
+      const link = this.link.value;
+      const log = this.log.value;
+      if (!log) this.showAddress({ page, link, log, timeS: NaN });
+    });
+    effect(() => {
+      this.session.generation.value;
+      const running = this.feed.value;
+      running.start();
+      return () => running.stop();
+    });
+    document.addEventListener("visibilitychange", () => this.feed.value.setHidden(document.hidden));
+    addEventListener("popstate", () => location.reload());
+  }
+
+  /** Plays a log from a time on (s since 1970-01-01 UTC); empty: the live arm. */
+  play(log: string, timeS = NaN): void {
+    const [store, feed] = this.open(log, timeS);
+    this.log.value = log;
+    this.page.value = "live";
+    this.store.value = store;
+    this.feed.value = feed;
+  }
+
+  tell(text: string, bad = false): void {
+    clearTimeout(this.noticeTimer);
+    this.notice.value = { text, bad };
+    this.noticeTimer = setTimeout(() => (this.notice.value = undefined), bad ? 15_000 : 5_000);
+  }
+
+  showAddress(address: Parameters<typeof formatAddress>[0]): void {
+    const text = formatAddress(address);
+    if (text !== location.search) history.replaceState(null, "", text || location.pathname);
+  }
+
+  private open(log: string, timeS: number): [ArmStore, Feed] {
+    const store = new ArmStore();
+    if (!log) return [store, new LiveFeed(this.session, store)];
+    const told = (atS: number) =>
+      this.showAddress({ page: this.page.value, link: this.link.value, log, timeS: atS });
+    return [store, new ReplayFeed(this.session, store, log, timeS, told)];
+  }
+
+  private loadChoices(): void {
+    try {
+      const kept = JSON.parse(localStorage.getItem("taclink.view") ?? "{}");
+      if (kept.quantity === "displacement") this.quantity.value = "displacement";
+      if (COLOUR_MAPS.includes(kept.colourMap)) this.colourMap.value = kept.colourMap;
+      if (kept.theme === "dark" || kept.theme === "light") this.theme.value = kept.theme;
+    } catch {
+      localStorage.removeItem("taclink.view");
+    }
+  }
+
+  private keepChoices(): void {
+    const theme = this.theme.value;
+    const text = JSON.stringify({ quantity: this.quantity.value, colourMap: this.colourMap.value, theme });
+    localStorage.setItem("taclink.view", text);
+    if (theme === "system") delete document.documentElement.dataset.theme;
+    else document.documentElement.dataset.theme = theme;
+  }
+}
+
+export const AppContext = createContext<AppState | undefined>(undefined);
+
+export function useApp(): AppState {
+  return useContext(AppContext)!;
+}
+
+/** The selected link, or the first one. */
+export function selectedLink(app: AppState): string {
+  const links = app.store.value.arm.value?.links ?? [];
+  const wanted = app.link.value;
+  return links.some((link) => link.name === wanted) ? wanted : (links[0]?.name ?? "");
+}

@@ -1,0 +1,216 @@
+import { Code } from "@connectrpc/connect";
+import { signal } from "@preact/signals";
+import { keepOpen } from "../api/keep_open";
+import { EventKind } from "../api/gen/taclink/v1/events_pb";
+import { Detail } from "../api/gen/taclink/v1/frame_pb";
+import type { ReplayStatus } from "../api/gen/taclink/v1/recording_pb";
+import { messageOf, type Session } from "../api/session";
+import { secondsOf } from "../ui/format";
+import type { ArmStore } from "./arm_store";
+import type { Connection, Feed } from "./feed";
+
+/** When something touched a link, s since 1970-01-01 UTC. */
+export interface ContactSpan {
+  link: string;
+  id: bigint;
+  fromS: number;
+  toS: number;
+  peakN: number;
+}
+
+const toNs = (seconds: number) => BigInt(Math.round(seconds * 1e6)) * 1000n;
+
+/** Keeps the store as the arm was when a log was recorded. */
+export class ReplayFeed implements Feed {
+  readonly connection = signal<Connection>({ state: "connecting" });
+  readonly status = signal<ReplayStatus | undefined>(undefined);
+  readonly positionS = signal(NaN);
+  readonly contacts = signal<readonly ContactSpan[]>([]);
+  /** Not all of the log's contacts are known yet. */
+  readonly looking = signal(true);
+  /** Why an order was refused, or the log can't be played. */
+  readonly trouble = signal("");
+
+  private life: AbortController | undefined;
+  private pausedByHiding = false;
+  private toldAtMs = 0;
+  private looping = false;
+
+  constructor(
+    private readonly session: Session,
+    private readonly store: ArmStore,
+    readonly log: string,
+    private startS: number,
+    private readonly onPosition: (timeS: number) => void,
+  ) {}
+
+  start(): void {
+    this.stop();
+    this.life = new AbortController();
+    const { signal: stop } = this.life;
+    void keepOpen(stop, {
+      run: (end, alive) => this.read(end, alive),
+      onLost: (reason, retryInMs, code) => this.lost(reason, retryInMs, code),
+      silenceMs: 10_000,
+    });
+    void this.findContacts(stop);
+  }
+
+  stop(): void {
+    this.life?.abort();
+    this.life = undefined;
+  }
+
+  setHidden(hidden: boolean): void {
+    const status = this.status.value;
+    if (hidden && status && !status.paused) {
+      this.pausedByHiding = true;
+      void this.pause(true);
+    } else if (!hidden && this.pausedByHiding) {
+      this.pausedByHiding = false;
+      void this.pause(false);
+    }
+  }
+
+  get loop(): boolean {
+    return this.looping;
+  }
+
+  pause(paused: boolean): Promise<void> {
+    return this.control({ case: "pause", value: paused });
+  }
+  step(frames: number): Promise<void> {
+    return this.control({ case: "step", value: frames });
+  }
+  setSpeed(speed: number): Promise<void> {
+    return this.control({ case: "speed", value: speed });
+  }
+  setLoop(loop: boolean): Promise<void> {
+    this.looping = loop;
+    return this.control({ case: "loop", value: loop });
+  }
+  async seek(timeS: number): Promise<void> {
+    if (this.status.value?.ended || !this.life) {
+      this.startS = timeS;
+      this.start();
+      return;
+    }
+    this.store.clear();
+    await this.control({ case: "seekUtcNs", value: toNs(timeS) });
+  }
+
+  private async control(
+    action: Parameters<Session["recording"]["controlReplay"]>[0]["action"],
+  ): Promise<void> {
+    const player = this.status.value?.player;
+    if (!player) return;
+    try {
+      await this.session.recording.controlReplay({ player, action });
+      this.trouble.value = "";
+    } catch (error) {
+      this.trouble.value = messageOf(error);
+    }
+  }
+
+  private lost(reason: string, retryInMs: number, code: Code | undefined): void {
+    if (code === Code.Unauthenticated || code === Code.PermissionDenied) {
+      this.connection.value = { state: "signIn", reason: "This server wants to know who you are." };
+      this.stop();
+      return;
+    }
+    if (code === Code.NotFound || code === Code.InvalidArgument || code === Code.DataLoss) {
+      this.trouble.value = reason;
+      this.connection.value = { state: "live" };
+      this.stop();
+      return;
+    }
+    const now = performance.now();
+    const before = this.connection.value;
+    const sinceMs = before.state === "lost" ? before.sinceMs : now;
+    this.startS = this.positionS.value;
+    this.connection.value = { state: "lost", reason, sinceMs, retryAtMs: now + retryInMs };
+  }
+
+  // Begins with what was last before the start, also paused: by a seek, which a range would cut off.
+  private async read(stop: AbortSignal, alive: () => void): Promise<void> {
+    await this.session.refresh();
+    const wanted = this.startS;
+    let sought = !Number.isFinite(wanted);
+    const request = { log: this.log, detail: Detail.FULL, speed: 1, loop: this.looping, paused: !sought };
+    for await (const { message } of this.session.recording.replay(request, { signal: stop })) {
+      alive();
+      this.connection.value = { state: "live" };
+      switch (message.case) {
+        case "status":
+          this.takeStatus(message.value);
+          if (!sought) {
+            sought = true;
+            await this.seek(wanted);
+            await this.pause(false);
+          }
+          if (message.value.ended) return this.stop();
+          break;
+        case "frame":
+          this.store.takeFrame(message.value);
+          this.takePosition(this.store.timeS);
+          break;
+        case "contacts":
+          this.store.takeContacts(message.value);
+          break;
+        case "event":
+          this.store.takeEvent(message.value);
+          break;
+        case "arm":
+          this.store.takeArm(message.value);
+          break;
+        default:
+          break;
+      }
+    }
+  }
+
+  private takeStatus(status: ReplayStatus): void {
+    this.status.value = status;
+    if (status.paused || status.ended) this.takePosition(secondsOf(status.positionUtcNs));
+  }
+
+  private takePosition(timeS: number): void {
+    if (!(timeS > 0)) return;
+    const now = performance.now();
+    if (now - this.toldAtMs < 100) return;
+    this.positionS.value = timeS;
+    this.toldAtMs = now;
+    this.onPosition(timeS);
+  }
+
+  // Only the events of the whole log, as fast as they come.
+  private async findContacts(stop: AbortSignal): Promise<void> {
+    if (!this.looking.peek()) return;
+    const open = new Map<string, ContactSpan>();
+    const spans: ContactSpan[] = [];
+    const request = { log: this.log, withoutFrames: true, withoutContacts: true, withoutArm: true };
+    try {
+      for await (const { message } of this.session.recording.replay(request, { signal: stop })) {
+        if (message.case !== "event" || message.value.detail.case !== "contact") continue;
+        const { kind, link, times } = message.value;
+        const contact = message.value.detail.value;
+        const timeS = secondsOf(times?.exposureUtcNs || times?.raisedUtcNs || 0n);
+        const key = `${link}\n${contact.contactId}`;
+        let span = open.get(key);
+        if (!span) {
+          const fromS = timeS - contact.durationS;
+          span = { link, id: contact.contactId, fromS, toS: timeS, peakN: contact.peakForceN };
+          open.set(key, span);
+          spans.push(span);
+        }
+        span.toS = timeS;
+        span.peakN = Math.max(span.peakN, contact.peakForceN);
+        if (kind === EventKind.CONTACT_END) open.delete(key);
+      }
+      this.looking.value = false;
+    } catch (error) {
+      if (!stop.aborted) this.trouble.value = `Contacts of the time line: ${messageOf(error)}`;
+    }
+    this.contacts.value = spans;
+  }
+}

@@ -1,0 +1,131 @@
+import * as THREE from "three";
+import type { LinkModel } from "../api/gen/taclink/v1/arm_pb";
+import type { LinkFrame } from "../api/gen/taclink/v1/frame_pb";
+import type { Pose } from "../api/gen/taclink/v1/geometry_pb";
+import { colourIndex } from "../skin/colour_map";
+import { MarkerFields, type Quantity } from "../skin/fields";
+import { SkinSurface } from "../skin/surface";
+
+const CAP_LENGTH_M = 0.012;
+const CAP_COLOUR = 0x3a4048;
+const CAP_SELECTED = 0x2f81f7;
+const UNMEASURED = 0x808890;
+
+/** How scalar values become colours. */
+export interface Colouring {
+  quantity: Quantity;
+  /** 256 colours, linear RGB. */
+  table: Float32Array;
+  /** Value of the last colour, SI. */
+  range: number;
+}
+
+/** One link in the scene: its skin as it is deformed now, between the rings that clamp it. */
+export class LinkObject {
+  readonly group = new THREE.Group();
+  readonly skin: THREE.Mesh<THREE.BufferGeometry, THREE.MeshLambertMaterial>;
+  /** The largest value drawn last, SI. */
+  largest = 0;
+
+  private readonly surface: SkinSurface;
+  private readonly fields: MarkerFields;
+  private readonly colours: THREE.BufferAttribute;
+  private readonly caps: THREE.MeshLambertMaterial;
+
+  constructor(
+    readonly name: string,
+    readonly model: LinkModel,
+  ) {
+    this.surface = new SkinSurface(model);
+    this.fields = new MarkerFields(model);
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(this.surface.positions, 3));
+    geometry.setAttribute("normal", new THREE.BufferAttribute(this.surface.normals, 3));
+    this.colours = new THREE.BufferAttribute(new Float32Array(this.surface.positions.length), 3);
+    geometry.setAttribute("color", this.colours);
+    geometry.setIndex(new THREE.BufferAttribute(this.surface.indices, 1));
+    this.skin = new THREE.Mesh(
+      geometry,
+      new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide }),
+    );
+    this.skin.userData.link = name;
+    this.caps = new THREE.MeshLambertMaterial({ color: CAP_COLOUR });
+    this.group.add(this.skin, this.cap(0), this.cap(model.lengthM));
+    // A skin dents by less than its radius.
+    const radius = Math.max(...model.profileRadiusM, 0.01);
+    geometry.boundingSphere = new THREE.Sphere(
+      new THREE.Vector3(0, 0, model.lengthM / 2),
+      Math.hypot(model.lengthM / 2, radius) * 1.5,
+    );
+    this.group.matrixAutoUpdate = false;
+  }
+
+  private cap(z: number): THREE.Mesh {
+    const at = z === 0 ? 0 : this.model.profileRadiusM.length - 1;
+    const radius = (this.model.profileRadiusM[at] ?? 0.02) * 1.04;
+    const cap = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, CAP_LENGTH_M, 48), this.caps);
+    cap.rotation.x = Math.PI / 2;
+    cap.position.z = z === 0 ? -CAP_LENGTH_M / 2 : z + CAP_LENGTH_M / 2;
+    cap.userData.link = this.name;
+    return cap;
+  }
+
+  place(pose: Pose | undefined): void {
+    const t = pose?.translationM;
+    const q = pose?.rotation;
+    this.group.matrix.compose(
+      new THREE.Vector3(t?.x ?? 0, t?.y ?? 0, t?.z ?? 0),
+      q ? new THREE.Quaternion(q.x, q.y, q.z, q.w) : new THREE.Quaternion(),
+      new THREE.Vector3(1, 1, 1),
+    );
+    this.group.updateMatrixWorld(true);
+  }
+
+  select(selected: boolean): void {
+    this.caps.color.set(selected ? CAP_SELECTED : CAP_COLOUR);
+  }
+
+  /** Without a frame: nothing is measured, and it shows. */
+  update(frame: LinkFrame | undefined, colouring: Colouring): void {
+    const { surface } = this;
+    if (frame)
+      surface.update(this.fields.displacements(frame), this.fields.values(frame, colouring.quantity));
+    else surface.update(undefined, undefined);
+    this.skin.material.vertexColors = frame !== undefined;
+    this.skin.material.wireframe = frame === undefined;
+    this.skin.material.color.set(frame ? 0xffffff : UNMEASURED);
+    this.skin.material.needsUpdate = true;
+    this.paint(colouring);
+    this.skin.geometry.attributes.position.needsUpdate = true;
+    this.skin.geometry.attributes.normal.needsUpdate = true;
+  }
+
+  private paint({ table, range }: Colouring): void {
+    const { values } = this.surface;
+    const colours = this.colours.array;
+    let largest = 0;
+    for (let vertex = 0; vertex < values.length; ++vertex) {
+      const value = values[vertex];
+      if (value > largest) largest = value;
+      const from = 3 * colourIndex(value, range);
+      colours[3 * vertex] = table[from];
+      colours[3 * vertex + 1] = table[from + 1];
+      colours[3 * vertex + 2] = table[from + 2];
+    }
+    this.largest = largest;
+    this.colours.needsUpdate = true;
+  }
+
+  /** The middle of the link, base frame. */
+  center(): THREE.Vector3 {
+    return new THREE.Vector3(0, 0, this.model.lengthM / 2).applyMatrix4(this.group.matrix);
+  }
+
+  dispose(): void {
+    this.group.traverse((object) => {
+      if (object instanceof THREE.Mesh) object.geometry.dispose();
+    });
+    this.skin.material.dispose();
+    this.caps.dispose();
+  }
+}

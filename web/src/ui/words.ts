@@ -1,0 +1,105 @@
+import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
+import { EventKind, ForceLevel, type Event } from "../api/gen/taclink/v1/events_pb";
+import { ForceModel, LinkStatus, type LinkFrame } from "../api/gen/taclink/v1/frame_pb";
+import { lengthOf } from "../model/vectors";
+import { newtons } from "./format";
+
+export const STATUS_WORDS: Record<LinkStatus, string> = {
+  [LinkStatus.UNSPECIFIED]: "unknown",
+  [LinkStatus.STARTING]: "starting",
+  [LinkStatus.CALIBRATING]: "calibrating",
+  [LinkStatus.OK]: "OK",
+  [LinkStatus.DEGRADED]: "degraded",
+  [LinkStatus.LOST]: "lost",
+};
+
+/** Of more than colour: people who don't see it read the sign. */
+export const STATUS_SIGNS: Record<LinkStatus, string> = {
+  [LinkStatus.UNSPECIFIED]: "?",
+  [LinkStatus.STARTING]: "…",
+  [LinkStatus.CALIBRATING]: "…",
+  [LinkStatus.OK]: "✓",
+  [LinkStatus.DEGRADED]: "!",
+  [LinkStatus.LOST]: "✕",
+};
+
+export const LEVEL_WORDS: Record<ForceLevel, string> = {
+  [ForceLevel.UNSPECIFIED]: "",
+  [ForceLevel.NORMAL]: "",
+  [ForceLevel.WARNING]: "warning",
+  [ForceLevel.ALARM]: "alarm",
+};
+
+export const MODEL_WORDS: Record<ForceModel, string> = {
+  [ForceModel.UNSPECIFIED]: "–",
+  [ForceModel.LINEAR]: "linear",
+  [ForceModel.LITERAL]: "literal (for comparison only)",
+  [ForceModel.PRESSURISED]: "pressurised",
+  [ForceModel.NONLINEAR]: "nonlinear",
+};
+
+const SEVERITY: Record<LinkStatus, number> = {
+  [LinkStatus.LOST]: 4,
+  [LinkStatus.DEGRADED]: 3,
+  [LinkStatus.STARTING]: 2,
+  [LinkStatus.CALIBRATING]: 2,
+  [LinkStatus.UNSPECIFIED]: 2,
+  [LinkStatus.OK]: 0,
+};
+
+/** How much a link needs attention: the higher, the more. */
+export function severity(status: LinkStatus, level: ForceLevel, supervision: Supervision): number {
+  const worker = supervision > Supervision.RUNNING ? 5 : 0;
+  const force = level === ForceLevel.ALARM ? 3.5 : level === ForceLevel.WARNING ? 1 : 0;
+  return Math.max(worker, force, SEVERITY[status]);
+}
+
+/** Status and reason, of the newest frame where there is one. */
+export function statusOf(link: Link, frame: LinkFrame | undefined): { status: LinkStatus; reason: string } {
+  if (link.supervision > Supervision.RUNNING && link.supervisionReason)
+    return { status: frame?.status ?? link.status, reason: link.supervisionReason };
+  return frame
+    ? { status: frame.status, reason: frame.statusReason }
+    : { status: link.status, reason: link.statusReason };
+}
+
+/** An event in one line. */
+export function eventText(event: Event): string {
+  const { detail } = event;
+  switch (detail.case) {
+    case "contact": {
+      const force = detail.value.forceN ? newtons(lengthOf(detail.value.forceN)) : "";
+      const id = `#${detail.value.contactId}`;
+      if (event.kind === EventKind.CONTACT_BEGIN) return `contact ${id} began, ${force}`;
+      if (event.kind === EventKind.CONTACT_UPDATE) return `contact ${id} is ${force}`;
+      const peak = newtons(detail.value.peakForceN);
+      return `contact ${id} ended after ${detail.value.durationS.toFixed(1)} s, peak ${peak} (${detail.value.endReason})`;
+    }
+    case "forceLevel": {
+      const region = detail.value.region ? ` in ${detail.value.region}` : "";
+      const level = LEVEL_WORDS[detail.value.level] || "normal";
+      return `force ${level}${region}: ${newtons(detail.value.forceN)}`;
+    }
+    case "linkStatus":
+      return `${STATUS_WORDS[detail.value.status]}${detail.value.reason ? `: ${detail.value.reason}` : ""}`;
+    case "operation": {
+      const what = OPERATIONS[event.kind] ?? "operation";
+      const end = detail.value.accepted ? "done" : "refused";
+      return `${what} ${end} by ${detail.value.who}${detail.value.outcome ? `: ${detail.value.outcome}` : ""}`;
+    }
+    case "drift":
+      return `baseline has followed the skin by ${(detail.value.driftM * 1e3).toFixed(2)} mm`;
+    case "framesLost":
+      return `${detail.value.frames} frames without events: the server was too busy`;
+    default:
+      return EventKind[event.kind] ?? "event";
+  }
+}
+
+const OPERATIONS: Partial<Record<EventKind, string>> = {
+  [EventKind.TARE]: "tare",
+  [EventKind.CALIBRATION]: "calibration",
+  [EventKind.BASELINE]: "baseline",
+  [EventKind.THRESHOLDS]: "thresholds",
+  [EventKind.RECORDING]: "recording",
+};

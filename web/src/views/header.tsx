@@ -1,0 +1,124 @@
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { Role } from "../api/gen/taclink/v1/operations_pb";
+import { ForceLevel } from "../api/gen/taclink/v1/events_pb";
+import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
+import { useApp, type Theme } from "../app_state";
+import { statusOf } from "../ui/words";
+import { RecorderControl } from "./recorder_control";
+import { SignIn } from "./sign_in";
+
+export function Header() {
+  const app = useApp();
+  const arm = app.store.value.arm.value;
+  const replay = app.log.value !== "";
+  return (
+    <header class="top">
+      <h1>
+        TacLINK <span class="arm-name">{arm?.name}</span>
+        {replay && <span class="replay-word">REPLAY</span>}
+      </h1>
+      <nav aria-label="Pages">
+        <button
+          type="button"
+          aria-current={app.page.value === "live" ? "page" : undefined}
+          onClick={() => (app.page.value = "live")}
+        >
+          Arm
+        </button>
+        <button
+          type="button"
+          aria-current={app.page.value === "logs" ? "page" : undefined}
+          onClick={() => (app.page.value = "logs")}
+        >
+          Logs
+        </button>
+      </nav>
+      <Health />
+      <span class="grow" />
+      <RecorderControl />
+      <ThemeChoice />
+      <User />
+    </header>
+  );
+}
+
+/** The arm in a word: connected, how many links are not well, alarms. Also in the title of the window. */
+function Health() {
+  const app = useApp();
+  const store = app.store.value;
+  store.beat.value;
+  const { state } = app.feed.value.connection.value;
+  const links = store.arm.value?.links ?? [];
+  const unwell = links.filter(
+    (link) => statusOf(link, store.link(link.name).newest).status !== LinkStatus.OK,
+  ).length;
+  const alarms = links.filter((link) => store.levelOf(link.name) === ForceLevel.ALARM).length;
+  const words = { connecting: "connecting …", lost: "connection lost", signIn: "not signed in", live: "" }[
+    state
+  ];
+  const text =
+    words || (unwell === 0 ? `all ${links.length} links OK` : `${unwell} of ${links.length} links not OK`);
+  useEffect(() => {
+    const mark = state === "lost" ? "✕ " : alarms > 0 ? `(${alarms}) ` : unwell > 0 ? "! " : "";
+    document.title = `${mark}${store.arm.value?.name ?? "TacLINK"}${app.log.value ? " – replay" : ""}`;
+  }, [state, alarms, unwell, store.arm.value?.name, app.log.value]);
+  const kind = state === "live" ? (unwell === 0 ? "good" : "warn") : state === "connecting" ? "" : "bad";
+  return (
+    <p class={`health ${kind}`} role="status">
+      {text}
+      {alarms > 0 && (
+        <strong class="bad"> {alarms === 1 ? "1 link" : `${alarms} links`} above the alarm force</strong>
+      )}
+    </p>
+  );
+}
+
+function ThemeChoice() {
+  const app = useApp();
+  return (
+    <label>
+      <span class="hidden-text">Colours of the page</span>
+      <select
+        value={app.theme.value}
+        onChange={(event) => (app.theme.value = event.currentTarget.value as Theme)}
+      >
+        <option value="system">Auto</option>
+        <option value="dark">Dark</option>
+        <option value="light">Light</option>
+      </select>
+    </label>
+  );
+}
+
+function User() {
+  const app = useApp();
+  const open = useSignal(false);
+  const caller = app.session.caller.value;
+  const connection = app.feed.value.connection.value;
+  const asked = connection.state === "signIn" ? connection.reason : "";
+  useEffect(() => {
+    if (asked) open.value = true;
+  }, [asked]);
+  const role = caller?.role === Role.OPERATOR ? "operator" : "viewer";
+  return (
+    <div class="user">
+      {caller?.name && (
+        <span>
+          {caller.name}, {role}{" "}
+          <button type="button" class="plain" onClick={() => app.session.signOut()}>
+            Sign out
+          </button>
+        </span>
+      )}
+      {(caller?.tokens || asked) && !caller?.name && (
+        <button type="button" onClick={() => (open.value = true)}>
+          Sign in
+        </button>
+      )}
+      {open.value && (
+        <SignIn reason={asked || "Your token says who you are."} onClose={() => (open.value = false)} />
+      )}
+    </div>
+  );
+}

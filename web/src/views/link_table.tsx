@@ -1,0 +1,135 @@
+import { PressureOrigin } from "../api/gen/taclink/v1/pressure_pb";
+import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
+import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
+import { selectedLink, useApp } from "../app_state";
+import { lengthOf } from "../model/vectors";
+import { duration, fixed, milliseconds, newtons } from "../ui/format";
+import { LEVEL_WORDS, MODEL_WORDS, severity, STATUS_SIGNS, STATUS_WORDS, statusOf } from "../ui/words";
+
+const PASCALS_PER_KPA = 1e3;
+
+/** A row for each link; what needs attention is above. */
+export function LinkTable() {
+  const app = useApp();
+  const store = app.store.value;
+  store.beat.value;
+  const links = store.arm.value?.links ?? [];
+  const rows = links
+    .map((link) => {
+      const { newest } = store.link(link.name);
+      const { status, reason } = statusOf(link, newest);
+      const level = store.levelOf(link.name);
+      return { link, status, reason, level, weight: severity(status, level, link.supervision) };
+    })
+    .sort((a, b) => b.weight - a.weight || a.link.index - b.link.index);
+  return (
+    <section class="links" aria-label="Links">
+      <div class="scroller" tabIndex={0} role="region" aria-label="Links and how they do">
+        <table>
+          <thead>
+            <tr>
+              <th scope="col">Link</th>
+              <th scope="col">Status</th>
+              <th scope="col">Force</th>
+              <th scope="col">Rate</th>
+              <th scope="col">
+                <abbr title="From exposure to clients, median / 99th percentile">Latency</abbr>
+              </th>
+              <th scope="col">Markers</th>
+              <th scope="col">Pressure</th>
+              <th scope="col">Baseline</th>
+              <th scope="col">Model</th>
+              <th scope="col">
+                <abbr title="Frames not solved by the server / not delivered to this page">Drops</abbr>
+              </th>
+            </tr>
+          </thead>
+          <tbody>
+            {rows.map((row) => (
+              <Row key={row.link.name} {...row} selected={row.link.name === selectedLink(app)} />
+            ))}
+          </tbody>
+        </table>
+        {links.length === 0 && (
+          <p class="empty">No link yet. The server's configuration names them under `links`.</p>
+        )}
+      </div>
+    </section>
+  );
+}
+
+function Row(props: { link: Link; status: LinkStatus; reason: string; level: number; selected: boolean }) {
+  const app = useApp();
+  const { link, status, reason, level } = props;
+  const record = app.store.value.link(link.name);
+  const frame = record.newest;
+  const statistics = link.statistics;
+  const grid = link.model?.markers;
+  const level_word = LEVEL_WORDS[level as keyof typeof LEVEL_WORDS];
+  return (
+    <tr
+      class={props.selected ? "selected" : ""}
+      data-link={link.name}
+      onClick={() => (app.link.value = link.name)}
+    >
+      <th scope="row">
+        <button
+          type="button"
+          class="plain"
+          aria-pressed={props.selected}
+          onClick={() => (app.link.value = link.name)}
+        >
+          {link.name}
+        </button>
+      </th>
+      <td>
+        <span class={`status s${status}`}>
+          <span aria-hidden="true">{STATUS_SIGNS[status]}</span> {STATUS_WORDS[status]}
+        </span>
+        {link.supervision > Supervision.RUNNING && <span class="status s5">worker</span>}
+        {reason && (
+          <div class="reason" title={reason}>
+            {reason}
+          </div>
+        )}
+      </td>
+      <td class={`numbers level${level}`}>
+        {frame?.totalForceN && status !== LinkStatus.LOST ? newtons(lengthOf(frame.totalForceN)) : "–"}
+        {level_word && <span class="level-word"> {level_word}</span>}
+      </td>
+      <td class="numbers">{statistics?.rateHz ? `${fixed(statistics.rateHz, 1)}/s` : "–"}</td>
+      <td class="numbers">
+        {milliseconds(statistics?.latencyP50S)} / {milliseconds(statistics?.latencyP99S)}
+      </td>
+      <td class="numbers">
+        {frame ? frame.markersSeen : "–"}/{grid ? grid.paths * grid.rings : "–"}
+      </td>
+      <td class="numbers">
+        <Pressure link={link} />
+      </td>
+      <td
+        class="numbers"
+        title={frame?.baseline ? `Drift ${fixed(frame.baseline.driftM * 1e3, 2)} mm` : undefined}
+      >
+        {frame && frame.markersSeen > 0 ? duration(frame.baselineAgeS) : "–"}
+      </td>
+      <td>{frame ? MODEL_WORDS[frame.forceModel] : "–"}</td>
+      <td class="numbers">
+        {String(statistics?.framesSkipped ?? 0n)} / {String(record.counts?.framesDropped ?? 0n)}
+      </td>
+    </tr>
+  );
+}
+
+function Pressure({ link }: { link: Link }) {
+  const report = useApp().store.value.link(link.name).newest?.pressure;
+  if (!report || report.origin === PressureOrigin.NONE)
+    return <span title="Nobody says: taken as 0">0, assumed</span>;
+  const kpa = fixed(report.pressurePa / PASCALS_PER_KPA, 2);
+  const how = report.stale ? ", stale" : report.assumed ? ", assumed" : "";
+  return (
+    <span title={report.trouble || undefined} class={report.stale ? "bad" : ""}>
+      {kpa} kPa{how}
+    </span>
+  );
+}

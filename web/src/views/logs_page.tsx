@@ -1,0 +1,232 @@
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import type { Log } from "../api/gen/taclink/v1/recording_pb";
+import { messageOf } from "../api/session";
+import { useApp } from "../app_state";
+import { chooseLogs, durationNs, type LogKey, type LogOrder } from "../model/log_list";
+import { Dialog } from "../ui/dialog";
+import { bytes, dateTime, duration, secondsOf } from "../ui/format";
+import { OperatorButton, useRefusal } from "../ui/operator_button";
+
+const COLUMNS: [LogKey, string][] = [
+  ["name", "Log"],
+  ["start", "Begins"],
+  ["duration", "Duration"],
+  ["bytes", "Size"],
+  ["frames", "Frames"],
+  ["contacts", "Contacts"],
+];
+
+/** The logs of the server. */
+export function LogsPage() {
+  const app = useApp();
+  const logs = useSignal<readonly Log[] | undefined>(undefined);
+  const trouble = useSignal("");
+  const filter = useSignal("");
+  const order = useSignal<LogOrder>({ key: "start", descending: true });
+  const deleting = useSignal<Log | undefined>(undefined);
+
+  const load = async () => {
+    try {
+      logs.value = (await app.session.recording.listLogs({}, { timeoutMs: 20_000 })).logs;
+      trouble.value = "";
+    } catch (error) {
+      trouble.value = messageOf(error);
+    }
+  };
+  useEffect(() => void load(), [app.session.generation.value]);
+
+  const sort = (key: LogKey) => {
+    const now = order.value;
+    order.value = { key, descending: now.key === key ? !now.descending : key !== "name" };
+  };
+  const shown = chooseLogs(logs.value ?? [], filter.value, order.value);
+  return (
+    <main class="logs">
+      <header class="row">
+        <h2>Logs</h2>
+        <label>
+          <span class="hidden-text">Filter</span>
+          <input
+            type="search"
+            placeholder="Name, note or link"
+            value={filter.value}
+            onInput={(event) => (filter.value = event.currentTarget.value)}
+          />
+        </label>
+        <button type="button" onClick={() => void load()}>
+          Refresh
+        </button>
+        <span class="small" role="status">
+          {logs.value && `${shown.length} of ${logs.value.length}`}
+        </span>
+      </header>
+      {trouble.value && (
+        <p role="alert" class="refusal">
+          {trouble.value}
+        </p>
+      )}
+      <div class="scroller" tabIndex={0} role="region" aria-label="List of logs">
+        <table>
+          <thead>
+            <tr>
+              {COLUMNS.map(([key, title]) => (
+                <th scope="col" aria-sort={sortOf(order.value, key)}>
+                  <button type="button" class="plain" onClick={() => sort(key)}>
+                    {title}
+                    <span aria-hidden="true">{mark(order.value, key)}</span>
+                  </button>
+                </th>
+              ))}
+              <th scope="col">Links</th>
+              <th scope="col">
+                <span class="hidden-text">What to do</span>
+              </th>
+            </tr>
+          </thead>
+          <tbody>
+            {shown.map((log) => (
+              <LogRow key={log.name} log={log} onDelete={() => (deleting.value = log)} />
+            ))}
+          </tbody>
+        </table>
+        {logs.value && shown.length === 0 && (
+          <p class="empty">
+            {logs.value.length === 0
+              ? "There are no logs yet. Press Record above, or run `taclink record start`."
+              : "No log holds these words."}
+          </p>
+        )}
+      </div>
+      {deleting.value && (
+        <DeleteDialog
+          log={deleting.value}
+          onClose={() => {
+            deleting.value = undefined;
+            void load();
+          }}
+        />
+      )}
+    </main>
+  );
+}
+
+const sortOf = (order: LogOrder, key: LogKey) =>
+  order.key !== key ? undefined : order.descending ? "descending" : "ascending";
+const mark = (order: LogOrder, key: LogKey) => (order.key !== key ? "" : order.descending ? " ▾" : " ▴");
+
+function LogRow({ log, onDelete }: { log: Log; onDelete: () => void }) {
+  const app = useApp();
+  const refusal = useRefusal();
+  const loading = useSignal<number | undefined>(undefined); // share
+  const download = async () => {
+    const life = new AbortController();
+    loading.value = 0;
+    try {
+      await save(app.session, log, (share) => (loading.value = share), life.signal);
+    } catch (error) {
+      app.tell(`Download of ${log.name}: ${messageOf(error)}`, true);
+    }
+    loading.value = undefined;
+  };
+  return (
+    <tr data-log={log.name}>
+      <th scope="row">
+        {log.name}
+        {log.open && <span class="status s2"> being written</span>}
+        {log.pictures && <span class="small"> with pictures</span>}
+        {log.note && <div class="small">{log.note}</div>}
+        {log.problem && <div class="small bad">{log.problem}</div>}
+      </th>
+      <td class="numbers">{dateTime(secondsOf(log.startUtcNs))}</td>
+      <td class="numbers">{durationNs(log) > 0n ? duration(secondsOf(durationNs(log))) : "–"}</td>
+      <td class="numbers">{bytes(log.bytes)}</td>
+      <td class="numbers">{String(log.frames)}</td>
+      <td class="numbers">{log.contacts === undefined ? "–" : String(log.contacts)}</td>
+      <td class="small">{log.links.join(", ")}</td>
+      <td class="row">
+        <button
+          type="button"
+          class="primary"
+          onClick={() => app.play(log.name)}
+          aria-label={`Play ${log.name}`}
+        >
+          Play
+        </button>
+        <button
+          type="button"
+          onClick={() => void download()}
+          disabled={loading.value !== undefined}
+          aria-label={`Download ${log.name}`}
+        >
+          {loading.value === undefined ? "Download" : `${Math.round(100 * loading.value)} %`}
+        </button>
+        <OperatorButton onClick={onDelete} disabled={log.open || refusal !== ""}>
+          Delete<span class="hidden-text"> {log.name}</span>
+        </OperatorButton>
+      </td>
+    </tr>
+  );
+}
+
+function DeleteDialog({ log, onClose }: { log: Log; onClose: () => void }) {
+  const app = useApp();
+  const remove = async () => {
+    try {
+      await app.session.recording.deleteLog({ log: log.name });
+      app.tell(`${log.name} is deleted.`);
+    } catch (error) {
+      app.tell(`Delete ${log.name}: ${messageOf(error)}`, true);
+    }
+    onClose();
+  };
+  return (
+    <Dialog title="Delete a log" onClose={onClose}>
+      <p>
+        Delete <strong>{log.name}</strong> ({bytes(log.bytes)}) from the server? It can't be brought back.
+      </p>
+      <div class="dialog-foot">
+        <button type="button" class="danger" onClick={() => void remove()}>
+          Delete
+        </button>
+        <button type="button" onClick={onClose}>
+          Keep it
+        </button>
+      </div>
+    </Dialog>
+  );
+}
+
+interface SaveFilePicker {
+  showSaveFilePicker?: (options: { suggestedName: string }) => Promise<FileSystemFileHandle>;
+}
+
+// To the disk piece by piece where the browser can; else by way of memory.
+async function save(
+  session: ReturnType<typeof useApp>["session"],
+  log: Log,
+  onProgress: (share: number) => void,
+  stop: AbortSignal,
+): Promise<void> {
+  const picker = (window as SaveFilePicker).showSaveFilePicker;
+  const large = log.bytes > 200_000_000n;
+  const file = picker && large ? await picker({ suggestedName: log.name }) : undefined;
+  const disk = await file?.createWritable();
+  const pieces: BlobPart[] = [];
+  for await (const { data, offset, size } of session.recording.downloadLog(
+    { log: log.name },
+    { signal: stop },
+  )) {
+    const piece = data as Uint8Array<ArrayBuffer>;
+    if (disk) await disk.write(piece);
+    else pieces.push(piece);
+    onProgress(size > 0n ? Number(offset + BigInt(data.length)) / Number(size) : 1);
+  }
+  if (disk) return disk.close();
+  const address = URL.createObjectURL(new Blob(pieces));
+  const anchor = document.createElement("a");
+  anchor.href = address;
+  anchor.download = log.name;
+  anchor.click();
+  setTimeout(() => URL.revokeObjectURL(address), 10_000);
+}

@@ -1,0 +1,134 @@
+import { useSignal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { selectedLink, useApp } from "../app_state";
+import type { ArmScene, Scales } from "../scene/arm_scene";
+import { COLOUR_MAPS, gradientOf, type ColourMapName } from "../skin/colour_map";
+import { QUANTITIES, type Quantity } from "../skin/fields";
+
+const HINT = "Arrow keys turn the view, + and - zoom, Home shows the whole arm.";
+
+/** The arm in 3-D with its legend. */
+export function SceneView() {
+  const app = useApp();
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const labels = useRef<HTMLDivElement>(null);
+  const scene = useSignal<ArmScene | undefined>(undefined);
+  const scales = useSignal<Scales | undefined>(undefined);
+  const trouble = useSignal("");
+  const store = app.store.value;
+
+  useEffect(() => {
+    let made: ArmScene | undefined;
+    let gone = false;
+    // three.js is most of the code: the page is there before it.
+    void import("../scene/arm_scene").then(({ ArmScene: Scene }) => {
+      if (gone) return;
+      try {
+        made = new Scene(canvas.current!, labels.current!, store);
+      } catch {
+        trouble.value = "This browser shows no WebGL: the arm can't be drawn in 3-D. Everything else works.";
+        return;
+      }
+      made.onPick = (link) => (app.link.value = link);
+      made.onScales = (now) => (scales.value = now);
+      scene.value = made;
+    });
+    return () => {
+      gone = true;
+      scene.value = undefined;
+      made?.dispose();
+    };
+  }, [store]);
+
+  const link = selectedLink(app);
+  useEffect(
+    () => scene.value?.setColours(app.quantity.value, app.colourMap.value),
+    [scene.value, app.quantity.value, app.colourMap.value],
+  );
+  useEffect(() => scene.value?.select(link), [scene.value, link]);
+
+  return (
+    <section class="scene" aria-label="The arm in 3-D">
+      <div class="canvas-host">
+        <canvas
+          ref={canvas}
+          tabIndex={0}
+          role="img"
+          aria-label={`The arm with its skins and forces. ${HINT}`}
+        />
+        <div ref={labels} class="labels" aria-hidden="true" />
+        {trouble.value && <p class="empty">{trouble.value}</p>}
+        {!store.arm.value && !trouble.value && <p class="empty">Waiting for the server …</p>}
+      </div>
+      <Legend scales={scales.value} />
+      <div class="tools" role="group" aria-label="View">
+        <button type="button" onClick={() => scene.value?.reset()} title="The whole arm (Home)">
+          Whole arm
+        </button>
+        <button type="button" onClick={() => scene.value?.focus(link)} title={`Look at ${link}`}>
+          Focus {link || "link"}
+        </button>
+        <button
+          type="button"
+          onClick={() => scene.value?.resetScales()}
+          title="Colours and arrows as at the beginning"
+        >
+          Reset scales
+        </button>
+      </div>
+    </section>
+  );
+}
+
+function Legend({ scales }: { scales: Scales | undefined }) {
+  const app = useApp();
+  const { name, unit, range } = QUANTITIES[app.quantity.value];
+  const top = scales?.top ?? range;
+  return (
+    <div class="legend">
+      <label>
+        <span class="hidden-text">Colour means</span>
+        <select
+          value={app.quantity.value}
+          onChange={(event) => (app.quantity.value = event.currentTarget.value as Quantity)}
+        >
+          {Object.entries(QUANTITIES).map(([key, info]) => (
+            <option value={key}>
+              {info.name}, {info.unit}
+            </option>
+          ))}
+        </select>
+      </label>
+      <div
+        class="ramp"
+        role="img"
+        aria-label={`${name} from 0 to ${top} ${unit}`}
+        style={{ background: gradientOf(app.colourMap.value) }}
+      />
+      <div class="ticks numbers" aria-hidden="true">
+        <span>0</span>
+        <span>{top / 2}</span>
+        <span>
+          {top} {unit}
+        </span>
+      </div>
+      <div class="arrow-scale numbers">
+        <span class="arrow-sign" aria-hidden="true">
+          ⟶
+        </span>
+        {scales ? `${(scales.arrowM * 100).toFixed(0)} cm arrow = ${scales.arrowN} N` : ""}
+      </div>
+      <label class="small">
+        Colours{" "}
+        <select
+          value={app.colourMap.value}
+          onChange={(event) => (app.colourMap.value = event.currentTarget.value as ColourMapName)}
+        >
+          {COLOUR_MAPS.map((map) => (
+            <option value={map}>{map}</option>
+          ))}
+        </select>
+      </label>
+    </div>
+  );
+}

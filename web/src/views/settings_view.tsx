@@ -1,0 +1,326 @@
+import { useSignal } from "@preact/signals";
+import type { JSX } from "preact";
+import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
+import type { ForceLevelState } from "../api/gen/taclink/v1/events_pb";
+import { ForceModel } from "../api/gen/taclink/v1/frame_pb";
+import type { CalibrationResult } from "../api/gen/taclink/v1/tactile_pb";
+import type { LinkTare } from "../api/gen/taclink/v1/tare_pb";
+import { messageOf } from "../api/session";
+import { useApp } from "../app_state";
+import { Dialog } from "../ui/dialog";
+import { duration, fixed } from "../ui/format";
+import { OperatorButton } from "../ui/operator_button";
+import { MODEL_WORDS } from "../ui/words";
+
+/** What can be done to a link. */
+export function SettingsView({ link }: { link: Link }) {
+  return (
+    <div class="settings">
+      <Baseline link={link} />
+      <Model link={link} />
+      {link.forceLevels.map((state) => (
+        <ThresholdForm key={`${link.name}\n${state.region}`} link={link} state={state} />
+      ))}
+      <Cameras link={link} />
+      <Worker link={link} />
+    </div>
+  );
+}
+
+function Baseline({ link }: { link: Link }) {
+  const app = useApp();
+  const busy = useSignal(false);
+  const refused = useSignal<LinkTare | undefined>(undefined);
+  const calibrating = useSignal(false);
+  const baseline = link.baseline;
+
+  const tare = async (force: boolean) => {
+    busy.value = true;
+    refused.value = undefined;
+    try {
+      const { links } = await app.session.tactile.tare({ links: [link.name], force }, { timeoutMs: 20_000 });
+      const answer = links[0];
+      if (answer?.accepted)
+        app.tell(`${link.name} is tared: the baseline moved by ${fixed(answer.shiftM * 1e3, 2)} mm.`);
+      else refused.value = answer;
+    } catch (error) {
+      app.tell(`Tare of ${link.name}: ${messageOf(error)}`, true);
+    }
+    busy.value = false;
+  };
+
+  return (
+    <fieldset>
+      <legend>Baseline</legend>
+      <p class="small numbers">
+        {baseline && baseline.origin
+          ? `Taken ${duration(Date.now() / 1e3 - Number(baseline.takenUtcNs / 1_000_000n) / 1e3)} ago, drift ${fixed(baseline.driftM * 1e3, 2)} mm.`
+          : "There is none yet."}
+      </p>
+      <div class="row">
+        <OperatorButton onClick={() => void tare(false)} disabled={busy.value}>
+          {busy.value ? "Taring …" : "Tare"}
+        </OperatorButton>
+        <OperatorButton onClick={() => (calibrating.value = true)}>Calibrate …</OperatorButton>
+      </div>
+      {refused.value && (
+        <div role="alert" class="refusal">
+          <p>{refused.value.reason}</p>
+          <OperatorButton onClick={() => void tare(true)}>Tare all the same</OperatorButton>
+        </div>
+      )}
+      {calibrating.value && <Calibration link={link} onClose={() => (calibrating.value = false)} />}
+    </fieldset>
+  );
+}
+
+function Calibration({ link, onClose }: { link: Link; onClose: () => void }) {
+  const app = useApp();
+  const progress = useSignal<[number, number] | undefined>(undefined);
+  const result = useSignal<CalibrationResult | undefined>(undefined);
+  const trouble = useSignal("");
+  const save = useSignal(false);
+  const life = useSignal<AbortController | undefined>(undefined);
+
+  const start = async () => {
+    const control = (life.value = new AbortController());
+    trouble.value = "";
+    result.value = undefined;
+    progress.value = [0, 8];
+    try {
+      const request = { link: link.name, save: save.value };
+      for await (const { message } of app.session.tactile.calibrate(request, { signal: control.signal })) {
+        if (message.case === "progress")
+          progress.value = [message.value.pairsTaken, message.value.pairsWanted];
+        else if (message.case === "result") result.value = message.value;
+      }
+    } catch (error) {
+      if (!control.signal.aborted) trouble.value = messageOf(error);
+    }
+    progress.value = undefined;
+    life.value = undefined;
+  };
+  const close = () => {
+    life.value?.abort();
+    onClose();
+  };
+
+  return (
+    <Dialog title={`Calibrate ${link.name}`} onClose={close}>
+      <p>Finds both cameras and the rest shape anew. Nothing may touch the skin meanwhile.</p>
+      <label>
+        <input
+          type="checkbox"
+          checked={save.value}
+          onChange={(event) => (save.value = event.currentTarget.checked)}
+        />{" "}
+        also write the link's calibration file
+      </label>
+      <div aria-live="polite">
+        {progress.value && (
+          <p>
+            <progress value={progress.value[0]} max={progress.value[1]} aria-label="Rest pairs taken" />{" "}
+            {progress.value[0]} of {progress.value[1]} rest pairs
+          </p>
+        )}
+        {trouble.value && (
+          <p role="alert" class="refusal">
+            {trouble.value}
+          </p>
+        )}
+        {result.value && <CalibrationFacts result={result.value} />}
+      </div>
+      <div class="dialog-foot">
+        <OperatorButton onClick={() => void start()} disabled={life.value !== undefined} class="primary">
+          {result.value || trouble.value ? "Again" : "Start"}
+        </OperatorButton>
+        <button type="button" onClick={close}>
+          {life.value ? "Cancel" : "Close"}
+        </button>
+      </div>
+    </Dialog>
+  );
+}
+
+function CalibrationFacts({ result }: { result: CalibrationResult }) {
+  const mm = (metres: number) => `${fixed(metres * 1e3, 3)} mm`;
+  return (
+    <dl class="facts numbers">
+      <dt>Markers used</dt>
+      <dd>{result.markersUsed}</dd>
+      <dt>Reprojection</dt>
+      <dd>{fixed(result.rmsPx, 3)} px RMS</dd>
+      <dt>Radius, around, along</dt>
+      <dd>
+        {mm(result.rmseRM)}, {mm(result.rmseTangentialM)}, {mm(result.rmseZM)} RMS
+      </dd>
+      <dt>File</dt>
+      <dd>{result.savedTo || "not written"}</dd>
+    </dl>
+  );
+}
+
+function Model({ link }: { link: Link }) {
+  const app = useApp();
+  const frame = app.store.value.link(link.name).newest;
+  const chosen = useSignal<ForceModel | undefined>(undefined);
+  const now = frame?.forceModel ?? ForceModel.UNSPECIFIED;
+  const set = async () => {
+    const model = chosen.value ?? now;
+    try {
+      await app.session.tactile.setForceModel({ link: link.name, model }, { timeoutMs: 30_000 });
+      app.tell(`${link.name} computes its forces by the ${MODEL_WORDS[model]} model now.`);
+      chosen.value = undefined;
+    } catch (error) {
+      app.tell(`Force model of ${link.name}: ${messageOf(error)}`, true);
+    }
+  };
+  return (
+    <fieldset>
+      <legend>Force model</legend>
+      <div class="row">
+        <label>
+          <span class="hidden-text">Model</span>
+          <select
+            value={chosen.value ?? now}
+            onChange={(event) => (chosen.value = Number(event.currentTarget.value) as ForceModel)}
+          >
+            {[ForceModel.NONLINEAR, ForceModel.PRESSURISED, ForceModel.LINEAR, ForceModel.LITERAL].map(
+              (model) => (
+                <option value={model}>{MODEL_WORDS[model]}</option>
+              ),
+            )}
+          </select>
+        </label>
+        <OperatorButton
+          onClick={() => void set()}
+          disabled={chosen.value === undefined || chosen.value === now}
+        >
+          Use
+        </OperatorButton>
+      </div>
+    </fieldset>
+  );
+}
+
+function ThresholdForm({ link, state }: { link: Link; state: ForceLevelState }) {
+  const app = useApp();
+  const where = state.region || "whole link";
+  const submit = async (event: JSX.TargetedSubmitEvent<HTMLFormElement>) => {
+    event.preventDefault();
+    const data = new FormData(event.currentTarget);
+    const value = (name: string) => Number(data.get(name)) || 0;
+    const thresholds = {
+      warningN: value("warning"),
+      alarmN: value("alarm"),
+      hysteresisN: value("hysteresis"),
+    };
+    try {
+      await app.session.tactile.setThresholds({ link: link.name, region: state.region, thresholds });
+      app.tell(`Thresholds of ${link.name}, ${where}, are set.`);
+    } catch (error) {
+      app.tell(`Thresholds of ${link.name}: ${messageOf(error)}`, true);
+    }
+  };
+  const field = (name: string, label: string, value: number | undefined) => (
+    <label>
+      {label}
+      <input name={name} type="number" min="0" step="any" defaultValue={String(value ?? 0)} /> N
+    </label>
+  );
+  return (
+    <fieldset>
+      <legend>Thresholds, {where}</legend>
+      <form onSubmit={submit} class="row">
+        {field("warning", "Warning", state.thresholds?.warningN)}
+        {field("alarm", "Alarm", state.thresholds?.alarmN)}
+        {field("hysteresis", "Hysteresis", state.thresholds?.hysteresisN)}
+        <OperatorButton type="submit" onClick={() => undefined}>
+          Set
+        </OperatorButton>
+      </form>
+      <p class="small">0 switches a level off. They hold until the server ends.</p>
+    </fieldset>
+  );
+}
+
+function Cameras({ link }: { link: Link }) {
+  const app = useApp();
+  const submit = async (event: JSX.TargetedSubmitEvent<HTMLFormElement>) => {
+    event.preventDefault();
+    const data = new FormData(event.currentTarget);
+    const exposureMs = Number(data.get("exposure"));
+    const gain = String(data.get("gain") ?? "").trim();
+    const automatic = data.get("automatic") !== null;
+    const exposure = automatic
+      ? ({ case: "automatic", value: true } as const)
+      : exposureMs > 0
+        ? ({ case: "exposureS", value: exposureMs / 1e3 } as const)
+        : ({ case: undefined } as const);
+    try {
+      await app.session.tactile.setCamera(
+        {
+          link: link.name,
+          camera: String(data.get("camera")),
+          exposure,
+          gain: gain ? Number(gain) : undefined,
+        },
+        { timeoutMs: 10_000 },
+      );
+      app.tell(`The cameras of ${link.name} are set.`);
+    } catch (error) {
+      app.tell(`Cameras of ${link.name}: ${messageOf(error)}`, true);
+    }
+  };
+  return (
+    <fieldset>
+      <legend>Cameras</legend>
+      <form onSubmit={submit} class="row">
+        <label>
+          <span class="hidden-text">Which</span>
+          <select name="camera">
+            <option value="">both</option>
+            <option value="top">top</option>
+            <option value="bottom">bottom</option>
+          </select>
+        </label>
+        <label>
+          Exposure <input name="exposure" type="number" min="0" step="0.1" /> ms
+        </label>
+        <label>
+          <input name="automatic" type="checkbox" /> automatic
+        </label>
+        <label>
+          Gain <input name="gain" type="number" step="1" />
+        </label>
+        <OperatorButton type="submit" onClick={() => undefined}>
+          Set
+        </OperatorButton>
+      </form>
+      <p class="small">Empty fields stay as they are. It holds until the link is started again.</p>
+    </fieldset>
+  );
+}
+
+function Worker({ link }: { link: Link }) {
+  const app = useApp();
+  const restart = async () => {
+    try {
+      await app.session.operations.restartLink({ link: link.name });
+      app.tell(`${link.name} is started anew. Without a calibration file nothing may touch it now.`);
+    } catch (error) {
+      app.tell(`Restart of ${link.name}: ${messageOf(error)}`, true);
+    }
+  };
+  return (
+    <fieldset>
+      <legend>Worker</legend>
+      <p class="small">
+        {link.supervision > Supervision.RUNNING ? link.supervisionReason : "Runs."} Restarted{" "}
+        {String(link.statistics?.workerRestarts ?? 0n)} times.
+        {link.statistics?.lastFailure && ` Last failure: ${link.statistics.lastFailure}`}
+      </p>
+      <OperatorButton onClick={() => void restart()}>Restart the link</OperatorButton>
+    </fieldset>
+  );
+}

@@ -1,0 +1,32 @@
+import { readdirSync, readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { gzipSync } from "node:zlib";
+import { defineConfig } from "vitest/config";
+
+// The server embeds the files by name, so that names are fixed; it tells browsers whether one has changed.
+export default defineConfig({
+  esbuild: { jsx: "automatic", jsxImportSource: "preact" },
+  server: { proxy: { "/taclink.v1": "http://127.0.0.1:8080" } },
+  build: {
+    target: "es2022",
+    modulePreload: false,
+    chunkSizeWarningLimit: 1000,
+    rollupOptions: {
+      output: {
+        entryFileNames: "[name].js",
+        chunkFileNames: "[name].js",
+        assetFileNames: "[name][extname]",
+      },
+    },
+  },
+  plugins: [
+    {
+      name: "compressed-copies",
+      writeBundle({ dir }) {
+        for (const name of readdirSync(dir!).filter((each) => !each.endsWith(".gz")))
+          writeFileSync(join(dir!, `${name}.gz`), gzipSync(readFileSync(join(dir!, name)), { level: 9 }));
+      },
+    },
+  ],
+  test: { include: ["test/**/*.test.ts"] },
+});
