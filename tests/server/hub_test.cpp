@@ -201,7 +201,7 @@ TEST(Hub, PicturesAreKeptOnlyForThoseWhoWantThem) {
   std::vector<std::weak_ptr<const FramePictures>> published;
   for (uint64_t i = 1; i <= 3; ++i) {
     auto pictures = std::make_shared<FramePictures>();
-    (*pictures)[0].bytes.assign(100'000, static_cast<uint8_t>(i));
+    pictures->raw[0].bytes.assign(100'000, static_cast<uint8_t>(i));
     published.push_back(pictures);
     hub.Publish(0, MakeState(i), pictures);
   }
@@ -210,7 +210,7 @@ TEST(Hub, PicturesAreKeptOnlyForThoseWhoWantThem) {
   PicturesPtr pictures;
   for (const uint64_t i : {2u, 3u}) {
     EXPECT_EQ(with->Take(nullptr, &pictures)->state().sequence, i);
-    EXPECT_EQ((*pictures)[0].bytes[0], i);
+    EXPECT_EQ(pictures->raw[0].bytes[0], i);
   }
   pictures.reset();
   EXPECT_TRUE(published[2].expired()) << "the other one's queue holds pictures";

@@ -69,7 +69,7 @@ describe("signing in", () => {
     const tare = visit.page.getByRole("button", { name: /^Tare/ });
     expect(await tare.getAttribute("aria-disabled")).toBe("true");
     expect(await tare.getAttribute("title")).toContain("sign in as an operator");
-    await tare.click();
+    await tare.click({ force: true });
     await visit.page.waitForTimeout(500);
     expect(await visit.page.locator(".events").innerText()).not.toContain("tare");
     await visit.picture("viewer");
@@ -118,9 +118,9 @@ describe("an operator", () => {
     const { page } = visit;
     await page.getByRole("tab", { name: "Settings" }).click();
     const model = page.locator("fieldset", { hasText: "Force model" });
-    await model.getByLabel("Model").selectOption({ label: "linear" });
+    await model.getByLabel("Model").selectOption({ label: "nonlinear" });
     await model.getByRole("button", { name: "Use" }).click();
-    await expect.poll(() => visit.row("still").innerText(), { timeout: 20_000 }).toContain("linear");
+    await expect.poll(() => visit.row("still").innerText(), { timeout: 20_000 }).toContain("nonlinear");
     const camera = page.locator("fieldset", { hasText: "Cameras" });
     await camera.getByLabel("Exposure").fill("8");
     await camera.getByRole("button", { name: "Set" }).click();
@@ -136,7 +136,7 @@ describe("an operator", () => {
     const { page } = visit;
     await page.getByRole("tab", { name: "Settings" }).click();
     await page.getByRole("button", { name: /Calibrate/ }).click();
-    await page.getByRole("button", { name: "Start" }).click();
+    await page.getByRole("button", { name: "Start", exact: true }).click();
     await page.getByText("Markers used").waitFor({ timeout: 30_000 });
     await visit.picture("calibrated");
     await page.getByRole("button", { name: "Close", exact: true }).last().click();
@@ -187,10 +187,10 @@ describe("an operator", () => {
     const shared = page.url();
     expect(new URL(shared).searchParams.get("t")).not.toBeNull();
     const tare = page.getByRole("tab", { name: "Settings" });
-    await tare.click();
+    await tare.click({ force: true });
     const title = await page.getByRole("button", { name: /^Tare/ }).getAttribute("title");
     expect(title).toContain("live arm");
-    await page.getByRole("button", { name: "Back to the live arm" }).click();
+    await page.getByRole("button", { name: "Back to the live arm", exact: true }).click();
     await expect.poll(() => new URL(page.url()).searchParams.get("log")).toBeNull();
 
     await page.getByRole("navigation").getByRole("button", { name: "Logs" }).click();

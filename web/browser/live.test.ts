@@ -71,7 +71,7 @@ describe("the arm", () => {
     const readout = visit.page.locator(".readout");
     await visit.page.locator(".label.force").first().waitFor();
     const box = (await map.boundingBox())!;
-    await visit.page.mouse.move(box.x + (7.5 / 20) * box.width, box.y + (1 - 8.5 / 12) * box.height);
+    await visit.page.mouse.move(box.x + (7.5 / 24) * box.width, box.y + (1 - 8.5 / 10) * box.height);
     await expect.poll(() => readout.innerText()).toMatch(/path 7, ring 8: [1-9]/);
     const pressure = Number(/: ([\d.]+) kPa/.exec(await readout.innerText())![1]);
     expect(pressure).toBeGreaterThan(1);

@@ -90,6 +90,8 @@ export class ReplayFeed implements Feed {
     return this.control({ case: "loop", value: loop });
   }
   async seek(timeS: number): Promise<void> {
+    this.positionS.value = timeS;
+    this.onPosition(timeS);
     if (this.status.value?.ended || !this.life) {
       this.startS = timeS;
       this.start();

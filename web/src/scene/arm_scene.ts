@@ -120,10 +120,17 @@ export class ArmScene {
     this.requestDraw();
   }
 
-  /** Looks at one link from where the view is now. */
+  /** Looks at one link: at its strongest contact, or without one from where the view is now. */
   focus(name: string): void {
     const link = this.links.get(name);
-    if (link) this.lookAt(new THREE.Box3().setFromObject(link.group));
+    if (!link) return;
+    const box = new THREE.Box3().setFromObject(link.group);
+    const normal = this.strongestNormal(name)?.transformDirection(link.group.matrix);
+    if (normal) {
+      const back = normal.add(new THREE.Vector3(0.35, -0.35, 0.45)).normalize();
+      this.camera.position.copy(box.getCenter(new THREE.Vector3())).add(back);
+    }
+    this.lookAt(box);
   }
 
   /** Looks at the whole arm, from the side and a little above. */
@@ -134,6 +141,13 @@ export class ArmScene {
     this.camera.position.copy(box.getCenter(new THREE.Vector3())).add(new THREE.Vector3(1.2, -1.6, 0.7));
     this.lookAt(box);
     this.floor.position.z = Math.min(0, box.min.z);
+  }
+
+  private strongestNormal(name: string): THREE.Vector3 | undefined {
+    const contacts = [...(this.store.link(name).newest?.contacts ?? [])];
+    contacts.sort((a, b) => b.normalForceN - a.normalForceN);
+    const normal = contacts[0]?.normal;
+    return normal && new THREE.Vector3(normal.x, normal.y, normal.z);
   }
 
   // As near as the box just fits, from the side where the camera is.

@@ -23,7 +23,7 @@ export function OperatorButton(props: {
 }) {
   const refusal = useRefusal();
   const refused = props.anyRole ? "" : refusal;
-  // aria-disabled and not disabled: the reason is to be found with the keyboard, too.
+  // aria-disabled and not disabled: the reason, its description, is to be found with the keyboard, too.
   return (
     <button
       type={props.type ?? "button"}
@@ -36,7 +36,6 @@ export function OperatorButton(props: {
       }}
     >
       {props.children}
-      {refused && <span class="hidden-text">. {refused}</span>}
     </button>
   );
 }

@@ -144,26 +144,28 @@ function LogRow({ log, onDelete }: { log: Log; onDelete: () => void }) {
       <td class="numbers">{String(log.frames)}</td>
       <td class="numbers">{log.contacts === undefined ? "–" : String(log.contacts)}</td>
       <td class="small">{log.links.join(", ")}</td>
-      <td class="row">
-        <button
-          type="button"
-          class="primary"
-          onClick={() => app.play(log.name)}
-          aria-label={`Play ${log.name}`}
-        >
-          Play
-        </button>
-        <button
-          type="button"
-          onClick={() => void download()}
-          disabled={loading.value !== undefined}
-          aria-label={`Download ${log.name}`}
-        >
-          {loading.value === undefined ? "Download" : `${Math.round(100 * loading.value)} %`}
-        </button>
-        <OperatorButton onClick={onDelete} disabled={log.open || refusal !== ""}>
-          Delete<span class="hidden-text"> {log.name}</span>
-        </OperatorButton>
+      <td>
+        <div class="row">
+          <button
+            type="button"
+            class="primary"
+            onClick={() => app.play(log.name)}
+            aria-label={`Play ${log.name}`}
+          >
+            Play
+          </button>
+          <button
+            type="button"
+            onClick={() => void download()}
+            disabled={loading.value !== undefined}
+            aria-label={`Download ${log.name}`}
+          >
+            {loading.value === undefined ? "Download" : `${Math.round(100 * loading.value)} %`}
+          </button>
+          <OperatorButton onClick={onDelete} disabled={log.open || refusal !== ""}>
+            Delete<span class="hidden-text"> {log.name}</span>
+          </OperatorButton>
+        </div>
       </td>
     </tr>
   );

@@ -235,6 +235,8 @@ class ForceChart {
       ctx.lineTo(bbox.left + bbox.width, y);
       ctx.stroke();
       ctx.setLineDash([]);
+      ctx.textAlign = "left";
+      ctx.textBaseline = "alphabetic";
       ctx.font = `${11 * devicePixelRatio}px system-ui`;
       ctx.fillText(word, bbox.left + 4 * devicePixelRatio, y - 3 * devicePixelRatio);
     };
