@@ -4,14 +4,15 @@ import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import { launch, Visit } from "./page";
 import { configuration, pressed, Server, untouched } from "./server";
 
-const isBright = (r: number, g: number, b: number) => r > 170 && g > 150 && b < 110;
+// In inferno no load is black, half the scale is red; arrows are orange.
+const isLoaded = (r: number, g: number, b: number) => r > g + 50 && r > b && b > 50;
 
 let browser: Browser;
 const server = new Server();
 
 beforeAll(async () => {
   const still = server.write("still.yaml", untouched());
-  const held = server.write("held.yaml", pressed(7, 8, 0.3));
+  const held = server.write("held.yaml", pressed(7, 5, 0.45));
   const config = server.write("arm.yaml", configuration("bench", { still, touched: held, third: still }));
   await server.start("--config", config);
   browser = await launch();
@@ -40,18 +41,20 @@ describe("the arm", () => {
     await page.locator(".label.force", { hasText: "N" }).first().waitFor();
     const force = visit.row("touched").locator("td").nth(1);
     const forceN = async () => Number.parseFloat(await force.innerText());
-    await expect.poll(forceN, { timeout: 10_000 }).toBeGreaterThan(0.24); // 0.3 N press
-    expect(await forceN()).toBeLessThan(0.36);
+    await expect.poll(forceN, { timeout: 10_000 }).toBeGreaterThan(0.25);
+    expect(await forceN()).toBeLessThan(0.5);
     await page.waitForTimeout(1500);
     await visit.picture("live");
+    await page.locator(".legend select").nth(1).selectOption("inferno");
     await page.getByRole("button", { name: /^Focus/ }).click();
     await page.waitForTimeout(1000);
-    const touched = await visit.shareOfPixels(isBright);
+    await visit.picture("focused");
+    const touched = await visit.shareOfPixels(isLoaded);
     await visit.row("still").click();
     await page.getByRole("button", { name: /^Focus/ }).click();
     await page.waitForTimeout(1000);
-    const still = await visit.shareOfPixels(isBright);
-    expect(touched).toBeGreaterThan(0.0005);
+    const still = await visit.shareOfPixels(isLoaded);
+    expect(touched).toBeGreaterThan(0.0002);
     expect(still).toBeLessThan(touched / 10);
     await visit.close();
   });
@@ -71,14 +74,14 @@ describe("the arm", () => {
     const readout = visit.page.locator(".readout");
     await visit.page.locator(".label.force").first().waitFor();
     const box = (await map.boundingBox())!;
-    await visit.page.mouse.move(box.x + (7.5 / 24) * box.width, box.y + (1 - 8.5 / 10) * box.height);
-    await expect.poll(() => readout.innerText()).toMatch(/path 7, ring 8: [1-9]/);
+    await visit.page.mouse.move(box.x + (6.5 / 24) * box.width, box.y + (1 - 4.5 / 10) * box.height);
+    await expect.poll(() => readout.innerText()).toMatch(/path 6, ring 4: [1-9]/);
     const pressure = Number(/: ([\d.]+) kPa/.exec(await readout.innerText())![1]);
     expect(pressure).toBeGreaterThan(1);
     await map.focus();
     await visit.page.keyboard.press("ArrowRight");
     await visit.page.keyboard.press("ArrowUp");
-    await expect.poll(() => readout.innerText()).toContain("path 8, ring 9");
+    await expect.poll(() => readout.innerText()).toContain("path 7, ring 5");
     await visit.picture("map");
     await visit.close();
   });

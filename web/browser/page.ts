@@ -2,7 +2,6 @@ import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { chromium, type Browser, type Page } from "playwright-core";
-import { expect } from "vitest";
 
 const PICTURES =
   process.env.TACLINK_PICTURES ?? fileURLToPath(new URL("../../build/web-pictures", import.meta.url));
@@ -49,7 +48,7 @@ export class Visit {
 
   async close(): Promise<void> {
     await this.page.close();
-    expect(this.troubles).toEqual([]);
+    if (this.troubles.length > 0) throw new Error(this.troubles.join("\n"));
   }
 
   picture(name: string): Promise<Buffer> {

@@ -127,7 +127,7 @@ export class ArmScene {
     const box = new THREE.Box3().setFromObject(link.group);
     const normal = this.strongestNormal(name)?.transformDirection(link.group.matrix);
     if (normal) {
-      const back = normal.add(new THREE.Vector3(0.35, -0.35, 0.45)).normalize();
+      const back = normal.add(new THREE.Vector3(0.3, -0.3, 0.3)).normalize();
       this.camera.position.copy(box.getCenter(new THREE.Vector3())).add(back);
     }
     this.lookAt(box);

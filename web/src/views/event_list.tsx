@@ -32,7 +32,11 @@ export function EventList() {
         {events.slice(0, SHOWN).map((event) => (
           <Row key={`${event.sequence}`} event={event} />
         ))}
-        {events.length === 0 && <li class="empty">Nothing has happened yet. Touch a skin.</li>}
+        {events.length === 0 && (
+          <li class="empty">
+            {app.log.value ? "No event here." : "Nothing has happened yet. Touch a skin."}
+          </li>
+        )}
       </ol>
     </section>
   );

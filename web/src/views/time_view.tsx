@@ -35,9 +35,14 @@ export function TimeView() {
       paused.value ??= to;
       zoom.value = [from, to];
     });
+    let drawn = "";
     const draw = () => {
+      if (document.hidden) return;
       const end = paused.value ?? now(store);
       const [from, to] = zoom.value ?? [end - span.value, end];
+      const view = `${from} ${to}`;
+      if (paused.value !== undefined && view === drawn) return; // what comes late would change it yet
+      drawn = view;
       if (Number.isFinite(from)) chart.show(collect(store, what.value, link, from, to), from, to);
     };
     draw();
