@@ -20,26 +20,36 @@ Result<void> CameraDesk::Order(const CameraOrder& order, CameraObserver observer
   return {};
 }
 
-std::vector<CameraDesk::Job> CameraDesk::TakeJobs() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(jobs_, {});
-}
-
 void CameraDesk::CarryOut(SourceSupervisor& source) {
-  for (const Job& job : TakeJobs()) {
+  while (true) {
+    CameraOrder order;
+    {
+      const std::lock_guard lock(mutex_);
+      if (jobs_.empty()) return;
+      order = jobs_.front().order;
+    }
     Result<void> done;
     for (const CameraId id : kBothCameras)
-      if (done && job.order.cameras[Index(id)]) done = source.SetCamera(id, job.order.settings);
-    job.observer(done);
+      if (done && order.cameras[Index(id)]) done = source.SetCamera(id, order.settings);
+    CameraObserver observer;
+    {
+      const std::lock_guard lock(mutex_);
+      if (jobs_.empty()) return;  // told meanwhile, by End
+      observer = std::move(jobs_.front().observer);
+      jobs_.pop_front();
+    }
+    observer(done);
   }
 }
 
 void CameraDesk::End(const Error& why) {
+  std::deque<Job> jobs;
   {
     const std::lock_guard lock(mutex_);
     closed_ = true;
+    jobs.swap(jobs_);
   }
-  for (const Job& job : TakeJobs()) job.observer(why);
+  for (const Job& job : jobs) job.observer(why);
 }
 
 }  // namespace taclink::server

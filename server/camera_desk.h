@@ -1,9 +1,9 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <functional>
 #include <mutex>
-#include <vector>
 
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/result.h"
@@ -29,7 +29,7 @@ class CameraDesk {
 
   /// On the capture thread, between two frames. Stops at the first camera that refuses.
   void CarryOut(SourceSupervisor& source);
-  /// Any thread: the capture thread ends, and will not tell. No order is taken any more.
+  /// Any thread: the capture thread ends or hangs, and will not tell. No order is taken any more.
   void End(const Error& why);
 
  private:
@@ -37,11 +37,10 @@ class CameraDesk {
     CameraOrder order;
     CameraObserver observer;
   };
-  std::vector<Job> TakeJobs();
 
   std::mutex mutex_;
   // Guarded by mutex_.
-  std::vector<Job> jobs_;
+  std::deque<Job> jobs_;  // the first may be under way; whoever takes one out tells its observer
   bool closed_ = false;
 };
 

@@ -355,13 +355,21 @@ Result<void> LinkSupervisor::SetCamera(const CameraOrder& order, CameraObserver 
   return NoWorker();
 }
 
+void LinkSupervisor::EndCameraOrders(const Error& why) {
+  if (const auto worker = current()) worker->EndCameraOrders(why);
+}
+
 Result<void> LinkSupervisor::SetForceModel(ForceModel model) {
   if (!factories_.estimator)
     return Error{ErrorCode::kFailedPrecondition, "link '" + name_ + "' computes no forces here"};
-  auto estimator = factories_.estimator(model);
   const auto worker = current();
   if (!worker) return NoWorker();
-  worker->UseEstimator(std::move(estimator));
+  try {
+    worker->UseEstimator(factories_.estimator(model));
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInternal, std::string("the force model can't be made: ") + e.what()};
+  }
+  if (factories_.choose) factories_.choose(model);
   return {};
 }
 

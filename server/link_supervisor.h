@@ -41,9 +41,10 @@ struct WatchdogOptions {
 struct LinkFactories {
   std::function<Result<std::unique_ptr<FrameSource>>()> source = {};
   std::function<Result<std::unique_ptr<LinkProcessor>>()> processor = {};
-  /// Makes the forces' part of a processor by another model, which processors made later then have, too.
-  /// None: the link has no forces to compute.
+  /// Makes the forces' part of a processor by another model. None: the link has no forces to compute.
   std::function<std::unique_ptr<ForceEstimator>(ForceModel)> estimator = {};
+  /// Processors that are made from now on compute so.
+  std::function<void(ForceModel)> choose = {};
 };
 
 /// How a link's worker does, for those who report it.
@@ -100,6 +101,8 @@ class LinkSupervisor {
   Result<void> Tare(const TareOptions& options, TareObserver observer);
   /// Likewise.
   Result<void> SetCamera(const CameraOrder& order, CameraObserver observer);
+  /// At shutdown: answers those that wait, whatever their cameras do.
+  void EndCameraOrders(const Error& why);
   /// Computes the forces by `model` from the next frame on, also after a restart. Takes up to seconds.
   /// Errors: kUnavailable (no worker now), kFailedPrecondition (nothing is computed here).
   Result<void> SetForceModel(ForceModel model);

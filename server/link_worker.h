@@ -82,6 +82,7 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   Result<void> SetCamera(const CameraOrder& order, CameraObserver observer) {
     return cameras_.Order(order, std::move(observer));
   }
+  void EndCameraOrders(const Error& why) { cameras_.End(why); }
 
   /// From the next frame on. Not null. Any thread.
   void UseEstimator(std::unique_ptr<ForceEstimator> estimator);

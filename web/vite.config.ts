@@ -21,6 +21,19 @@ export default defineConfig({
   },
   plugins: [
     {
+      name: "scene-at-once", // three.js is loaded beside the rest, not after it
+      transformIndexHtml: (_, { bundle }) =>
+        bundle
+          ? [
+              {
+                tag: "link",
+                attrs: { rel: "modulepreload", href: "/arm_scene.js" },
+                injectTo: "head" as const,
+              },
+            ]
+          : [],
+    },
+    {
       name: "compressed-copies",
       writeBundle({ dir }) {
         for (const name of readdirSync(dir!).filter((each) => !each.endsWith(".gz")))

@@ -1,7 +1,6 @@
 #include "sensing/mechanics/sparse_cholesky.h"
 
 #include <cholmod.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cassert>
@@ -9,10 +8,13 @@
 #include <mutex>
 #include <new>
 
-// OpenBLAS' own; its header is in no runtime package.
 extern "C" {
+// OpenBLAS' own; its header is in no runtime package.
 void openblas_set_num_threads(int threads);
 int openblas_get_parallel();  // 0: the sequential build
+// OpenMP's, whose header comes with GCC only.
+int omp_get_max_active_levels();
+void omp_set_max_active_levels(int levels);
 }
 
 namespace taclink {

@@ -45,10 +45,12 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
       .source = [link, model = *model, &clock] { return MakeSource(link, model, clock); },
       .processor = [link, model = *model, chosen] { return MakeProcessor(chosen->In(link), model); },
       .estimator =
-          [link, model = *model, chosen](ForceModel force_model) {
-            chosen->Set(force_model);
-            return MakeForceEstimator(model, ToPipelineOptions(chosen->In(link)).force);
-          }};
+          [link, model = *model](ForceModel force_model) mutable {
+            LinkConfig changed = link;
+            changed.force_model = force_model;
+            return MakeForceEstimator(model, ToPipelineOptions(changed).force);
+          },
+      .choose = [chosen](ForceModel force_model) { chosen->Set(force_model); }};
   auto source = factories.source();
   if (!source) return source.error();
   auto processor = factories.processor();

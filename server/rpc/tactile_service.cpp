@@ -52,6 +52,8 @@ void TactileService::EndStreams(const std::string& reason) {
   updates_.Close(reason);
   calibrations_.Close(reason);
   tares_.Close(reason);
+  for (size_t link = 0; link < link_names_.size(); ++link)
+    arm_.worker(link).EndCameraOrders({ErrorCode::kUnavailable, reason});
 }
 
 ServiceLimits TactileService::limits() const {

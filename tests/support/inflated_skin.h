@@ -9,6 +9,7 @@
 #include "sensing/core/link_model.h"
 #include "sensing/mechanics/material_fit.h"
 #include "sensing/mechanics/pressed_skin.h"
+#include "tests/support/drawn_vector.h"
 
 namespace taclink {
 
@@ -32,7 +33,7 @@ inline InflationRecord NoisyRecord(const std::vector<Vec3>& displacements_mm, do
   const Vec3 sigmas = sigma_mm * Vec3(1, 1, 3);
   InflationRecord record{.name = std::to_string(pressure_mpa * 1e3) + " kPa", .pressure_mpa = pressure_mpa};
   for (const Vec3& u : displacements_mm) {
-    const Vec3 noise = sigmas.cwiseProduct(Vec3(normal(random), normal(random), normal(random)));
+    const Vec3 noise = sigmas.cwiseProduct(DrawnVec3([&] { return normal(random); }));
     record.markers.push_back({u + noise, sigmas.cwiseAbs2().cwiseInverse().asDiagonal()});
   }
   return record;

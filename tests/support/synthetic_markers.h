@@ -9,6 +9,7 @@
 #include "sensing/camera/projection.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
+#include "tests/support/drawn_vector.h"
 
 namespace taclink {
 
@@ -97,7 +98,7 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
       if (!pixel || uniform(random) < options.drop || Hidden(model, dents, rest, projector.center_in_link()))
         continue;
       Detection d;
-      d.center_px = *pixel + Vec2(noise(random), noise(random));
+      d.center_px = *pixel + DrawnVec2([&] { return noise(random); });
       if (d.center_px.x() < 2 || d.center_px.y() < 2 || d.center_px.x() > width - 3 ||
           d.center_px.y() > height - 3)
         continue;
@@ -111,7 +112,7 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
     });
     for (int i = 0; i < options.false_spots; ++i) {
       Detection d;
-      d.center_px = Vec2(width * uniform(random), height * uniform(random));
+      d.center_px = DrawnVec2([&] { return uniform(random); }).cwiseProduct(Vec2(width, height));
       d.covariance_px2 = options.noise_px * options.noise_px * Mat2::Identity();
       d.area_px2 = 5 + 10 * uniform(random);  // dust
       all.emplace_back(d, -1);

@@ -16,7 +16,7 @@ beforeAll(async () => {
   });
   server.write("tokens", `${lines.join("\n")}\n`);
   const still = server.write("still.yaml", untouched());
-  const held = server.write("held.yaml", pressed(7, 8, 0.3));
+  const held = server.write("held.yaml", pressed(7, 5, 0.4));
   const config = server.write(
     "arm.yaml",
     configuration("bench", { still, touched: held }, "security: {tokens: tokens}\n"),

@@ -12,7 +12,7 @@ const server = new Server();
 
 beforeAll(async () => {
   const still = server.write("still.yaml", untouched());
-  const held = server.write("held.yaml", pressed(7, 5, 0.45));
+  const held = server.write("held.yaml", pressed(7, 5, 0.4));
   const config = server.write("arm.yaml", configuration("bench", { still, touched: held, third: still }));
   await server.start("--config", config);
   browser = await launch();
@@ -41,14 +41,15 @@ describe("the arm", () => {
     await page.locator(".label.force", { hasText: "N" }).first().waitFor();
     const force = visit.row("touched").locator("td").nth(1);
     const forceN = async () => Number.parseFloat(await force.innerText());
-    await expect.poll(forceN, { timeout: 10_000 }).toBeGreaterThan(0.25);
+    await expect.poll(forceN, { timeout: 10_000 }).toBeGreaterThan(0.3);
     expect(await forceN()).toBeLessThan(0.5);
+    await page.waitForTimeout(1500);
+    await visit.picture("whole");
+    await page.getByRole("button", { name: /^Focus/ }).click();
     await page.waitForTimeout(1500);
     await visit.picture("live");
     await page.locator(".legend select").nth(1).selectOption("inferno");
-    await page.getByRole("button", { name: /^Focus/ }).click();
     await page.waitForTimeout(1000);
-    await visit.picture("focused");
     const touched = await visit.shareOfPixels(isLoaded);
     await visit.row("still").click();
     await page.getByRole("button", { name: /^Focus/ }).click();

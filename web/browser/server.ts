@@ -76,13 +76,18 @@ export class Server {
   }
 }
 
-/** A scene that lasts: once the rest shape was taken, also by a busy machine, something presses on it for good. */
+/** A scene that lasts: once the rest shape was taken, also by a busy machine, it is blown up and
+ * something presses on it for good. */
 export function pressed(path: number, ring: number, forceN: number): string {
   return `taclink_scene: 1
 name: held
 model: cylinder
 frame_rate_hz: ${RATE_HZ}
 duration_s: 3600
+pressure_keyframes:
+  - {time_s: 4.5, kpa: 0}
+  - {time_s: 5.5, kpa: 1.5}
+  - {time_s: 3600, kpa: 1.5}
 contacts:
   - {at: {path: ${path}, ring: ${ring}}, force_n: ${forceN}, begin_s: 6, end_s: 3599, ramp_s: 0.5}
 `;

@@ -19,19 +19,20 @@ export function App({ state }: { state: AppState }) {
 
 function Page() {
   const app = useApp();
-  const old = app.feed.value.connection.value.state === "lost";
+  const { state } = app.feed.value.connection.value;
+  const old = state === "lost" || state === "signIn";
   return (
     <>
-      <a class="skip" href="#content">
-        To the arm
-      </a>
+      <button type="button" class="skip" onClick={() => document.querySelector("main")?.focus()}>
+        To the content
+      </button>
       <Header />
       <ConnectionBanner />
       <ReplayBar />
       {app.page.value === "logs" ? (
         <LogsPage />
       ) : (
-        <main id="content" class={old ? "arm old" : "arm"}>
+        <main tabIndex={-1} class={old ? "arm old" : "arm"}>
           <SceneView />
           <LinkPanel />
           <LinkTable />

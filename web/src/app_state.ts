@@ -74,7 +74,12 @@ export class AppState {
 
   showAddress(address: Parameters<typeof formatAddress>[0]): void {
     const text = formatAddress(address);
-    if (text !== location.search) history.replaceState(null, "", text || location.pathname);
+    if (text === location.search) return;
+    try {
+      history.replaceState(null, "", text || location.pathname);
+    } catch {
+      // Refused where it changes too often; the next change tells the place as well.
+    }
   }
 
   private open(log: string, timeS: number): [ArmStore, Feed] {

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "sensing/model/model_file.h"
+#include "tests/support/drawn_vector.h"
 
 namespace taclink {
 namespace {
@@ -98,7 +99,7 @@ TEST_F(VisionScoreTest, GaussianErrorsOfTheSaidCovarianceAreConsistent) {
   result_.shape.covariances_mm2.assign(count_, root * root.transpose());
   for (int frame = 0; frame < 60; ++frame) {
     for (size_t m = 0; m < count_; ++m) {
-      const Vec3 noise = root * Vec3(normal(rng), normal(rng), normal(rng));
+      const Vec3 noise = root * DrawnVec3([&] { return normal(rng); });
       result_.shape.displacements_mm[m] = truth_.displacements_mm[m] + noise;
       result_.shape.positions_mm[m] = truth_.positions_mm[m] + bias + noise;
     }

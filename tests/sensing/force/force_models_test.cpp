@@ -9,6 +9,7 @@
 #include "sensing/force/force_estimator.h"
 #include "sensing/mechanics/pressed_skin.h"
 #include "sensing/model/model_file.h"
+#include "tests/support/drawn_vector.h"
 
 namespace taclink {
 namespace {
@@ -40,7 +41,7 @@ struct Push {
     SkinShape shape;
     const Mat3 covariance = Vec3(1, 1, 9).asDiagonal() * (kNoiseMm * kNoiseMm);
     for (int m = 0; m < model.markers.count(); ++m) {
-      const Vec3 error(kNoiseMm * normal(random), kNoiseMm * normal(random), 3 * kNoiseMm * normal(random));
+      const Vec3 error = kNoiseMm * DrawnVec3([&] { return normal(random); }).cwiseProduct(Vec3(1, 1, 3));
       const Vec3 u = displacements[static_cast<size_t>(m)] + error;
       shape.displacements_mm.push_back(u);
       shape.positions_mm.push_back(model.RestMarker(m) + u);

@@ -8,6 +8,7 @@
 #include <random>
 #include <string>
 
+#include "tests/support/drawn_vector.h"
 #include "tests/support/read_jpeg.h"
 
 namespace taclink {
@@ -66,8 +67,9 @@ TEST(Detector, CentresOfEllipsesAreSubPixelAtAnySize) {
       for (int column = 0; column < 8; ++column) {
         const double longest = 2 + 13 * uniform(random);  // semi-axis: 4 to 30 px across
         const double shortest = std::max(2.0, longest * (0.6 + 0.4 * uniform(random)));
-        ellipses.push_back({Vec2(40 + 75 * column + uniform(random), 45 + 75 * row + uniform(random)),
-                            longest, shortest, kPi * uniform(random), 90 + 120 * uniform(random)});
+        const Vec2 shift = DrawnVec2([&] { return uniform(random); });
+        ellipses.push_back({Vec2(40 + 75 * column, 45 + 75 * row) + shift, longest, shortest,
+                            kPi * uniform(random), 90 + 120 * uniform(random)});
       }
     }
     MarkerDetector detector;

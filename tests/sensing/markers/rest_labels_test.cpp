@@ -7,6 +7,7 @@
 #include "sensing/model/model_file.h"
 #include "sensing/simulation/renderer.h"
 #include "sensing/simulation/simulated_skin.h"
+#include "tests/support/drawn_vector.h"
 #include "tests/support/read_jpeg.h"
 #include "tests/support/synthetic_markers.h"
 
@@ -18,7 +19,7 @@ StereoRig Built(const LinkModel& model, std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   StereoRig rig = model.nominal_rig;
   for (const CameraId id : kBothCameras) {
-    rig[id].lens.principal_point_px += 30 * Vec2(uniform(random), uniform(random));
+    rig[id].lens.principal_point_px += 30 * DrawnVec2([&] { return uniform(random); });
     rig[id].lens.focal_px *= 1 + 0.05 * uniform(random);
     const Mat3 roll(
         Eigen::AngleAxisd(0.35 * model.markers.path_pitch_rad() * uniform(random), Vec3::UnitZ()));
@@ -69,8 +70,8 @@ TEST_P(RestLabelsTest, MisalignedCameras) {
   for (int trial = 0; trial < 6; ++trial) {
     StereoRig rig = model_.nominal_rig;
     for (const CameraId id : kBothCameras) {
-      const Vec3 axis = Vec3(uniform(random), uniform(random), uniform(random)).normalized();
-      const Vec3 shift = 2 * Vec3(uniform(random), uniform(random), uniform(random)).normalized();
+      const Vec3 axis = DrawnVec3([&] { return uniform(random); }).normalized();
+      const Vec3 shift = 2 * DrawnVec3([&] { return uniform(random); }).normalized();
       Rigid3& pose = rig[id].camera_from_link;
       const Mat3 turn(Eigen::AngleAxisd(RadFromDeg(2), axis));
       pose.rotation = turn * pose.rotation;

@@ -8,6 +8,7 @@
 
 #include "sensing/mechanics/skin_response.h"
 #include "sensing/model/model_file.h"
+#include "tests/support/drawn_vector.h"
 #include "tests/support/inflated_skin.h"
 
 namespace taclink {
@@ -60,8 +61,7 @@ TEST_F(MaterialFitTest, FindsTheModulusDespiteWrongLabels) {
   std::normal_distribution<double> normal(0, 8);
   for (int m = 3; m < model_.markers.count(); m += 19) {
     for (InflationRecord& record : records)
-      record.markers[static_cast<size_t>(m)].displacement_mm +=
-          Vec3(normal(random_), normal(random_), normal(random_));
+      record.markers[static_cast<size_t>(m)].displacement_mm += DrawnVec3([&] { return normal(random_); });
   }
   const auto fit = Fit(records);
   ASSERT_TRUE(fit.ok()) << fit.error().message;

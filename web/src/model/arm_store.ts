@@ -58,6 +58,8 @@ export class ArmStore {
   takeArm(arm: Arm): void {
     const names = new Set(arm.links.map((link) => link.name));
     for (const name of this.records.keys()) if (!names.has(name)) this.records.delete(name);
+    // Without joints the arm itself says where its links are.
+    if (!arm.baseFrame) for (const record of this.records.values()) record.pose = undefined;
     this.arm.value = arm;
     for (const name of names) this.changed(name);
   }
@@ -86,8 +88,9 @@ export class ArmStore {
     this.changed(frame.link);
   }
 
-  takeTime(timeS: number): void {
-    if (timeS > this.timeS || Number.isNaN(this.timeS) || timeS < this.timeS - 5) {
+  // Links' times differ by a little; a clock that goes back by more does so for all.
+  private takeTime(timeS: number): void {
+    if (timeS > this.timeS || Number.isNaN(this.timeS) || timeS < this.timeS - 0.5) {
       this.timeS = timeS;
       this.timeAtMs = performance.now();
     }
@@ -111,6 +114,14 @@ export class ArmStore {
     const detail = event.detail;
     if (event.kind === EventKind.FORCE_LEVEL && detail.case === "forceLevel")
       this.levels.set(`${event.link}\n${detail.value.region}`, detail.value.level);
+    this.announce();
+  }
+
+  /** Another run of the server: its events are numbered anew, and levels begin at normal. */
+  forgetEvents(): void {
+    this.events.value = [];
+    this.levels.clear();
+    this.announce();
   }
 
   private readonly levels = new Map<string, ForceLevel>();
@@ -136,6 +147,10 @@ export class ArmStore {
 
   private changed(link: string): void {
     for (const listener of this.listeners) listener(link);
+    this.announce();
+  }
+
+  private announce(): void {
     if (this.beatDue) return;
     this.beatDue = true;
     setTimeout(() => {

@@ -94,8 +94,8 @@ export class LiveFeed implements Feed {
   }
 
   private async readFrames(stop: AbortSignal, alive: () => void): Promise<void> {
-    await this.session.refresh();
-    const { arm } = await this.session.tactile.getArm({}, { signal: stop, timeoutMs: 5000 });
+    const asked = this.session.tactile.getArm({}, { signal: stop, timeoutMs: 5000 });
+    const [{ arm }] = await Promise.all([asked, this.session.refresh()]);
     if (!arm) return;
     this.store.takeArm(arm);
     const inner = new AbortController();
@@ -143,7 +143,8 @@ export class LiveFeed implements Feed {
         this.store.takeEvent(message.value);
         this.eventsAfter = message.value.sequence;
       } else if (message.case === "status") {
-        if (this.eventsRun !== message.value.runId) this.eventsRun = message.value.runId;
+        if (this.eventsRun && this.eventsRun !== message.value.runId) this.store.forgetEvents();
+        this.eventsRun = message.value.runId;
         this.eventsAfter = message.value.position;
       }
     }

@@ -33,6 +33,7 @@ export class ReplayFeed implements Feed {
 
   private life: AbortController | undefined;
   private pausedByHiding = false;
+  private placedAtMs = 0;
   private toldAtMs = 0;
   private looping = false;
 
@@ -59,11 +60,14 @@ export class ReplayFeed implements Feed {
   stop(): void {
     this.life?.abort();
     this.life = undefined;
+    if (Number.isFinite(this.positionS.peek())) this.startS = this.positionS.peek();
   }
 
   setHidden(hidden: boolean): void {
     const status = this.status.value;
-    if (hidden && status && !status.paused) {
+    if (!this.life || status?.ended) {
+      this.pausedByHiding = false;
+    } else if (hidden && status && !status.paused) {
       this.pausedByHiding = true;
       void this.pause(true);
     } else if (!hidden && this.pausedByHiding) {
@@ -93,7 +97,6 @@ export class ReplayFeed implements Feed {
     this.positionS.value = timeS;
     this.onPosition(timeS);
     if (this.status.value?.ended || !this.life) {
-      this.startS = timeS;
       this.start();
       return;
     }
@@ -122,7 +125,8 @@ export class ReplayFeed implements Feed {
     }
     if (code === Code.NotFound || code === Code.InvalidArgument || code === Code.DataLoss) {
       this.trouble.value = reason;
-      this.connection.value = { state: "live" };
+      this.status.value = undefined;
+      this.connection.value = { state: "connecting" };
       this.stop();
       return;
     }
@@ -138,17 +142,20 @@ export class ReplayFeed implements Feed {
     await this.session.refresh();
     const wanted = this.startS;
     let sought = !Number.isFinite(wanted);
-    const request = { log: this.log, detail: Detail.FULL, speed: 1, loop: this.looping, paused: !sought };
+    const before = this.status.value;
+    const speed = before && !before.ended ? before.speed : 1;
+    const stayPaused = before !== undefined && before.paused && !before.ended;
+    const request = { log: this.log, detail: Detail.FULL, speed, loop: this.looping, paused: !sought };
     for await (const { message } of this.session.recording.replay(request, { signal: stop })) {
       alive();
-      this.connection.value = { state: "live" };
+      if (this.connection.value.state !== "live") this.connection.value = { state: "live" };
       switch (message.case) {
         case "status":
           this.takeStatus(message.value);
           if (!sought) {
             sought = true;
             await this.seek(wanted);
-            await this.pause(false);
+            if (!stayPaused) await this.pause(false);
           }
           if (message.value.ended) return this.stop();
           break;
@@ -172,6 +179,7 @@ export class ReplayFeed implements Feed {
   }
 
   private takeStatus(status: ReplayStatus): void {
+    if (status.loops !== (this.status.value?.loops ?? 0n)) this.store.clear();
     this.status.value = status;
     if (status.paused || status.ended) this.takePosition(secondsOf(status.positionUtcNs));
   }
@@ -179,8 +187,11 @@ export class ReplayFeed implements Feed {
   private takePosition(timeS: number): void {
     if (!(timeS > 0)) return;
     const now = performance.now();
-    if (now - this.toldAtMs < 100) return;
+    if (now - this.placedAtMs < 100) return;
     this.positionS.value = timeS;
+    this.placedAtMs = now;
+    // Browsers allow few changes of the address.
+    if (now - this.toldAtMs < 1000) return;
     this.toldAtMs = now;
     this.onPosition(timeS);
   }

@@ -5,12 +5,14 @@ import type { ArmStore } from "../model/arm_store";
 import { lengthOf } from "../model/vectors";
 import { colourTable, StickyRange, type ColourMapName } from "../skin/colour_map";
 import { QUANTITIES, type Quantity } from "../skin/fields";
+import { sameShape } from "../skin/same_shape";
 import { ForceArrows, type ForceArrow } from "./force_arrows";
 import { Labels, type Label } from "./labels";
 import { LinkObject } from "./link_object";
 
 const LONGEST_ARROW_M = 0.1;
 const FIRST_ARROW_RANGE_N = 2;
+const DRAG_PX = 4;
 
 /** What the legend tells. */
 export interface Scales {
@@ -45,6 +47,7 @@ export class ArmScene {
   private ranges: Record<Quantity, StickyRange>;
   private arrowRange = new StickyRange(FIRST_ARROW_RANGE_N);
   private selected = "";
+  private pressedAt = [0, 0];
 
   /** Throws where the browser has no WebGL. */
   constructor(
@@ -72,6 +75,7 @@ export class ArmScene {
     this.scene.add(new THREE.AmbientLight(0xffffff, 2.2), this.camera, this.floor, this.arrows.group);
     this.resizes = new ResizeObserver(() => this.resize());
     this.resizes.observe(canvas.parentElement!);
+    canvas.addEventListener("pointerdown", this.press);
     canvas.addEventListener("click", this.pick);
     canvas.addEventListener("keydown", this.steer);
     this.endListening = store.onChange((link) => {
@@ -87,10 +91,14 @@ export class ArmScene {
     this.drawing = -1;
     this.endListening();
     this.resizes.disconnect();
+    this.canvas.removeEventListener("pointerdown", this.press);
     this.canvas.removeEventListener("click", this.pick);
     this.canvas.removeEventListener("keydown", this.steer);
     this.controls.dispose();
     for (const link of this.links.values()) link.dispose();
+    this.labels.dispose();
+    this.arrows.dispose();
+    this.floor.dispose();
     this.renderer.dispose();
   }
 
@@ -223,7 +231,7 @@ export class ArmScene {
 
   private nameplate(link: LinkObject): THREE.Vector3 {
     const side = new THREE.Vector3(1, 0, 0).applyQuaternion(this.camera.quaternion);
-    return link.center().addScaledVector(side, -1.35 * Math.max(...link.model.profileRadiusM) - 0.02);
+    return link.center().addScaledVector(side, -1.4 * Math.max(...link.model.profileRadiusM) - 0.04);
   }
 
   // Links come and go with a configuration.
@@ -231,7 +239,7 @@ export class ArmScene {
     const names = new Set(arm.links.map((link) => link.name));
     for (const [name, object] of this.links) {
       const link = arm.links.find((each) => each.name === name);
-      if (link?.model && link.model.name === object.model.name) continue;
+      if (link?.model && sameShape(link.model, object.model)) continue;
       this.scene.remove(object.group);
       object.dispose();
       this.links.delete(name);
@@ -291,7 +299,13 @@ export class ArmScene {
     });
   }
 
+  private readonly press = (event: PointerEvent): void => {
+    this.pressedAt = [event.clientX, event.clientY];
+  };
+
+  // A drag turns the view and ends with a click as well.
   private readonly pick = (event: MouseEvent): void => {
+    if (Math.hypot(event.clientX - this.pressedAt[0], event.clientY - this.pressedAt[1]) > DRAG_PX) return;
     const box = this.canvas.getBoundingClientRect();
     const at = new THREE.Vector2(
       ((event.clientX - box.left) / box.width) * 2 - 1,

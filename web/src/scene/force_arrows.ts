@@ -53,6 +53,10 @@ export class ForceArrows {
     arrow.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), force.clone().normalize());
   }
 
+  dispose(): void {
+    for (const each of [this.material, this.ghost, this.shaft, this.head]) each.dispose();
+  }
+
   /** Where an arrow begins: its label's place. */
   static tail({ tip, force }: ForceArrow, metresPerNewton: number): THREE.Vector3 {
     const length = Math.max(force.length() * metresPerNewton, 1.5 * HEAD);

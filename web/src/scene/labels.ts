@@ -13,6 +13,10 @@ export class Labels {
 
   constructor(private readonly host: HTMLElement) {}
 
+  dispose(): void {
+    for (const element of this.elements) element.remove();
+  }
+
   show(labels: readonly Label[], camera: THREE.Camera, width: number, height: number): void {
     while (this.elements.length < labels.length)
       this.elements.push(this.host.appendChild(document.createElement("span")));

@@ -4,7 +4,7 @@ import type { Link } from "../api/gen/taclink/v1/arm_pb";
 import type { PreviewPicture, StreamPreviewResponse } from "../api/gen/taclink/v1/preview_pb";
 import { keepOpen } from "../api/keep_open";
 import { useApp } from "../app_state";
-import { fixed } from "../ui/format";
+import { clockTime, fixed, secondsOf } from "../ui/format";
 
 const RATE_HZ = 5;
 const FOUND = "#3ddc97";
@@ -17,6 +17,7 @@ export function CameraView({ link }: { link: Link }) {
   const withMarkers = useSignal(true);
   const withLabels = useSignal(false);
 
+  const live = app.feed.value.connection.value.state === "live";
   useEffect(() => {
     preview.value = undefined;
     trouble.value = "";
@@ -24,6 +25,7 @@ export function CameraView({ link }: { link: Link }) {
       trouble.value = "A log is played: pictures are shown of the live arm only.";
       return;
     }
+    if (!live) return;
     const life = new AbortController();
     const visible = () => !document.hidden;
     void keepOpen(life.signal, {
@@ -41,7 +43,7 @@ export function CameraView({ link }: { link: Link }) {
       silenceMs: 0,
     });
     return () => life.abort();
-  }, [link.name, app.log.value]);
+  }, [link.name, app.log.value, app.session.generation.value, live]);
 
   const cameras = preview.value?.pictures ?? [];
   return (
@@ -65,6 +67,9 @@ export function CameraView({ link }: { link: Link }) {
         </label>
       </div>
       {trouble.value && <p class="empty">{trouble.value}</p>}
+      {preview.value && (
+        <p class="small numbers">taken {clockTime(secondsOf(preview.value.exposureUtcNs))}</p>
+      )}
       {!trouble.value && cameras.length === 0 && <p class="empty">Waiting for pictures …</p>}
       <div class="pictures">
         {cameras.map((picture) => (

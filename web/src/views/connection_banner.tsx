@@ -24,8 +24,8 @@ export function ConnectionBanner() {
   const sinceS = (performance.now() - connection.sinceMs) / 1e3;
   return (
     <div class="banner lost" role="alert">
-      <strong>Connection lost.</strong> What you see is {duration(Math.max(0, sinceS))} old.{" "}
-      {connection.reason} Trying again …
+      <strong>Connection lost.</strong> What you see is old. {connection.reason} Trying again …{" "}
+      <span aria-hidden="true">({duration(Math.max(0, sinceS))})</span>
     </div>
   );
 }

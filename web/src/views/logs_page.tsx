@@ -42,7 +42,7 @@ export function LogsPage() {
   };
   const shown = chooseLogs(logs.value ?? [], filter.value, order.value);
   return (
-    <main class="logs">
+    <main tabIndex={-1} class="logs">
       <header class="row">
         <h2>Logs</h2>
         <label>

@@ -14,6 +14,7 @@ const REDRAW_MS = 125;
 // A link at rest tells its force once a second.
 const HOLD_S = 2.5;
 const MOST_CONTACTS = 8;
+const LEAST_TOP_N = 0.4;
 /** Told apart also by colour-blind people (Okabe and Ito), and by dashes from the ninth on. */
 const LINE_COLOURS = ["#56b4e9", "#e69f00", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7", "#999999"];
 
@@ -131,7 +132,7 @@ class ForceChart {
   private plot: uPlot | undefined;
   private names = "";
   private curves: Curves | undefined;
-  private top = 1;
+  private top = LEAST_TOP_N;
   private readonly sizes: ResizeObserver;
 
   constructor(
@@ -151,7 +152,7 @@ class ForceChart {
     this.curves = curves;
     const names = curves.names.join("\n");
     if (!this.plot || names !== this.names) this.make(names);
-    let top = 1;
+    let top = LEAST_TOP_N;
     for (const series of curves.data.slice(1))
       for (const value of series) if (value && value > top) top = value;
     // Falls only when it is far too high, so that the axis does not jump.

@@ -5,6 +5,7 @@ import type { MarkerRange } from "../api/gen/taclink/v1/events_pb";
 import { useApp } from "../app_state";
 import { colourTable, roundUp, StickyRange } from "../skin/colour_map";
 import { MarkerFields, QUANTITIES } from "../skin/fields";
+import { sameShape } from "../skin/same_shape";
 import { contourFlat, paintFlat } from "../skin/unroll";
 import { fixed } from "../ui/format";
 
@@ -25,7 +26,9 @@ export function UnrolledMap({ link }: { link: Link }) {
   const cell = useSignal<Cell | undefined>(undefined);
   const model = link.model!;
   const grid = model.markers!;
-  const fields = useMemo(() => new MarkerFields(model), [model.name, link.name]);
+  const known = useRef(model);
+  if (!sameShape(known.current, model)) known.current = model;
+  const fields = useMemo(() => new MarkerFields(known.current), [known.current]);
   const range = useMemo(
     () => new StickyRange(QUANTITIES[app.quantity.value].range),
     [app.quantity.value, link.name],
@@ -34,7 +37,6 @@ export function UnrolledMap({ link }: { link: Link }) {
   useEffect(() => {
     let waiting = 0;
     const painter = new FlatPainter(canvas.current!, grid.paths, grid.rings);
-    const regions = link.forceLevels.flatMap((level) => (level.markers ? [level.markers] : []));
     const draw = () => {
       waiting = 0;
       const frame = store.link(link.name).shape;
@@ -47,7 +49,8 @@ export function UnrolledMap({ link }: { link: Link }) {
       painter.paint(values, range.top * scale, colourTable(app.colourMap.value));
       const level = Math.max(LEAST_OUTLINE_PA, OUTLINE_SHARE * Math.max(...pressures));
       painter.outline(contourFlat(pressures, grid, level));
-      painter.regions(regions);
+      const now = store.arm.peek()?.links.find((each) => each.name === link.name);
+      painter.regions(now?.forceLevels.flatMap((level) => (level.markers ? [level.markers] : [])) ?? []);
       painter.mark(cell.value);
     };
     const request = () => {
