@@ -1,6 +1,6 @@
 import axe from "axe-core";
 import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { afterAll, beforeAll, describe, expect, onTestFinished, test } from "vitest";
 import { launch, Visit } from "./page";
 import { configuration, pressed, Server, untouched } from "./server";
 
@@ -175,6 +175,7 @@ describe("the forces' curves", () => {
 describe("a server that ends", () => {
   test("is seen to be gone, and taken up again when it is back", async () => {
     const own = new Server();
+    onTestFinished(() => own.close());
     const config = own.write(
       "arm.yaml",
       configuration("away", { only: own.write("still.yaml", untouched()) }),
@@ -190,6 +191,5 @@ describe("a server that ends", () => {
     await banner.waitFor({ state: "detached", timeout: 15_000 });
     await visit.row("only").getByText("OK").waitFor({ timeout: 15_000 });
     await visit.close();
-    await own.close();
   });
 });
