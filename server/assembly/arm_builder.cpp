@@ -45,7 +45,7 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
       .source = [link, model = *model, &clock] { return MakeSource(link, model, clock); },
       .processor = [link, model = *model, chosen] { return MakeProcessor(chosen->In(link), model); },
       .estimator =
-          [link, model = *model](ForceModel force_model) mutable {
+          [link, model = *model](ForceModel force_model) {
             LinkConfig changed = link;
             changed.force_model = force_model;
             return MakeForceEstimator(model, ToPipelineOptions(changed).force);

@@ -59,6 +59,7 @@ class LinkCallsTest : public ::testing::Test {
     Result<void> UseEstimator(std::unique_ptr<ForceEstimator> estimator) override {
       EXPECT_NE(estimator, nullptr);
       ++log_->used;
+      log_->used.notify_all();
       return {};
     }
 
@@ -231,7 +232,7 @@ TEST_F(LinkCallsTest, AForceModelIsMadeAsideAndUsed) {
   WaitUntilRunning();
   EXPECT_TRUE(SetForceModel("upper", v1::FORCE_MODEL_NONLINEAR).ok());
   script_->Push(1);
-  while (log_->used == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  log_->used.wait(0);
   const std::lock_guard lock(log_->mutex);
   EXPECT_THAT(log_->made, ElementsAre(ForceModel::kNonlinear));
 }

@@ -41,19 +41,19 @@ describe("the arm", () => {
     await page.locator(".label.force", { hasText: "N" }).first().waitFor();
     const force = visit.row("touched").locator("td").nth(1);
     const forceN = async () => Number.parseFloat(await force.innerText());
-    await expect.poll(forceN, { timeout: 10_000 }).toBeGreaterThan(0.3);
-    expect(await forceN()).toBeLessThan(0.5);
-    await page.waitForTimeout(1500);
+    await expect.poll(forceN, { timeout: 10_000 }).toBeGreaterThan(0.36); // 0.4 N press
+    expect(await forceN()).toBeLessThan(0.44);
+    await visit.drawn();
     await visit.picture("whole");
     await page.getByRole("button", { name: /^Focus/ }).click();
-    await page.waitForTimeout(1500);
+    await visit.drawn();
     await visit.picture("live");
     await page.locator(".legend select").nth(1).selectOption("inferno");
-    await page.waitForTimeout(1000);
+    await visit.drawn();
     const touched = await visit.shareOfPixels(isLoaded);
     await visit.row("still").click();
     await page.getByRole("button", { name: /^Focus/ }).click();
-    await page.waitForTimeout(1000);
+    await visit.drawn();
     const still = await visit.shareOfPixels(isLoaded);
     expect(touched).toBeGreaterThan(0.0002);
     expect(still).toBeLessThan(touched / 10);

@@ -56,6 +56,16 @@ export class Visit {
     return this.page.screenshot({ path: join(PICTURES, `${name}.png`) });
   }
 
+  /** Until the scene was drawn twice from now on: what was asked of it before is on the canvas. */
+  async drawn(): Promise<void> {
+    const canvas = this.page.locator(".scene canvas");
+    const before = Number(await canvas.getAttribute("data-frames"));
+    await this.page.waitForFunction(
+      (least) => Number(document.querySelector<HTMLElement>(".scene canvas")?.dataset.frames) >= least,
+      before + 2,
+    );
+  }
+
   row(link: string) {
     return this.page.locator(`tr[data-link="${link}"]`);
   }

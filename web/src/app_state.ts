@@ -12,6 +12,8 @@ import type { Quantity } from "./skin/fields";
 
 export type Theme = "system" | "dark" | "light";
 
+const prefersLight = matchMedia("(prefers-color-scheme: light)");
+
 /** All that the views share. */
 export class AppState {
   readonly session = new Session();
@@ -25,10 +27,10 @@ export class AppState {
   readonly quantity = signal<Quantity>("pressure");
   readonly colourMap = signal<ColourMapName>("cividis");
   readonly theme = signal<Theme>("system");
-  readonly askSignIn = signal(false);
   /** For people, at the foot of the page for a while. */
   readonly notice = signal<{ text: string; bad: boolean } | undefined>(undefined);
 
+  private readonly systemLight = signal(prefersLight.matches);
   private noticeTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor() {
@@ -53,6 +55,7 @@ export class AppState {
       running.start();
       return () => running.stop();
     });
+    prefersLight.addEventListener("change", () => (this.systemLight.value = prefersLight.matches));
     document.addEventListener("visibilitychange", () => this.feed.value.setHidden(document.hidden));
     addEventListener("popstate", () => location.reload());
   }
@@ -105,8 +108,8 @@ export class AppState {
     const theme = this.theme.value;
     const text = JSON.stringify({ quantity: this.quantity.value, colourMap: this.colourMap.value, theme });
     localStorage.setItem("taclink.view", text);
-    if (theme === "system") delete document.documentElement.dataset.theme;
-    else document.documentElement.dataset.theme = theme;
+    const system = this.systemLight.value ? "light" : "dark";
+    document.documentElement.dataset.theme = theme === "system" ? system : theme;
   }
 }
 
