@@ -145,6 +145,32 @@ Result<void> Client::RestartLink(const std::string& link, milliseconds timeout) 
   return {};
 }
 
+Result<void> Client::SetCamera(const std::string& link, const std::string& camera,
+                               const CameraSettings& settings, milliseconds timeout) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + timeout);
+  v1::SetCameraRequest request;
+  request.set_link(link);
+  request.set_camera(camera);
+  if (settings.automatic_exposure) request.set_automatic(true);
+  if (settings.exposure_s) request.set_exposure_s(*settings.exposure_s);
+  if (settings.gain) request.set_gain(*settings.gain);
+  v1::SetCameraResponse response;
+  const grpc::Status status = connection_->stub->SetCamera(&context, request, &response);
+  return status.ok() ? Result<void>() : FromStatus(status, connection_->address);
+}
+
+Result<void> Client::SetForceModel(const std::string& link, ForceModel model, milliseconds timeout) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + timeout);
+  v1::SetForceModelRequest request;
+  request.set_link(link);
+  request.set_model(ToMessage(model));
+  v1::SetForceModelResponse response;
+  const grpc::Status status = connection_->stub->SetForceModel(&context, request, &response);
+  return status.ok() ? Result<void>() : FromStatus(status, connection_->address);
+}
+
 Result<CalibrationResult> Client::Calibrate(const CalibrateOptions& options,
                                             const CalibrateProgress& progress, milliseconds timeout) {
   grpc::ClientContext context;

@@ -121,18 +121,22 @@ LinkModel From(const v1::LinkModel& message) {
 }
 
 Camera From(const v1::Camera& message) {
-  return {.name = message.name(),
-          .configured = message.configured(),
-          .device = message.device(),
-          .format = message.format(),
-          .trouble = message.trouble(),
-          .rate_hz = message.rate_hz(),
-          .pictures = message.pictures(),
-          .lost = message.lost(),
-          .damaged = message.damaged(),
-          .undecodable = message.undecodable(),
-          .unpaired = message.unpaired(),
-          .stamped_on_arrival = message.stamped_on_arrival()};
+  Camera camera = {.name = message.name(),
+                   .configured = message.configured(),
+                   .device = message.device(),
+                   .format = message.format(),
+                   .trouble = message.trouble(),
+                   .rate_hz = message.rate_hz(),
+                   .pictures = message.pictures(),
+                   .lost = message.lost(),
+                   .damaged = message.damaged(),
+                   .undecodable = message.undecodable(),
+                   .unpaired = message.unpaired(),
+                   .stamped_on_arrival = message.stamped_on_arrival()};
+  if (message.has_automatic_exposure()) camera.automatic_exposure = message.automatic_exposure();
+  if (message.has_exposure_s()) camera.exposure_s = message.exposure_s();
+  if (message.has_gain()) camera.gain = message.gain();
+  return camera;
 }
 
 Link From(const v1::Link& message) {
@@ -403,6 +407,22 @@ CalibrationResult FromMessage(const v1::CalibrationResult& message) {
           .rmse_z_m = message.rmse_z_m(),
           .file_text = message.file_text(),
           .saved_to = message.saved_to()};
+}
+
+v1::ForceModel ToMessage(ForceModel model) {
+  switch (model) {
+    case ForceModel::kLiteral:
+      return v1::FORCE_MODEL_LITERAL;
+    case ForceModel::kLinear:
+      return v1::FORCE_MODEL_LINEAR;
+    case ForceModel::kPressurised:
+      return v1::FORCE_MODEL_PRESSURISED;
+    case ForceModel::kNonlinear:
+      return v1::FORCE_MODEL_NONLINEAR;
+    case ForceModel::kUnknown:
+      break;
+  }
+  return v1::FORCE_MODEL_UNSPECIFIED;
 }
 
 v1::CalibrateRequest ToMessage(const CalibrateOptions& options) {

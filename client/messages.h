@@ -18,6 +18,7 @@ ArmContacts FromMessage(const v1::StreamContactsResponse& message);
 std::optional<Covariance3> FromMessage(const google::protobuf::RepeatedField<double>& covariance);
 v1::StreamFramesRequest ToMessage(const StreamOptions& options);
 v1::CalibrateRequest ToMessage(const CalibrateOptions& options);
+v1::ForceModel ToMessage(ForceModel model);
 Baseline FromMessage(const v1::Baseline& message);
 ForceLevelState FromMessage(const v1::ForceLevelState& message);
 Event FromMessage(const v1::Event& message);

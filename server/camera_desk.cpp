@@ -11,6 +11,17 @@ constexpr size_t kMostWaiting = 16;
 
 }  // namespace
 
+void CameraMemory::Keep(const CameraOrder& order) {
+  const std::lock_guard lock(mutex_);
+  for (const CameraId id : kBothCameras)
+    if (order.cameras[Index(id)]) settings_[Index(id)].Take(order.settings);
+}
+
+void CameraMemory::Tell(FrameSource& source) const {
+  const std::lock_guard lock(mutex_);
+  for (const CameraId id : kBothCameras) source.Remember(id, settings_[Index(id)]);
+}
+
 Result<void> CameraDesk::Order(const CameraOrder& order, CameraObserver observer) {
   const std::lock_guard lock(mutex_);
   if (closed_) return Error{ErrorCode::kUnavailable, "the link's worker has ended; try again when it runs"};

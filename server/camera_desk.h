@@ -21,6 +21,18 @@ struct CameraOrder {
 /// Called once, on the capture thread or that which gives it up.
 using CameraObserver = std::function<void(const Result<void>&)>;
 
+/// What a link's cameras were set to since the server started, for the source that follows. Any thread.
+class CameraMemory {
+ public:
+  void Keep(const CameraOrder& order);
+  /// Before the source is started.
+  void Tell(FrameSource& source) const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::array<CameraSettings, kCameraCount> settings_;  // guarded by mutex_
+};
+
 /// Where settings of a link's cameras are ordered, and from where its capture thread carries them out.
 class CameraDesk {
  public:

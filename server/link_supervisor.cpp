@@ -286,6 +286,7 @@ void LinkSupervisor::AwaitBuild(int64_t now_ns) {
     started_ns_ = now_ns;
     return Died(build->result.error().message, now_ns);
   }
+  cameras_->Tell(*build->source);
   auto worker = std::make_shared<LinkWorker>(name_, std::move(build->source), std::move(build->processor),
                                              outlet_, clock_, options_);
   started_ns_ = now_ns;
@@ -351,7 +352,11 @@ Result<void> LinkSupervisor::Tare(const TareOptions& options, TareObserver obser
 }
 
 Result<void> LinkSupervisor::SetCamera(const CameraOrder& order, CameraObserver observer) {
-  if (const auto worker = current()) return worker->SetCamera(order, std::move(observer));
+  const auto kept = [memory = cameras_, order, observer = std::move(observer)](const Result<void>& done) {
+    if (done) memory->Keep(order);
+    observer(done);
+  };
+  if (const auto worker = current()) return worker->SetCamera(order, kept);
   return NoWorker();
 }
 

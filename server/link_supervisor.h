@@ -99,7 +99,7 @@ class LinkSupervisor {
   Result<void> Calibrate(const CalibrationOrder& order, CalibrationObserver observer);
   /// Likewise.
   Result<void> Tare(const TareOptions& options, TareObserver observer);
-  /// Likewise.
+  /// Likewise. What was taken lasts until the server ends, also with a fresh worker.
   Result<void> SetCamera(const CameraOrder& order, CameraObserver observer);
   /// At shutdown: answers those that wait, whatever their cameras do.
   void EndCameraOrders(const Error& why);
@@ -136,6 +136,7 @@ class LinkSupervisor {
   const LinkWorkerOptions options_;
   const WatchdogOptions limits_;
   const std::shared_ptr<LinkOutlet> outlet_;
+  const std::shared_ptr<CameraMemory> cameras_ = std::make_shared<CameraMemory>();
   const std::shared_ptr<std::atomic<int>> builds_ = std::make_shared<std::atomic<int>>(0);  // threads
 
   std::atomic<Order> order_ = Order::kNone;

@@ -146,11 +146,9 @@ void SourceSupervisor::SetCondition(SourceCondition::State state, std::string re
 
 Result<void> SourceSupervisor::SetCamera(CameraId id, const CameraSettings& settings) {
   if (!started_) return Error{ErrorCode::kUnavailable, "the link's cameras are not there now"};
-  try {
-    return source_->SetCamera(id, settings);
-  } catch (const std::exception& e) {
-    return Error{ErrorCode::kInternal, std::string("the camera could not be set: ") + e.what()};
-  }
+  auto set = Guarded([&] { return source_->SetCamera(id, settings); });
+  Observe();  // who is answered may ask at once
+  return set;
 }
 
 SourceCondition SourceSupervisor::condition() const {

@@ -30,6 +30,7 @@ void AddShow(const Arguments& app, Selected& selected);
 void AddToken(const Arguments& app, Selected& selected);
 void AddTare(const Arguments& app, Selected& selected);
 void AddEvents(const Arguments& app, Selected& selected);
+void AddSet(const Arguments& app, Selected& selected);
 void AddThresholds(const Arguments& app, Selected& selected);
 
 /// Likewise, below `record`.

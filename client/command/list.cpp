@@ -55,12 +55,16 @@ void PrintCameras(const client::Arm& arm) {
 }
 
 Json CameraJson(const client::Camera& camera) {
-  return {{"camera", camera.name},       {"configured", camera.configured},
-          {"device", camera.device},     {"format", camera.format},
-          {"trouble", camera.trouble},   {"rate_hz", camera.rate_hz},
-          {"pictures", camera.pictures}, {"lost", camera.lost},
-          {"damaged", camera.damaged},   {"undecodable", camera.undecodable},
-          {"unpaired", camera.unpaired}, {"stamped_on_arrival", camera.stamped_on_arrival}};
+  Json out = {{"camera", camera.name},       {"configured", camera.configured},
+              {"device", camera.device},     {"format", camera.format},
+              {"trouble", camera.trouble},   {"rate_hz", camera.rate_hz},
+              {"pictures", camera.pictures}, {"lost", camera.lost},
+              {"damaged", camera.damaged},   {"undecodable", camera.undecodable},
+              {"unpaired", camera.unpaired}, {"stamped_on_arrival", camera.stamped_on_arrival}};
+  if (camera.automatic_exposure) out["automatic_exposure"] = *camera.automatic_exposure;
+  if (camera.exposure_s) out["exposure_ms"] = *camera.exposure_s * 1e3;
+  if (camera.gain) out["gain"] = *camera.gain;
+  return out;
 }
 
 void PrintJson(const client::Arm& arm) {

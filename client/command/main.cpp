@@ -44,6 +44,7 @@ int main(int argc, char** argv) {
   taclink::command::AddTare(arguments, selected);
   taclink::command::AddEvents(arguments, selected);
   taclink::command::AddThresholds(arguments, selected);
+  taclink::command::AddSet(arguments, selected);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

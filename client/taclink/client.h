@@ -87,6 +87,17 @@ struct Camera {
   uint64_t undecodable = 0;  ///< no picture could be made of it
   uint64_t unpaired = 0;     ///< the other camera had none of that time
   uint64_t stamped_on_arrival = 0;
+  // As read when it was opened or set; none: it has no such control, or is not open.
+  std::optional<bool> automatic_exposure = {};
+  std::optional<double> exposure_s = {};  ///< none also while the camera decides
+  std::optional<int> gain = {};           ///< camera's own units
+};
+
+/// What is not given stays as it is.
+struct CameraSettings {
+  bool automatic_exposure = false;        ///< then without exposure_s
+  std::optional<double> exposure_s = {};  ///< steps of 0.1 ms
+  std::optional<int> gain = {};           ///< camera's own units
 };
 
 struct Link {
@@ -311,6 +322,16 @@ class Client {
   /// GetArm tells how it goes. Errors: kNotFound, kUnavailable.
   Result<void> RestartLink(const std::string& link,
                            std::chrono::milliseconds timeout = std::chrono::seconds(10));
+
+  /// `camera`: "top", "bottom" or empty for both. Holds until the server ends. Errors: kNotFound,
+  /// kInvalidArgument (with what the camera takes), kUnsupported (nothing to set), kUnavailable (the camera
+  /// is not there now).
+  Result<void> SetCamera(const std::string& link, const std::string& camera, const CameraSettings& settings,
+                         std::chrono::milliseconds timeout = std::chrono::seconds(20));
+  /// Computes the link's forces by `model` from the next frame on. Errors: kNotFound, kInvalidArgument,
+  /// kUnavailable.
+  Result<void> SetForceModel(const std::string& link, ForceModel model,
+                             std::chrono::milliseconds timeout = std::chrono::seconds(60));
 
   /// Finds the link's cameras and rest shape anew; nothing may touch the skin. Waits for the end. Errors:
   /// kNotFound, kFailedPrecondition (touched, moved, does not fit: the message says), kUnavailable,

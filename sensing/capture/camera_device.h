@@ -48,6 +48,9 @@ class CameraDevice {
     return Error{ErrorCode::kUnsupported, description() + " can't be set"};
   }
 
+  /// As read when it was opened or set.
+  virtual CameraSettings settings() const { return {}; }
+
   virtual CameraFormat format() const = 0;
   virtual std::string description() const = 0;  ///< "/dev/video0 (usb:1-2, serial:A1)"
   virtual int buffer_count() const = 0;

@@ -41,6 +41,7 @@ class CameraPair final : public FrameSource {
   Result<void> Start() override;
   Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override;
   Result<void> SetCamera(CameraId id, const CameraSettings& settings) override;
+  void Remember(CameraId id, const CameraSettings& settings) override { system_->Remember(id, settings); }
   SourceInfo Info() const override;
   SourceCounters Counters() const override;
 
@@ -369,6 +370,7 @@ Result<void> CameraPair::SetCamera(CameraId id, const CameraSettings& settings) 
     return Error{ErrorCode::kUnavailable, options_.names[Index(id)] + ": the camera is not there now"};
   auto set = camera.device->Set(settings);
   if (set) system_->Remember(id, settings);
+  ++info_changes_;  // also a refused order may have set a part
   return set;
 }
 
@@ -389,6 +391,7 @@ SourceInfo CameraPair::Info() const {
     const std::string format = FormatName(camera.device->format().pixels);
     out.device = camera.device->description();
     out.format = format + " " + size;
+    out.settings = camera.device->settings();
     if (formats != format) formats += (formats.empty() ? "" : " + ") + format;
   }
   info.description +=

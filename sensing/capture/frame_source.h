@@ -12,19 +12,23 @@
 
 namespace taclink {
 
-/// One camera of a source, in words for people.
-struct SourceCamera {
-  std::string configured;  ///< as the configuration names it
-  std::string device;      ///< what was found: "/dev/video0 (usb:1-2, serial:A1)"; empty: not open
-  std::string format;      ///< "YUYV 640x480"; empty: not open
-  std::string trouble;     ///< why it gives no pictures now; empty: it does
-};
-
-/// How a camera exposes; what is not set stays as it is.
+/// How a camera exposes; what is not set stays as it is, or is not known.
 struct CameraSettings {
   bool automatic_exposure = false;         ///< the camera decides; then without a time
   std::optional<int> exposure_100us = {};  ///< exposure time, 0.1 ms
   std::optional<int> gain = {};            ///< camera's own units
+
+  /// What `newer` sets, over this.
+  void Take(const CameraSettings& newer);
+};
+
+/// One camera of a source, in words for people.
+struct SourceCamera {
+  std::string configured;        ///< as the configuration names it
+  std::string device;            ///< what was found: "/dev/video0 (usb:1-2, serial:A1)"; empty: not open
+  std::string format;            ///< "YUYV 640x480"; empty: not open
+  std::string trouble;           ///< why it gives no pictures now; empty: it does
+  CameraSettings settings = {};  ///< as read from it when it was opened or set
 };
 
 /// What a source delivers, known after Start.
@@ -71,8 +75,19 @@ class FrameSource {
     return Error{ErrorCode::kUnsupported, "this link's pictures come from no camera that can be set"};
   }
 
+  /// Before Start: what the cameras are to be set to when they are opened.
+  virtual void Remember(CameraId, const CameraSettings&) {}
+
   virtual SourceInfo Info() const = 0;
   virtual SourceCounters Counters() const { return {}; }
 };
+
+inline void CameraSettings::Take(const CameraSettings& newer) {
+  if (newer.automatic_exposure || newer.exposure_100us) {
+    automatic_exposure = newer.automatic_exposure;
+    exposure_100us = newer.exposure_100us;
+  }
+  if (newer.gain) gain = newer.gain;
+}
 
 }  // namespace taclink

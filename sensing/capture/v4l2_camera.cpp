@@ -28,6 +28,7 @@ class V4l2Camera final : public CameraDevice {
   Result<std::optional<DriverPicture>> Dequeue() override;
   Result<void> Requeue(int buffer) override { return device_.Requeue(buffer); }
   Result<void> Set(const CameraSettings& settings) override { return device_.Set(settings); }
+  CameraSettings settings() const override { return device_.settings(); }
   CameraFormat format() const override {
     return {device_.format(), width_px_, height_px_, device_.bytes_per_line()};
   }
@@ -85,8 +86,7 @@ OpenedCamera OpenByName(const V4l2Options& options, CameraId id, const CameraSet
                           .height_px = options.height_px,
                           .frame_rate_hz = options.frame_rate_hz,
                           .format = options.format,
-                          .exposure_100us = settings.exposure_100us,
-                          .gain = settings.gain,
+                          .settings = settings,
                           .buffers = options.buffers};
   auto camera = OpenStreaming(asked, options, clock);
   if (!camera && camera.error().code == ErrorCode::kResourceExhausted && !options.format) {
@@ -111,12 +111,7 @@ class V4l2CameraSystem final : public CameraSystem {
                         return OpenByName(options_, id, settings, clock_);
                       });
   }
-  void Remember(CameraId id, const CameraSettings& settings) override {
-    CameraSettings& kept = settings_[Index(id)];
-    if (settings.automatic_exposure) kept.exposure_100us.reset();
-    if (settings.exposure_100us) kept.exposure_100us = settings.exposure_100us;
-    if (settings.gain) kept.gain = settings.gain;
-  }
+  void Remember(CameraId id, const CameraSettings& settings) override { settings_[Index(id)].Take(settings); }
 
   std::array<std::string, kCameraCount> Wait(const CameraDevices& devices, int64_t until_ns) override;
 

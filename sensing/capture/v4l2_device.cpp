@@ -101,7 +101,7 @@ Result<V4l2Device> V4l2Device::Open(const V4l2DeviceOptions& options) {
   }
   V4l2Device device(options, open(options.path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
   if (device.fd_ < 0) return device.Failed("can't be opened");
-  for (const auto step : {&V4l2Device::CheckIsCamera, &V4l2Device::Negotiate, &V4l2Device::SetExposureAndGain,
+  for (const auto step : {&V4l2Device::CheckIsCamera, &V4l2Device::Negotiate, &V4l2Device::SetAsAsked,
                           &V4l2Device::MapBuffers}) {
     if (auto done = (device.*step)(); !done) return done.error();
   }
@@ -115,7 +115,8 @@ V4l2Device::V4l2Device(V4l2Device&& other) noexcept
       bytes_per_line_(other.bytes_per_line_),
       streaming_(std::exchange(other.streaming_, false)),
       buffers_(std::exchange(other.buffers_, {})),
-      damaged_(other.damaged_) {}
+      damaged_(other.damaged_),
+      settings_(other.settings_) {}
 
 V4l2Device& V4l2Device::operator=(V4l2Device&& other) noexcept {
   if (this == &other) return *this;
@@ -127,6 +128,7 @@ V4l2Device& V4l2Device::operator=(V4l2Device&& other) noexcept {
   streaming_ = std::exchange(other.streaming_, false);
   buffers_ = std::exchange(other.buffers_, {});
   damaged_ = other.damaged_;
+  settings_ = other.settings_;
   return *this;
 }
 
@@ -248,40 +250,45 @@ Result<void> V4l2Device::SetFrameRate() {
                    OfferedRates(fd_, FourCc(format_), options_.width_px, options_.height_px)};
 }
 
-Result<void> V4l2Device::SetExposureAndGain() {
-  if (options_.exposure_100us) {
-    if (auto manual = SetControl(V4L2_CID_EXPOSURE_AUTO, "auto exposure (for manual)", V4L2_EXPOSURE_MANUAL);
-        !manual && HasControl(V4L2_CID_EXPOSURE_AUTO)) {
-      return manual;
-    }
-    if (auto set = SetControl(V4L2_CID_EXPOSURE_ABSOLUTE, "exposure (0.1 ms)", *options_.exposure_100us);
-        !set) {
-      return set;
-    }
+Result<void> V4l2Device::SetAutomaticExposure() {
+  // Of the two automatic modes a camera often has one only.
+  auto set = SetControl(V4L2_CID_EXPOSURE_AUTO, "automatic exposure", V4L2_EXPOSURE_APERTURE_PRIORITY);
+  return set ? set : SetControl(V4L2_CID_EXPOSURE_AUTO, "automatic exposure", V4L2_EXPOSURE_AUTO);
+}
+
+Result<void> V4l2Device::SetExposure(int exposure_100us) {
+  auto manual = SetControl(V4L2_CID_EXPOSURE_AUTO, "auto exposure (for manual)", V4L2_EXPOSURE_MANUAL);
+  if (!manual && HasControl(V4L2_CID_EXPOSURE_AUTO)) return manual;
+  return SetControl(V4L2_CID_EXPOSURE_ABSOLUTE, "exposure (0.1 ms)", exposure_100us);
+}
+
+Result<void> V4l2Device::SetGain(int gain) {
+  if (HasControl(V4L2_CID_AUTOGAIN)) {
+    if (auto manual = SetControl(V4L2_CID_AUTOGAIN, "automatic gain", 0); !manual) return manual;
   }
-  if (options_.gain) {
-    if (HasControl(V4L2_CID_AUTOGAIN)) {
-      if (auto manual = SetControl(V4L2_CID_AUTOGAIN, "automatic gain", 0); !manual) return manual;
-    }
-    if (auto set = SetControl(V4L2_CID_GAIN, "gain", *options_.gain); !set) return set;
-  }
-  return {};
+  return SetControl(V4L2_CID_GAIN, "gain", gain);
 }
 
 Result<void> V4l2Device::Set(const CameraSettings& settings) {
-  if (settings.automatic_exposure) {
-    // Of the two automatic modes a camera often has one only.
-    auto set = SetControl(V4L2_CID_EXPOSURE_AUTO, "automatic exposure", V4L2_EXPOSURE_APERTURE_PRIORITY);
-    if (!set) set = SetControl(V4L2_CID_EXPOSURE_AUTO, "automatic exposure", V4L2_EXPOSURE_AUTO);
-    if (!set) return set;
-    options_.exposure_100us.reset();
-  }
-  const auto before = std::pair(options_.exposure_100us, options_.gain);
-  if (settings.exposure_100us) options_.exposure_100us = settings.exposure_100us;
-  if (settings.gain) options_.gain = settings.gain;
-  auto set = SetExposureAndGain();
-  if (!set) std::tie(options_.exposure_100us, options_.gain) = before;
+  Result<void> set;
+  if (settings.automatic_exposure) set = SetAutomaticExposure();
+  if (set && settings.exposure_100us) set = SetExposure(*settings.exposure_100us);
+  if (set && settings.gain) set = SetGain(*settings.gain);
+  settings_ = ReadSettings();
   return set;
+}
+
+CameraSettings V4l2Device::ReadSettings() const {
+  const auto read = [this](uint32_t id, const char* name) -> std::optional<int> {
+    const auto value = GetControl(id, name);
+    return value ? std::optional(*value) : std::nullopt;
+  };
+  CameraSettings out;
+  const auto mode = read(V4L2_CID_EXPOSURE_AUTO, "automatic exposure");
+  out.automatic_exposure = mode && *mode != V4L2_EXPOSURE_MANUAL && *mode != V4L2_EXPOSURE_SHUTTER_PRIORITY;
+  if (!out.automatic_exposure) out.exposure_100us = read(V4L2_CID_EXPOSURE_ABSOLUTE, "exposure");
+  out.gain = read(V4L2_CID_GAIN, "gain");
+  return out;
 }
 
 bool V4l2Device::HasControl(uint32_t id) const {

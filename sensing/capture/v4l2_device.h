@@ -21,10 +21,8 @@ struct V4l2DeviceOptions {
   int height_px = 480;
   double frame_rate_hz = 30;
   std::optional<PixelFormat> format = PixelFormat::kYuyv;  ///< none: the best it has at that size and rate
-  std::optional<int>
-      exposure_100us;       ///< exposure time, 0.1 ms; turns automatic exposure off. None: left as it is
-  std::optional<int> gain;  ///< camera's own units; turns automatic gain off. None: left as it is
-  int buffers = 4;          ///< pictures that the driver can hold
+  CameraSettings settings = {};  ///< a time turns automatic exposure off, a gain automatic gain
+  int buffers = 4;               ///< pictures that the driver can hold
 };
 
 /// One camera under Linux' V4L2 interface, with memory-mapped buffers. Owns the device: while it lives nobody
@@ -52,6 +50,8 @@ class V4l2Device {
 
   /// As FrameSource::SetCamera.
   Result<void> Set(const CameraSettings& settings);
+  /// As CameraDevice::settings.
+  const CameraSettings& settings() const { return settings_; }
   /// Any control of the camera by its V4L2 number. `name` is for the error message.
   Result<void> SetControl(uint32_t id, const char* name, int value);
   Result<int> GetControl(uint32_t id, const char* name) const;
@@ -74,7 +74,11 @@ class V4l2Device {
   Result<void> Negotiate();
   Result<void> SetFormat();
   Result<void> SetFrameRate();
-  Result<void> SetExposureAndGain();
+  Result<void> SetAsAsked() { return Set(options_.settings); }
+  Result<void> SetAutomaticExposure();
+  Result<void> SetExposure(int exposure_100us);
+  Result<void> SetGain(int gain);
+  CameraSettings ReadSettings() const;
   bool HasControl(uint32_t id) const;
   Result<void> MapBuffers();
   Error Failed(const std::string& doing) const;  ///< from errno
@@ -87,6 +91,7 @@ class V4l2Device {
   bool streaming_ = false;
   std::vector<Mapping> buffers_;
   uint64_t damaged_ = 0;
+  CameraSettings settings_;  // as read
 };
 
 /// "YUYV", "MJPEG" or "GREY", as people look for it in a camera's data sheet.

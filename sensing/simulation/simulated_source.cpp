@@ -64,9 +64,7 @@ Result<void> SimulatedSource::SetCamera(CameraId id, const CameraSettings& setti
     return Error{ErrorCode::kInvalidArgument, name_ + ": exposure must be 0.1 to 100 ms"};
   if (gain < 1 || gain > kLargestGain)
     return Error{ErrorCode::kInvalidArgument, name_ + ": gain must be 1 to 16"};
-  CameraSettings& kept = settings_[Index(id)];
-  if (settings.exposure_100us) kept.exposure_100us = exposure;
-  if (settings.gain) kept.gain = gain;
+  settings_[Index(id)].Take(settings);
   return {};
 }
 

@@ -28,6 +28,9 @@ class SimulatedSource final : public FrameSource {
   Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override;
   /// As a camera that exposes for 5 ms with gain 1 at first; there is no automatic exposure.
   Result<void> SetCamera(CameraId id, const CameraSettings& settings) override;
+  void Remember(CameraId id, const CameraSettings& settings) override {
+    static_cast<void>(SetCamera(id, settings));  // it took them before
+  }
   SourceInfo Info() const override;
 
   /// Of the last frame.

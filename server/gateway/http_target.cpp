@@ -83,8 +83,10 @@ bool TakesGzip(std::string_view accept_encoding) {
     const size_t begin = std::min(item.find_first_not_of(' '), item.size());
     item.remove_prefix(begin);
     const std::string_view coding = item.substr(0, item.find_first_of("; "));
+    const size_t weight = item.find("q=");
     if (coding == "gzip")
-      return item.find("q=0") == std::string_view::npos || item.find("q=0.") != std::string_view::npos;
+      return weight == std::string_view::npos ||
+             item.find_first_not_of("0. ", weight + 2) != std::string_view::npos;
   }
   return false;
 }

@@ -64,6 +64,13 @@ void FillSupervision(const Supervision& supervision, v1::Link& out) {
   statistics.set_last_failure(supervision.last_failure);
 }
 
+void FillSettings(const CameraSettings& settings, v1::Camera& out) {
+  if (settings.automatic_exposure || settings.exposure_100us)
+    out.set_automatic_exposure(settings.automatic_exposure);
+  if (settings.exposure_100us) out.set_exposure_s(*settings.exposure_100us * 1e-4);
+  if (settings.gain) out.set_gain(*settings.gain);
+}
+
 void FillCameras(const SourceCondition& source, const LinkStatistics& statistics, v1::Link& out) {
   const SourceCounters& counters = source.counters;
   out.mutable_statistics()->set_pairs_skipped(counters.skipped_pairs);
@@ -82,6 +89,7 @@ void FillCameras(const SourceCondition& source, const LinkStatistics& statistics
     message.set_undecodable(statistics.bad_pictures[i]);
     message.set_unpaired(counters.unpaired[i]);
     message.set_stamped_on_arrival(counters.stamped_on_arrival[i]);
+    if (!camera.device.empty()) FillSettings(camera.settings, message);
   }
 }
 

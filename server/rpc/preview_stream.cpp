@@ -12,7 +12,6 @@ namespace taclink::server {
 namespace {
 
 constexpr double kDefaultRateHz = 5, kMaxRateHz = 30;
-constexpr int kQuality = 80;
 
 Error Invalid(std::string message) {
   return {ErrorCode::kInvalidArgument, std::move(message)};
@@ -67,23 +66,8 @@ std::optional<grpc::ByteBuffer> PreviewStream::Next() {
 }
 
 void PreviewStream::Fill(const FramePictures& pictures, size_t camera, v1::PreviewPicture& out) {
-  const RawImage& image = pictures.raw[camera];
-  out.set_camera(Name(kBothCameras[camera]));
-  out.set_width_px(static_cast<uint32_t>(image.width_px));
-  out.set_height_px(static_cast<uint32_t>(image.height_px));
-  if (!image.valid) {
-    out.set_why_missing(image.why_missing.empty() ? "the camera gave no picture" : image.why_missing);
-    return;
-  }
-  if (image.format == PixelFormat::kMjpeg) {
-    out.set_jpeg(image.bytes.data(), image.bytes.size());
-  } else if (auto made = decoder_.Decode(image, gray_); !made) {
-    out.set_why_missing(made.error().message);
-  } else if (made = encoder_.Encode(gray_, kQuality, jpeg_); !made) {
-    out.set_why_missing(made.error().message);
-  } else {
-    out.set_jpeg(jpeg_.data(), jpeg_.size());
-  }
+  maker_.Fill(pictures.raw[camera], kBothCameras[camera], out);
+  if (!pictures.raw[camera].valid) return;
   const auto& markers = pictures.labels.cameras[camera];
   for (size_t marker = 0; marker < markers.size(); ++marker) {
     if (!markers[marker].seen) continue;

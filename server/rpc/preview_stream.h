@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "sensing/capture/decode.h"
-#include "sensing/capture/encode.h"
 #include "server/arm.h"
+#include "server/rpc/preview_message.h"
 #include "server/rpc/pumped_stream.h"
 #include "taclink/v1/preview.pb.h"
 
@@ -44,10 +43,7 @@ class PreviewStream final : public PumpedStream {
   std::unique_ptr<Subscription> subscription_;  // set by Begin
 
   // Used by one thread at a time.
-  GrayDecoder decoder_;
-  JpegEncoder encoder_;
-  cv::Mat gray_;
-  std::vector<uint8_t> jpeg_;
+  PreviewMaker maker_;
 };
 
 }  // namespace taclink::server

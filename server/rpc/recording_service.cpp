@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "server/replay/log_pictures.h"
 #include "server/rpc/download_stream.h"
 #include "server/rpc/refused_stream.h"
 #include "server/rpc/replay_stream.h"
@@ -18,15 +19,17 @@ namespace {
 constexpr size_t kPlayerThreads = 2;  // a large chunk that one player reads does not make all others late
 
 // Damage is no fault of the caller's.
+grpc::Status OfLog(const Error& error) {
+  const bool damaged = error.code == ErrorCode::kInvalidArgument;
+  return damaged ? grpc::Status(grpc::StatusCode::DATA_LOSS, error.message) : ToGrpc(error);
+}
+
 OpenedLog OpenLog(Recorder& recorder, const std::string& name) {
   if (const auto found = recorder.folder().Find(name); !found)
     return {.reader = nullptr, .status = ToGrpc(found.error())};
   auto reader = recorder.catalog().Open(name);
   if (reader) return {.reader = std::move(*reader), .status = grpc::Status::OK};
-  const Error& error = reader.error();
-  const bool damaged = error.code == ErrorCode::kInvalidArgument;
-  return {.reader = nullptr,
-          .status = damaged ? grpc::Status(grpc::StatusCode::DATA_LOSS, error.message) : ToGrpc(error)};
+  return {.reader = nullptr, .status = OfLog(reader.error())};
 }
 
 }  // namespace
@@ -164,6 +167,24 @@ grpc::ServerUnaryReactor* RecordingService::ControlReplay(grpc::CallbackServerCo
   } else {
     reactor->Finish(ToGrpc(stream.error()));
   }
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* RecordingService::GetReplayPictures(grpc::CallbackServerContext* context,
+                                                              const v1::GetReplayPicturesRequest* request,
+                                                              v1::GetReplayPicturesResponse* response) {
+  auto* reactor = context->DefaultReactor();
+  boost::asio::post(*files_, [this, reactor, request, response] {
+    const auto stream = desk_->Find(request->player());
+    if (!stream) return reactor->Finish(ToGrpc(stream.error()));
+    const auto pictures = FindPictures((*stream)->reader(), request->link(), request->utc_ns());
+    if (!pictures) return reactor->Finish(OfLog(pictures.error()));
+    response->set_sequence(pictures->sequence);
+    response->set_exposure_utc_ns(pictures->exposure_utc_ns);
+    for (const CameraId id : kBothCameras)
+      preview_.Fill(pictures->images[Index(id)], id, *response->add_pictures());
+    reactor->Finish(grpc::Status::OK);
+  });
   return reactor;
 }
 

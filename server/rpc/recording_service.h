@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "server/recording/recorder.h"
+#include "server/rpc/preview_message.h"
 #include "server/rpc/replay_desk.h"
 #include "server/rpc/stream_registry.h"
 #include "server/security/security.h"
@@ -24,7 +25,8 @@ class RecordingService final
                               v1::RecordingService::WithCallbackMethod_DeleteLog<
                                   v1::RecordingService::WithRawCallbackMethod_Replay<
                                       v1::RecordingService::WithCallbackMethod_ControlReplay<
-                                          v1::RecordingService::Service>>>>>>>>> {
+                                          v1::RecordingService::WithCallbackMethod_GetReplayPictures<
+                                              v1::RecordingService::Service>>>>>>>>>> {
  public:
   /// `registry`: of all streams of the server.
   RecordingService(Recorder& recorder, StreamRegistry& registry,
@@ -54,6 +56,8 @@ class RecordingService final
   Stream* Replay(grpc::CallbackServerContext* context, const grpc::ByteBuffer* request) override;
   Unary* ControlReplay(grpc::CallbackServerContext* context, const v1::ControlReplayRequest* request,
                        v1::ControlReplayResponse* response) override;
+  Unary* GetReplayPictures(grpc::CallbackServerContext* context, const v1::GetReplayPicturesRequest* request,
+                           v1::GetReplayPicturesResponse* response) override;
 
   /// `work` is done by the files' thread; the call ends with what it returns.
   Unary* Later(grpc::CallbackServerContext* context, const char* method, std::function<Result<void>()> work);
@@ -66,6 +70,7 @@ class RecordingService final
   const std::shared_ptr<boost::asio::thread_pool> players_;
   const std::shared_ptr<ReplayDesk> desk_;
   const std::shared_ptr<const Security> security_;
+  PreviewMaker preview_;  // used by the files' thread
 };
 
 }  // namespace taclink::server

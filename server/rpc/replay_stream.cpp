@@ -59,8 +59,9 @@ Result<void> ReplayStream::MakePlayer(std::shared_ptr<const mcap::Reader> reader
   if (!channels) return channels.error();
   PlayerOptions options = order_.player;
   options.channels = std::move(channels->played);
-  auto player = LogPlayer::Open(std::move(reader), std::move(options));
+  auto player = LogPlayer::Open(reader, std::move(options));
   if (!player) return player.error();
+  reader_ = std::move(reader);
   auto id = desk_->Enter(std::static_pointer_cast<ReplayStream>(shared_from_this()));
   if (!id) return id.error();
   topics_ = std::move(channels->topics);

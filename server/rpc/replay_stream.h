@@ -40,6 +40,9 @@ class ReplayStream final : public PumpedStream {
   /// `done` hears what became of it, in the players' threads. Any thread.
   void Control(const v1::ControlReplayRequest& request, std::function<void(const grpc::Status&)> done);
 
+  /// Once the desk has the stream.
+  const mcap::Reader& reader() const { return *reader_; }
+
  private:
   std::optional<grpc::ByteBuffer> Next() override;
   std::optional<grpc::ByteBuffer> Last(const std::string& reason) override;
@@ -66,7 +69,8 @@ class ReplayStream final : public PumpedStream {
   // Used in the strand.
   boost::asio::strand<boost::asio::thread_pool::executor_type> strand_;
   boost::asio::steady_timer timer_;
-  std::string id_;  // empty: the log is not open yet
+  std::shared_ptr<const mcap::Reader> reader_;  // constant once the desk has the stream
+  std::string id_;                              // empty: the log is not open yet
   std::map<uint16_t, wire::log::Topic> topics_;
   std::unique_ptr<LogPlayer> player_;
   bool status_due_ = true;

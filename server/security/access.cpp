@@ -29,6 +29,7 @@ constexpr AccessRule kTable[] = {
     {"/taclink.v1.RecordingService/DownloadLog", Role::kViewer},
     {"/taclink.v1.RecordingService/Replay", Role::kViewer},
     {"/taclink.v1.RecordingService/ControlReplay", Role::kViewer},
+    {"/taclink.v1.RecordingService/GetReplayPictures", Role::kViewer},
     {"/grpc.health.v1.Health/Check", Role::kNobody},
     {"/grpc.health.v1.Health/Watch", Role::kNobody},
     {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", Role::kViewer},

@@ -114,6 +114,16 @@ TEST_F(EventCommandTest, AFreeLinkIsTared) {
   const json link = json::parse(tare.out).at("links")[0];
   EXPECT_FALSE(link.at("forced").get<bool>());
   EXPECT_LT(link.at("shift_mm").get<double>(), 0.2);
+  const auto set = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"set", "--link", "a", "--server", address_});
+    return Taclink(arguments);
+  };
+  const Finished both = set({"--force-model", "linear", "--camera", "top", "--exposure", "6"});
+  EXPECT_EQ(both.exit_code, 0) << both.err;
+  EXPECT_THAT(both.out, ::testing::AllOf(HasSubstr("top camera is set"), HasSubstr("linear model")));
+  EXPECT_THAT(set({"--gain", "900"}).err, HasSubstr("gain must be 1 to 16"));
+  EXPECT_THAT(set({"--camera", "top"}).err, HasSubstr("--camera also needs"));
+  EXPECT_EQ(set({}).exit_code, 2);
   const Finished unknown = Taclink({"tare", "elbow", "--server", address_});
   EXPECT_EQ(unknown.exit_code, 1);
   EXPECT_THAT(unknown.err, HasSubstr("no link 'elbow'"));

@@ -374,6 +374,32 @@ TEST_F(LinkSupervisorTest, RestartReplacesAWorkerThatRuns) {
   EXPECT_EQ(link_->supervision().restarts, 1u) << "it did not rest";
 }
 
+TEST_F(LinkSupervisorTest, WhatCamerasWereSetToOutlivesTheirWorker) {
+  Run(Measure);
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);  // the source runs
+  std::atomic<int> taken = 0, refused = 0;
+  const auto set = [&](const CameraOrder& order) {
+    const int before = taken + refused;
+    const auto observer = [&](const Result<void>& done) { done ? ++taken : ++refused; };
+    ASSERT_TRUE(link_->SetCamera(order, observer).ok());
+    Until([&] { return taken + refused > before; });
+  };
+  set({.cameras = {false, true}, .settings = {.exposure_100us = 80, .gain = 3}});
+  set({.cameras = {true, true}, .settings = {.gain = 5}});
+  set({.cameras = {true, true}, .settings = {.gain = 99}});
+  EXPECT_EQ(taken, 2);
+  EXPECT_EQ(refused, 1);
+  link_->Restart();
+  UntilRestarted(1);
+  const auto remembered = script_->remembered();
+  ASSERT_EQ(remembered.size(), 2u);
+  for (const auto& [camera, settings] : remembered) {
+    EXPECT_EQ(settings.gain, 5);
+    EXPECT_EQ(settings.exposure_100us, camera == CameraId::kTop ? std::nullopt : std::optional(80));
+  }
+}
+
 TEST_F(LinkSupervisorTest, NobodyIsBlamedForAStandstillOfTheWholeProgram) {
   Gate gate;
   Run([&](const StereoFrame& frame, LinkState& state) {

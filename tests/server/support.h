@@ -75,6 +75,12 @@ class SourceScript {
     steps_.push_back(std::move(step));
     changed_.notify_all();
   }
+  using CameraOrders = std::vector<std::pair<CameraId, CameraSettings>>;
+  /// By Remember, of all sources.
+  CameraOrders remembered() const {
+    const std::lock_guard lock(mutex_);
+    return remembered_;
+  }
   /// What the source says of itself from now on.
   void Describe(SourceInfo info, SourceCounters counters) {
     const std::lock_guard lock(mutex_);
@@ -136,6 +142,7 @@ class SourceScript {
   std::deque<std::function<Result<void>(StereoFrame&)>> steps_;
   bool waiting_ = false;
   int starts_ = 0;
+  CameraOrders remembered_;
   int failing_starts_ = 0;  // < 0: all
   ErrorCode start_error_ = ErrorCode::kUnavailable;
 };
@@ -146,6 +153,14 @@ class FakeSource final : public FrameSource {
   Result<void> Start() override { return script_->Start(); }
   Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override {
     return script_->Next(frame, timeout);
+  }
+  Result<void> SetCamera(CameraId, const CameraSettings& settings) override {
+    if (settings.gain == 99) return Error{ErrorCode::kInvalidArgument, "gain must be 0 to 64"};
+    return {};
+  }
+  void Remember(CameraId id, const CameraSettings& settings) override {
+    const std::lock_guard lock(script_->mutex_);
+    script_->remembered_.emplace_back(id, settings);
   }
   SourceInfo Info() const override { return script_->Info(); }
   SourceCounters Counters() const override { return script_->Counters(); }

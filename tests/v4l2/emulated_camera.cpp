@@ -14,7 +14,7 @@
 namespace taclink::testing {
 namespace {
 
-constexpr uint8_t kVideoInterface = 1;
+constexpr uint8_t kControlInterface = 0, kVideoInterface = 1;
 // Of the payload header, UVC 1.0, 2.4.3.3.
 constexpr uint8_t kHeaderSize = 2, kEndOfPicture = 0x02, kErrorBit = 0x40, kEndOfHeader = 0x80;
 // Places in the probe and commit controls, UVC 1.0, table 4-47.
@@ -55,6 +55,7 @@ std::string EmulatedCamera::Plug(int port) {
   std::string trouble;
   Do([this, port, &trouble] {
     Lost();
+    settings_ = {};
     trouble = port_.Plug(port);
   });
   return trouble;
@@ -73,6 +74,12 @@ void EmulatedCamera::Spoil(Damage damage, int pictures) {
     damage_ = damage;
     damaged_left_ = pictures;
   });
+}
+
+UvcSettings EmulatedCamera::settings() {
+  UvcSettings out;
+  Do([this, &out] { out = settings_; });
+  return out;
 }
 
 uint64_t EmulatedCamera::pictures_sent() const {
@@ -186,6 +193,7 @@ bool EmulatedCamera::HandleStandard(const UsbRequest& request) {
 /// Probe and commit: what is to be streamed.
 bool EmulatedCamera::HandleVideo(const UsbRequest& request) {
   const uint8_t code = request.setup[1], control = request.setup[3], interface = request.setup[4];
+  if (interface == kControlInterface) return HandleSetting(request);
   if (interface != kVideoInterface) return port_.Answer(request, -EPIPE, {});
   if (code == kSetCurrent) {
     std::copy_n(request.data.begin(), std::min(request.data.size(), probe_.size()), probe_.begin());
@@ -198,6 +206,18 @@ bool EmulatedCamera::HandleVideo(const UsbRequest& request) {
   if (code == kGetInfo) answer = {3};
   answer.resize(std::min<size_t>(answer.size(), request.length));
   return port_.Answer(request, 0, answer);
+}
+
+bool EmulatedCamera::HandleSetting(const UsbRequest& request) {
+  const UvcControl control{request.setup[1], request.setup[3], request.setup[5]};
+  if (control.code == kSetCurrent) {
+    const bool taken = WriteControl(control, request.data, settings_);
+    return port_.Answer(request, taken ? 0 : -EPIPE, {}, taken ? request.length : 0);
+  }
+  auto answer = ReadControl(settings_, control);
+  if (!answer) return port_.Answer(request, -EPIPE, {});
+  answer->resize(std::min<size_t>(answer->size(), request.length));
+  return port_.Answer(request, 0, *answer);
 }
 
 /// Makes what was asked for possible, as a camera does.

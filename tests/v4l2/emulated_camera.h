@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/v4l2/usb_port.h"
+#include "tests/v4l2/uvc_controls.h"
 
 namespace taclink::testing {
 
@@ -36,13 +37,17 @@ class EmulatedCamera {
   EmulatedCamera(const EmulatedCamera&) = delete;
   EmulatedCamera& operator=(const EmulatedCamera&) = delete;
 
-  /// Into a port of the virtual hub, from 0; returns when it is done. Empty: well; else what failed.
+  /// Into a port of the virtual hub, from 0, with the settings it is made with; returns when it is done.
+  /// Empty: well; else what failed.
   std::string Plug(int port);
   void Unplug();
   /// It answers, but gives no pictures.
   void Stall(bool stalled);
   /// Of the next so many pictures.
   void Spoil(Damage damage, int pictures);
+
+  /// As the driver has set it.
+  UvcSettings settings();
 
   uint64_t pictures_sent() const;
 
@@ -62,6 +67,7 @@ class EmulatedCamera {
   bool HandleControl(const UsbRequest& request);
   bool HandleStandard(const UsbRequest& request);
   bool HandleVideo(const UsbRequest& request);
+  bool HandleSetting(const UsbRequest& request);
   void SettleProbe();
   void StartStreaming();
   void Expose();
@@ -76,6 +82,7 @@ class EmulatedCamera {
   UsbPort port_;
   std::array<uint8_t, 26> probe_{};
   Streaming streaming_;
+  UvcSettings settings_;
   bool stalled_ = false;
   Damage damage_ = Damage::kNone;
   int damaged_left_ = 0;

@@ -55,8 +55,8 @@ std::string Rig::StartServer() {
       std::vector<std::string>{TACLINKD, "--config", kConfigPath, "--listen", "127.0.0.1:0"});
   const auto line = server_->ReadUntil("listening on ", std::chrono::seconds(60), true);
   if (!line) return "the server does not start: " + server_->Wait(std::chrono::seconds(1)).err;
-  auto client =
-      client::Client::Connect(line->substr(line->find("listening on ") + 13), std::chrono::seconds(60));
+  address_ = line->substr(line->find("listening on ") + 13);
+  auto client = client::Client::Connect(address_, std::chrono::seconds(60));
   if (!client) return client.error().message;
   client_ = std::move(*client);
   auto reader = client_->StreamFrames({.delivery = client::Delivery::kEvery}, std::chrono::seconds(60));

@@ -40,6 +40,8 @@ class Rig {
   /// Empty: it runs; else what failed.
   std::string StartServer();
   client::Arm Arm();
+  client::Client& client() { return *client_; }
+  const std::string& address() const { return address_; }
   void StopServer();
 
   using Wanted = std::function<bool(const client::Frame&)>;
@@ -54,6 +56,7 @@ class Rig {
   Pictures pictures_;
   std::vector<std::unique_ptr<EmulatedCamera>> cameras_;
   std::unique_ptr<Process> server_;
+  std::string address_;
   std::optional<client::Client> client_;
   std::unique_ptr<client::FrameReader> reader_;
 

@@ -3,16 +3,20 @@
 #include "tests/v4l2/rig.h"
 
 #include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 
 #include "sensing/capture/camera_finder.h"
+#include "sensing/capture/decode.h"
 #include "sensing/capture/v4l2_device.h"
 #include "sensing/capture/v4l2_source.h"
 #include "sensing/core/clock.h"
+#include "taclink/v1/tactile.grpc.pb.h"
 #include "tests/sensing/capture/pictures.h"
 
 namespace taclink::testing {
@@ -186,6 +190,76 @@ TEST_F(RigTest, BForcesAreTheTruths) {
     EXPECT_GT(largest_measured_n, 0.25);
     EXPECT_LE(worst_n, 0.05);
   }
+}
+
+TEST_F(RigTest, BPreviewsAreWhatTheCamerasSee) {
+  const auto stub =
+      v1::TactileService::NewStub(grpc::CreateChannel(rig_->address(), grpc::InsecureChannelCredentials()));
+  for (const char* link : {"a", "b"}) {  // MJPEG as it came, and made of YUYV
+    grpc::ClientContext context;
+    v1::StreamPreviewRequest request;
+    request.set_link(link);
+    const auto reader = stub->StreamPreview(&context, request);
+    v1::StreamPreviewResponse preview;
+    ASSERT_TRUE(reader->Read(&preview));
+    context.TryCancel();
+    ASSERT_EQ(preview.pictures_size(), 2);
+    for (const v1::PreviewPicture& picture : preview.pictures()) {
+      EXPECT_EQ(picture.width_px(), 640u);
+      EXPECT_EQ(picture.height_px(), 480u);
+      RawImage jpeg{.format = PixelFormat::kMjpeg,
+                    .width_px = 640,
+                    .height_px = 480,
+                    .bytes = {picture.jpeg().begin(), picture.jpeg().end()}};
+      jpeg.valid = true;
+      cv::Mat gray;
+      ASSERT_TRUE(GrayDecoder().Decode(jpeg, gray).ok()) << picture.why_missing();
+      ASSERT_GT(picture.markers_size(), 100);
+      for (int i = 0; i < picture.markers_size(); ++i) {
+        const int x = static_cast<int>(std::lround(picture.centers_px(2 * i)));
+        const int y = static_cast<int>(std::lround(picture.centers_px(2 * i + 1)));
+        EXPECT_GT(gray.at<uint8_t>(y, x), 60) << "no marker at " << x << ", " << y;
+      }
+    }
+  }
+}
+
+TEST_F(RigTest, BSettingsGoToTheCameraAlsoWhenItComesBack) {
+  constexpr UvcSettings kManual{.exposure_mode = 1, .exposure_100us = 80, .gain = 20};
+  client::Client& client = rig_->client();
+  const auto bottom = [] { return rig_->Arm().links[0].cameras[1]; };
+  EXPECT_EQ(bottom().automatic_exposure, true);
+  EXPECT_EQ(bottom().exposure_s, std::nullopt);
+  EXPECT_EQ(bottom().gain, 16);
+  const auto set = client.SetCamera("a", "bottom", {.exposure_s = 0.008, .gain = 20});
+  ASSERT_TRUE(set) << set.error().message;
+  EXPECT_EQ(rig_->camera(kABottom).settings(), kManual);
+  EXPECT_EQ(rig_->camera(kATop).settings(), UvcSettings());
+  const auto read_back = [&](const client::Camera& camera) {
+    return camera.automatic_exposure == false && camera.exposure_s == 0.008 && camera.gain == 20;
+  };
+  EXPECT_TRUE(read_back(bottom()));
+
+  const auto refused = client.SetCamera("a", "bottom", {.gain = 900});
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(refused.error().message, HasSubstr("gain must be from 0 to 64, not 900"));
+
+  const int64_t unplugged_ns = MonotonicNs();
+  rig_->camera(kABottom).Unplug();
+  ASSERT_TRUE(
+      rig_->Await("a", unplugged_ns, [](const auto& frame) { return Blames(frame, "bottom camera"); }));
+  EXPECT_EQ(bottom().gain, std::nullopt) << "nobody knows";
+  EXPECT_EQ(client.SetCamera("a", "bottom", {.gain = 3}).error().code, ErrorCode::kUnavailable);
+  const int64_t plugged_ns = MonotonicNs();
+  ASSERT_EQ(rig_->camera(kABottom).Plug(kABottom), "");
+  ASSERT_TRUE(
+      rig_->Await("a", plugged_ns, [](const auto& frame) { return frame.status == LinkStatus::kOk; }));
+  EXPECT_EQ(rig_->camera(kABottom).settings(), kManual);
+  EXPECT_TRUE(read_back(bottom()));
+
+  ASSERT_TRUE(client.SetCamera("a", "bottom", {.automatic_exposure = true}));
+  EXPECT_EQ(rig_->camera(kABottom).settings().exposure_mode, 8u);
+  EXPECT_EQ(bottom().automatic_exposure, true);
 }
 
 TEST_F(RigTest, CFaultsOfOneLinkAreSaidMendedAndNobodyElses) {

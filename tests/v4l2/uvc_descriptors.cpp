@@ -12,7 +12,9 @@ using Bytes = std::vector<uint8_t>;
 constexpr uint8_t kDevice = 1, kConfiguration = 2, kString = 3, kInterface = 4, kEndpoint = 5,
                   kAssociation = 11, kClass = 0x24;
 constexpr uint8_t kVideo = 14, kVideoControl = 1, kVideoStreaming = 2, kVideoCollection = 3;
-constexpr uint8_t kControlHeader = 1, kInputTerminal = 2, kOutputTerminal = 3;
+constexpr uint8_t kControlHeader = 1, kInputTerminal = 2, kOutputTerminal = 3, kProcessingUnit = 5;
+// What can be set: exposure mode and time of the camera, gain of its processing unit.
+constexpr uint8_t kExposureControls = 0x0a, kGainControl = 0x02;
 constexpr uint8_t kInputHeader = 1, kFormatYuv = 4, kFrameYuv = 5, kFormatMjpeg = 6, kFrameMjpeg = 7,
                   kColors = 13;
 
@@ -43,8 +45,10 @@ Bytes Interface(uint8_t number, uint8_t endpoints, uint8_t subclass) {
 
 Bytes ControlInterface() {
   Bytes out = Sized({kClass, kControlHeader, 0x00, 0x01, 0, 0, 0x00, 0x6c, 0xdc, 0x02, 1, 1});
-  Append(out, Sized({kClass, kInputTerminal, 1, 0x01, 0x02, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0}));  // camera
-  Append(out, Sized({kClass, kOutputTerminal, 2, 0x01, 0x01, 0, 1, 0}));                            // to USB
+  Append(out, Sized({kClass, kInputTerminal, kUvcCamera, 0x01, 0x02, 0, 0, 0, 0, 0, 0, 0, 0, 3,
+                     kExposureControls, 0, 0}));
+  Append(out, Sized({kClass, kProcessingUnit, kUvcProcessing, kUvcCamera, 0, 0, 2, 0, kGainControl, 0}));
+  Append(out, Sized({kClass, kOutputTerminal, 2, 0x01, 0x01, 0, kUvcProcessing, 0}));  // to USB
   SetTotal(out, 5, out.size());
   return out;
 }

@@ -18,6 +18,8 @@ inline const std::vector<UvcSize> kUvcSizes = {{640, 480, {30, 15, 10, 5, 4, 3, 
 inline constexpr uint8_t kUvcMjpeg = 1, kUvcYuyv = 2;
 inline constexpr uint32_t kUvcMaxPayload = 16384;
 inline constexpr uint8_t kUvcEndpoint = 1;
+/// Numbers of the camera terminal and the processing unit.
+inline constexpr uint8_t kUvcCamera = 1, kUvcProcessing = 3;
 
 uint32_t UvcInterval100ns(int rate_hz);
 uint32_t UvcPictureBytes(const UvcSize& size);

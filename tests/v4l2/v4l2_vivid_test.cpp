@@ -193,7 +193,7 @@ TEST_F(Vivid, TimeoutIsHonouredAndTellsWhatIsMissing) {
 
 TEST_F(Vivid, ControlsAreSetAndReadBack) {
   V4l2DeviceOptions options = SmallCamera();
-  options.gain = 77;
+  options.settings.gain = 77;
   auto camera = V4l2Device::Open(options);
   ASSERT_TRUE(camera) << camera.error().message;
   EXPECT_EQ(camera->GetControl(V4L2_CID_GAIN, "gain").value(), 77);
@@ -205,11 +205,11 @@ TEST_F(Vivid, ControlsAreSetAndReadBack) {
 
 TEST_F(Vivid, ControlsThatItLacksOrCanNotDoAreNamed) {
   V4l2DeviceOptions options = SmallCamera();
-  options.exposure_100us = 50;
+  options.settings.exposure_100us = 50;
   EXPECT_EQ(OpenError(options).code, ErrorCode::kUnsupported);
   EXPECT_THAT(OpenError(options).message, AllOf(HasSubstr(kTopPath), HasSubstr("no control for exposure")));
   options = SmallCamera();
-  options.gain = 300;
+  options.settings.gain = 300;
   EXPECT_EQ(OpenError(options).code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(OpenError(options).message, HasSubstr("gain must be from 0 to 255, not 300"));
 }

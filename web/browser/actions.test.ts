@@ -150,6 +150,7 @@ describe("an operator", () => {
     await page.getByRole("button", { name: /Record/ }).click();
     await page.getByLabel("Name").fill("browser");
     await page.getByLabel("Note").fill("a pinch");
+    await page.getByLabel(/pictures/).check();
     await page.locator("dialog").getByRole("button", { name: "Record" }).click();
     await page.locator(".record-sign").waitFor();
     await page.waitForTimeout(4000);
@@ -183,7 +184,12 @@ describe("an operator", () => {
     await expect.poll(() => page.getByRole("slider").getAttribute("aria-valuenow")).toBe("2");
     await page.getByRole("button", { name: "Step" }).click();
     await page.locator(".label.force").first().waitFor();
+    await page.locator(".track .span").first().waitFor(); // it was there before the recording began
     await visit.picture("replay");
+    await page.getByRole("tab", { name: "Cameras" }).click();
+    await page.getByRole("img", { name: "bottom camera of touched" }).waitFor();
+    await page.getByText("Logs hold the markers' positions").waitFor();
+    await visit.picture("replay-cameras");
     const shared = page.url();
     expect(new URL(shared).searchParams.get("t")).not.toBeNull();
     const tare = page.getByRole("tab", { name: "Settings" });

@@ -5,6 +5,7 @@ import { Session } from "./api/session";
 import { formatAddress, parseAddress } from "./model/address";
 import { ArmStore } from "./model/arm_store";
 import type { Feed } from "./model/feed";
+import { keepCurves, restoreCurves } from "./model/kept_curves";
 import { LiveFeed } from "./model/live_feed";
 import { ReplayFeed } from "./model/replay_feed";
 import { COLOUR_MAPS, type ColourMapName } from "./skin/colour_map";
@@ -57,11 +58,13 @@ export class AppState {
     });
     prefersLight.addEventListener("change", () => (this.systemLight.value = prefersLight.matches));
     document.addEventListener("visibilitychange", () => this.feed.value.setHidden(document.hidden));
+    addEventListener("pagehide", () => this.keepCurves());
     addEventListener("popstate", () => location.reload());
   }
 
   /** Plays a log from a time on (s since 1970-01-01 UTC); empty: the live arm. */
   play(log: string, timeS = NaN): void {
+    this.keepCurves();
     const [store, feed] = this.open(log, timeS);
     this.log.value = log;
     this.page.value = "live";
@@ -85,9 +88,16 @@ export class AppState {
     }
   }
 
+  private keepCurves(): void {
+    if (!this.log.value) keepCurves(this.store.value);
+  }
+
   private open(log: string, timeS: number): [ArmStore, Feed] {
     const store = new ArmStore();
-    if (!log) return [store, new LiveFeed(this.session, store)];
+    if (!log) {
+      restoreCurves(store);
+      return [store, new LiveFeed(this.session, store)];
+    }
     const told = (atS: number) =>
       this.showAddress({ page: this.page.value, link: this.link.value, log, timeS: atS });
     return [store, new ReplayFeed(this.session, store, log, timeS, told)];

@@ -242,11 +242,14 @@ TEST_F(CameraPairTest, ALateCallerGetsTheNewestPair) {
 TEST_F(CameraPairTest, SettingsGoToTheCameraAndAreKeptForItsReturn) {
   Start();
   ASSERT_TRUE(Next());
+  const uint64_t changes = source_->Counters().info_changes;
   EXPECT_TRUE(source_->SetCamera(CameraId::kBottom, {.exposure_100us = 80}).ok());
   EXPECT_TRUE(cameras_[kTop].set.empty());
   ASSERT_EQ(cameras_[kBottom].set.size(), 1u);
   EXPECT_EQ(cameras_[kBottom].set[0].exposure_100us, 80);
   EXPECT_EQ(cameras_[kBottom].kept.size(), 1u);
+  EXPECT_EQ(source_->Info().cameras[kBottom].settings.exposure_100us, 80);
+  EXPECT_GT(source_->Counters().info_changes, changes);
 
   cameras_[kBottom].set_error = "gain must be from 0 to 64";
   const auto refused = source_->SetCamera(CameraId::kBottom, {.gain = 900});

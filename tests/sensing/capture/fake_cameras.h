@@ -131,6 +131,9 @@ class FakeCameraSystem final : public CameraSystem {
       camera_.set.push_back(settings);
       return {};
     }
+    CameraSettings settings() const override {
+      return camera_.set.empty() ? CameraSettings() : camera_.set.back();
+    }
     std::string description() const override { return "fake"; }
     int buffer_count() const override { return kBuffers; }
     uint64_t damaged() const override { return 0; }

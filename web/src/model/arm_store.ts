@@ -49,6 +49,10 @@ export class ArmStore {
     return record;
   }
 
+  links(): Iterable<[string, LinkRecord]> {
+    return this.records;
+  }
+
   /** Called with the link that has changed. Returns how to end that. */
   onChange(listener: (link: string) => void): () => void {
     this.listeners.add(listener);

@@ -1,3 +1,6 @@
+/** Time, total (null: nothing was measured), and the contacts' ids and forces. */
+export type Sample = [timeS: number, totalN: number | null, contacts: [id: string, forceN: number][]];
+
 /** One link's forces over time, of bounded length. Times: s since 1970-01-01 UTC; forces: N. */
 export class ForceHistory {
   private readonly times: Float64Array;
@@ -53,6 +56,25 @@ export class ForceHistory {
       else high = middle;
     }
     return low;
+  }
+
+  /** All from `fromS` on, in their order. */
+  samplesFrom(fromS: number): Sample[] {
+    const out: Sample[] = [];
+    this.each(fromS, Infinity, (place, timeS) => {
+      const total = this.totals[place];
+      const contacts = this.contacts[place].map(({ id, forceN }): [string, number] => [id, forceN]);
+      out.push([timeS, Number.isNaN(total) ? null : total, contacts]);
+    });
+    return out;
+  }
+
+  addSample([timeS, totalN, contacts]: Sample): void {
+    this.add(
+      timeS,
+      totalN ?? NaN,
+      contacts.map(([id, forceN]) => ({ id, forceN })),
+    );
   }
 
   /** Calls `visit` for the samples from `fromS` to `toS`, both included, in their order. */

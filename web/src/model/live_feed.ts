@@ -93,38 +93,47 @@ export class LiveFeed implements Feed {
     return true;
   }
 
+  // All at once: the first frame need not wait for the arm.
   private async readFrames(stop: AbortSignal, alive: () => void): Promise<void> {
+    const inner = new AbortController();
+    stop.addEventListener("abort", () => inner.abort(), { once: true });
+    try {
+      await Promise.all([this.learnArm(inner.signal), this.followFrames(inner.signal, alive)]);
+    } finally {
+      inner.abort();
+    }
+  }
+
+  private async learnArm(stop: AbortSignal): Promise<void> {
     const asked = this.session.tactile.getArm({}, { signal: stop, timeoutMs: 5000 });
     const [{ arm }] = await Promise.all([asked, this.session.refresh()]);
     if (!arm) return;
     this.store.takeArm(arm);
-    const inner = new AbortController();
-    stop.addEventListener("abort", () => inner.abort(), { once: true });
     if (arm.baseFrame)
-      void keepOpen(inner.signal, {
+      void keepOpen(stop, {
         run: (end) => this.readContacts(end),
         onLost: () => undefined,
         silenceMs: 0,
       });
-    try {
-      const request = {
-        detail: Detail.FULL,
-        maxRateHz: FRAMES_HZ,
-        delivery: Delivery.LATEST,
-        deadbandForceN: STILL_FORCE_N,
-        deadbandMoveM: STILL_MOVE_M,
-      };
-      for await (const { message } of this.session.tactile.streamFrames(request, { signal: stop })) {
-        alive();
-        if (this.connection.value.state !== "live") this.connection.value = { state: "live" };
-        if (message.case === "frame") this.store.takeFrame(message.value);
-        else if (message.case === "status") {
-          this.store.takeCounts(message.value.links);
-          if (message.value.endReason) throw new Error(message.value.endReason);
-        }
+  }
+
+  private async followFrames(stop: AbortSignal, alive: () => void): Promise<void> {
+    const request = {
+      detail: Detail.FULL,
+      maxRateHz: FRAMES_HZ,
+      delivery: Delivery.LATEST,
+      deadbandForceN: STILL_FORCE_N,
+      deadbandMoveM: STILL_MOVE_M,
+    };
+    for await (const { message } of this.session.tactile.streamFrames(request, { signal: stop })) {
+      alive();
+      if (this.store.arm.peek() && this.connection.peek().state !== "live")
+        this.connection.value = { state: "live" };
+      if (message.case === "frame") this.store.takeFrame(message.value);
+      else if (message.case === "status") {
+        this.store.takeCounts(message.value.links);
+        if (message.value.endReason) throw new Error(message.value.endReason);
       }
-    } finally {
-      inner.abort();
     }
   }
 

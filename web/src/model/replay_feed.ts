@@ -3,11 +3,12 @@ import { signal } from "@preact/signals";
 import { keepOpen } from "../api/keep_open";
 import { EventKind } from "../api/gen/taclink/v1/events_pb";
 import { Detail } from "../api/gen/taclink/v1/frame_pb";
-import type { ReplayStatus } from "../api/gen/taclink/v1/recording_pb";
+import type { GetReplayPicturesResponse, ReplayStatus } from "../api/gen/taclink/v1/recording_pb";
 import { messageOf, type Session } from "../api/session";
 import { secondsOf } from "../ui/format";
 import type { ArmStore } from "./arm_store";
 import type { Connection, Feed } from "./feed";
+import { lengthOf } from "./vectors";
 
 /** When something touched a link, s since 1970-01-01 UTC. */
 export interface ContactSpan {
@@ -18,6 +19,9 @@ export interface ContactSpan {
   peakN: number;
 }
 
+const ALL_LINKS_TOLD_S = 1;
+
+const keyOf = (link: string, id: bigint) => `${link}\n${id}`;
 const toNs = (seconds: number) => BigInt(Math.round(seconds * 1e6)) * 1000n;
 
 /** Keeps the store as the arm was when a log was recorded. */
@@ -102,6 +106,18 @@ export class ReplayFeed implements Feed {
     }
     this.store.clear();
     await this.control({ case: "seekUtcNs", value: toNs(timeS) });
+  }
+
+  /** What the link's cameras saw then; undefined: nothing is played now. */
+  async picturesOf(
+    link: string,
+    timeS: number,
+    stop: AbortSignal,
+  ): Promise<GetReplayPicturesResponse | undefined> {
+    const player = this.status.peek()?.player;
+    if (!player || this.status.peek()?.ended || !Number.isFinite(timeS)) return undefined;
+    const request = { player, link, utcNs: toNs(timeS) };
+    return this.session.recording.getReplayPictures(request, { signal: stop, timeoutMs: 5000 });
   }
 
   private async control(
@@ -196,19 +212,42 @@ export class ReplayFeed implements Feed {
     this.onPosition(timeS);
   }
 
+  // Of those that were there when the recording began no event tells. By link and id.
+  private async contactsAtStart(stop: AbortSignal): Promise<Map<string, ContactSpan>> {
+    const request = { log: this.log, withoutFrames: true, withoutEvents: true, withoutArm: true };
+    const found = new Map<string, ContactSpan>();
+    let beginS = NaN;
+    for await (const { message } of this.session.recording.replay(request, { signal: stop })) {
+      if (message.case !== "contacts") continue;
+      const timeS = secondsOf(message.value.utcNs);
+      if (Number.isNaN(beginS)) beginS = timeS;
+      if (timeS > beginS + ALL_LINKS_TOLD_S) break; // each message has the links that came until then
+      for (const { link, linkContactId: id, wrench } of message.value.contacts) {
+        const key = keyOf(link, id);
+        if (found.has(key)) continue;
+        const peakN = wrench?.forceN ? lengthOf(wrench.forceN) : 0;
+        found.set(key, { link, id, fromS: beginS, toS: beginS, peakN });
+      }
+    }
+    return found;
+  }
+
   // Only the events of the whole log, as fast as they come.
   private async findContacts(stop: AbortSignal): Promise<void> {
     if (!this.looking.peek()) return;
-    const open = new Map<string, ContactSpan>();
     const spans: ContactSpan[] = [];
     const request = { log: this.log, withoutFrames: true, withoutContacts: true, withoutArm: true };
     try {
+      const open = await this.contactsAtStart(stop);
+      spans.push(...open.values());
       for await (const { message } of this.session.recording.replay(request, { signal: stop })) {
+        if (message.case === "status" && message.value.ended)
+          for (const span of open.values()) span.toS = secondsOf(message.value.toUtcNs);
         if (message.case !== "event" || message.value.detail.case !== "contact") continue;
         const { kind, link, times } = message.value;
         const contact = message.value.detail.value;
         const timeS = secondsOf(times?.exposureUtcNs || times?.raisedUtcNs || 0n);
-        const key = `${link}\n${contact.contactId}`;
+        const key = keyOf(link, contact.contactId);
         let span = open.get(key);
         if (!span) {
           const fromS = timeS - contact.durationS;

@@ -2,48 +2,42 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Link } from "../api/gen/taclink/v1/arm_pb";
 import type { PreviewPicture, StreamPreviewResponse } from "../api/gen/taclink/v1/preview_pb";
-import { keepOpen } from "../api/keep_open";
+import { keepOpen, sleep } from "../api/keep_open";
+import { messageOf, type Session } from "../api/session";
 import { useApp } from "../app_state";
+import { ReplayFeed } from "../model/replay_feed";
 import { clockTime, fixed, secondsOf } from "../ui/format";
 
 const RATE_HZ = 5;
 const FOUND = "#3ddc97";
 
+/** Two pictures of one moment, live or from a log. */
+type Pictures = Pick<StreamPreviewResponse, "exposureUtcNs" | "pictures">;
+
 /** What the two cameras of a link see, with the markers found there. */
 export function CameraView({ link }: { link: Link }) {
   const app = useApp();
-  const preview = useSignal<StreamPreviewResponse | undefined>(undefined);
+  const preview = useSignal<Pictures | undefined>(undefined);
   const trouble = useSignal("");
   const withMarkers = useSignal(true);
   const withLabels = useSignal(false);
 
-  const live = app.feed.value.connection.value.state === "live";
+  const feed = app.feed.value;
+  const live = feed.connection.value.state === "live";
   useEffect(() => {
     preview.value = undefined;
     trouble.value = "";
-    if (app.log.value) {
-      trouble.value = "A log is played: pictures are shown of the live arm only.";
-      return;
-    }
     if (!live) return;
     const life = new AbortController();
-    const visible = () => !document.hidden;
-    void keepOpen(life.signal, {
-      run: async (stop, alive) => {
-        if (!visible()) return;
-        const request = { link: link.name, maxRateHz: RATE_HZ };
-        for await (const message of app.session.tactile.streamPreview(request, { signal: stop })) {
-          alive();
-          trouble.value = "";
-          preview.value = message;
-          if (!visible()) return;
-        }
-      },
-      onLost: (reason) => (trouble.value = visible() ? reason : ""),
-      silenceMs: 0,
-    });
+    const show = (pictures: Pictures) => {
+      trouble.value = "";
+      preview.value = pictures;
+    };
+    const lost = (reason: string) => (trouble.value = document.hidden ? "" : reason);
+    if (feed instanceof ReplayFeed) void followLog(feed, link.name, life.signal, show, lost);
+    else void followLive(app.session, link.name, life.signal, show, lost);
     return () => life.abort();
-  }, [link.name, app.log.value, app.session.generation.value, live]);
+  }, [link.name, feed, app.session.generation.value, live]);
 
   const cameras = preview.value?.pictures ?? [];
   return (
@@ -70,6 +64,9 @@ export function CameraView({ link }: { link: Link }) {
       {preview.value && (
         <p class="small numbers">taken {clockTime(secondsOf(preview.value.exposureUtcNs))}</p>
       )}
+      {feed instanceof ReplayFeed && cameras.length > 0 && (
+        <p class="small">Logs hold the markers' positions, not where they were found in the pictures.</p>
+      )}
       {!trouble.value && cameras.length === 0 && <p class="empty">Waiting for pictures …</p>}
       <div class="pictures">
         {cameras.map((picture) => (
@@ -85,6 +82,53 @@ export function CameraView({ link }: { link: Link }) {
       <CameraFacts link={link} />
     </div>
   );
+}
+
+type Show = (pictures: Pictures) => void;
+type Lost = (reason: string) => void;
+
+async function followLive(
+  session: Session,
+  link: string,
+  stop: AbortSignal,
+  show: Show,
+  lost: Lost,
+): Promise<void> {
+  await keepOpen(stop, {
+    run: async (end, alive) => {
+      if (document.hidden) return;
+      const request = { link, maxRateHz: RATE_HZ };
+      for await (const message of session.tactile.streamPreview(request, { signal: end })) {
+        alive();
+        show(message);
+        if (document.hidden) return;
+      }
+    },
+    onLost: lost,
+    silenceMs: 0,
+  });
+}
+
+async function followLog(
+  feed: ReplayFeed,
+  link: string,
+  stop: AbortSignal,
+  show: Show,
+  lost: Lost,
+): Promise<void> {
+  let shown = NaN;
+  for (; !stop.aborted; await sleep(1000 / RATE_HZ, stop)) {
+    const timeS = feed.positionS.peek();
+    if (timeS === shown || document.hidden) continue;
+    try {
+      const pictures = await feed.picturesOf(link, timeS, stop);
+      if (!pictures) continue;
+      show(pictures);
+      shown = timeS;
+    } catch (error) {
+      if (!stop.aborted) lost(messageOf(error));
+    }
+  }
 }
 
 function Picture(props: { picture: PreviewPicture; link: Link; markers: boolean; labels: boolean }) {
@@ -113,8 +157,8 @@ function Picture(props: { picture: PreviewPicture; link: Link; markers: boolean;
       {picture.jpeg.length > 0 ? (
         <canvas
           ref={canvas}
-          width={picture.widthPx}
-          height={picture.heightPx}
+          width={picture.widthPx || 640}
+          height={picture.heightPx || 480}
           role="img"
           aria-label={`${picture.camera} camera of ${link.name}, ${picture.markers.length} markers found`}
         />
@@ -137,7 +181,11 @@ function draw(
   labels: boolean,
 ): void {
   const context = canvas.getContext("2d")!;
-  context.drawImage(bitmap, 0, 0, canvas.width, canvas.height);
+  if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
+    canvas.width = bitmap.width;
+    canvas.height = bitmap.height;
+  }
+  context.drawImage(bitmap, 0, 0);
   context.strokeStyle = context.fillStyle = FOUND;
   context.font = "9px system-ui";
   picture.markers.forEach((marker, i) => {

@@ -1,6 +1,7 @@
 import { useSignal } from "@preact/signals";
 import type { JSX } from "preact";
 import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
+import type { Camera } from "../api/gen/taclink/v1/camera_pb";
 import type { ForceLevelState } from "../api/gen/taclink/v1/events_pb";
 import { ForceModel } from "../api/gen/taclink/v1/frame_pb";
 import type { CalibrationResult } from "../api/gen/taclink/v1/tactile_pb";
@@ -297,9 +298,22 @@ function Cameras({ link }: { link: Link }) {
           Set
         </OperatorButton>
       </form>
-      <p class="small">Empty fields stay as they are. It holds until the link is started again.</p>
+      <ul class="small numbers plain-list">
+        {link.cameras.map((camera) => (
+          <li>
+            {camera.name}: {exposureOf(camera)}
+            {camera.gain !== undefined && `, gain ${camera.gain}`}
+          </li>
+        ))}
+      </ul>
+      <p class="small">Empty fields stay as they are. It holds until the server ends.</p>
     </fieldset>
   );
+}
+
+function exposureOf(camera: Camera): string {
+  if (camera.exposureS !== undefined) return `exposure ${fixed(camera.exposureS * 1e3, 1)} ms`;
+  return camera.automaticExposure ? "automatic exposure" : "exposure not known";
 }
 
 function Worker({ link }: { link: Link }) {
