@@ -23,6 +23,7 @@ export function CameraView({ link }: { link: Link }) {
   const withLabels = useSignal(false);
 
   const feed = app.feed.value;
+  const recorded = feed instanceof ReplayFeed;
   const live = feed.connection.value.state === "live";
   useEffect(() => {
     preview.value = undefined;
@@ -42,30 +43,31 @@ export function CameraView({ link }: { link: Link }) {
   const cameras = preview.value?.pictures ?? [];
   return (
     <div class="cameras">
-      <div class="row">
-        <label class="small">
-          <input
-            type="checkbox"
-            checked={withMarkers.value}
-            onChange={(event) => (withMarkers.value = event.currentTarget.checked)}
-          />{" "}
-          markers found
-        </label>
-        <label class="small">
-          <input
-            type="checkbox"
-            checked={withLabels.value}
-            onChange={(event) => (withLabels.value = event.currentTarget.checked)}
-          />{" "}
-          labels (path.ring)
-        </label>
-      </div>
+      {recorded ? (
+        <p class="small">Logs hold the markers' positions, not where they were found in the pictures.</p>
+      ) : (
+        <div class="row">
+          <label class="small">
+            <input
+              type="checkbox"
+              checked={withMarkers.value}
+              onChange={(event) => (withMarkers.value = event.currentTarget.checked)}
+            />{" "}
+            markers found
+          </label>
+          <label class="small">
+            <input
+              type="checkbox"
+              checked={withLabels.value}
+              onChange={(event) => (withLabels.value = event.currentTarget.checked)}
+            />{" "}
+            labels (path.ring)
+          </label>
+        </div>
+      )}
       {trouble.value && <p class="empty">{trouble.value}</p>}
       {preview.value && (
         <p class="small numbers">taken {clockTime(secondsOf(preview.value.exposureUtcNs))}</p>
-      )}
-      {feed instanceof ReplayFeed && cameras.length > 0 && (
-        <p class="small">Logs hold the markers' positions, not where they were found in the pictures.</p>
       )}
       {!trouble.value && cameras.length === 0 && <p class="empty">Waiting for pictures …</p>}
       <div class="pictures">
@@ -74,6 +76,7 @@ export function CameraView({ link }: { link: Link }) {
             key={picture.camera}
             picture={picture}
             link={link}
+            recorded={recorded}
             markers={withMarkers.value}
             labels={withLabels.value}
           />
@@ -131,10 +134,20 @@ async function followLog(
   }
 }
 
-function Picture(props: { picture: PreviewPicture; link: Link; markers: boolean; labels: boolean }) {
+interface PictureProps {
+  picture: PreviewPicture;
+  link: Link;
+  /** From a log, which has no markers. */
+  recorded: boolean;
+  markers: boolean;
+  labels: boolean;
+}
+
+function Picture(props: PictureProps) {
   const canvas = useRef<HTMLCanvasElement>(null);
-  const { picture, link, markers, labels } = props;
+  const { picture, link, recorded, markers, labels } = props;
   const paths = link.model!.markers!.paths;
+  const found = recorded ? "" : `${picture.markers.length} markers`;
 
   useEffect(() => {
     if (picture.jpeg.length === 0) return;
@@ -160,13 +173,14 @@ function Picture(props: { picture: PreviewPicture; link: Link; markers: boolean;
           width={picture.widthPx || 640}
           height={picture.heightPx || 480}
           role="img"
-          aria-label={`${picture.camera} camera of ${link.name}, ${picture.markers.length} markers found`}
+          aria-label={`${picture.camera} camera of ${link.name}${found && `, ${found} found`}`}
         />
       ) : (
         <p class="empty">{picture.whyMissing || "No picture."}</p>
       )}
       <figcaption>
-        {picture.camera}: {picture.markers.length} markers
+        {picture.camera}
+        {found && `: ${found}`}
       </figcaption>
     </figure>
   );
