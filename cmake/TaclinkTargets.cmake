@@ -15,21 +15,22 @@ if(TACLINK_SANITIZER)
   target_compile_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER} -fno-sanitize-recover=all
                                                  $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER})
-  if(TACLINK_SANITIZER MATCHES "undefined" AND NOT TACLINK_FUZZ)
+  if(TACLINK_SANITIZER MATCHES "undefined")
+    set(fuzzed $<BOOL:$<TARGET_PROPERTY:TACLINK_FUZZED>>)
+    set(fewer_checks -fno-sanitize=null$<COMMA>alignment$<COMMA>object-size$<COMMA>pointer-overflow)
     # Checks of every access, most of which the address sanitizer makes as well: with them Eigen's code takes twice as
-    # long to compile. The preset `fuzz` has them.
-    target_compile_options(taclink_flags INTERFACE -fno-sanitize=null,alignment,object-size,pointer-overflow)
+    # long to compile. What is fuzzed has them.
+    # As -fsanitize=fuzzer-no-link, which does not go with headers that were compiled without it.
+    set(coverage -fsanitize-coverage=inline-8bit-counters$<COMMA>indirect-calls$<COMMA>trace-cmp$<COMMA>pc-table)
+    target_compile_options(taclink_flags INTERFACE $<IF:${fuzzed},${coverage},${fewer_checks}>)
   endif()
 endif()
 # clang warns of more than GCC; the builds by GCC are strict.
 target_compile_options(taclink_flags INTERFACE $<$<CXX_COMPILER_ID:Clang>:-Wno-error>)
-if(TACLINK_FUZZ)
-  target_compile_options(taclink_flags INTERFACE -fsanitize=fuzzer-no-link)
-endif()
 
 # Headers that most sources read take half of their compile time. Sets of them are compiled once: `library` for sensing,
 # `thread` for all other libraries, `test` with GoogleTest, `rpc` and `rpc_test` where gRPC is in most sources. Sources
-# include what they need all the same: the presets `tsan` and `fuzz` go without. All but sensing is then compiled with
+# include what they need all the same: the preset `tsan` goes without. All but sensing is then compiled with
 # -pthread, for gRPC brings it and one set of headers has one set of flags.
 option(TACLINK_PRECOMPILE "Precompile common headers" OFF)
 set(TACLINK_COMMON_HEADERS <Eigen/Core> <algorithm> <array> <atomic> <chrono> <cmath> <condition_variable> <filesystem>
