@@ -6,7 +6,8 @@ import { defineConfig } from "vitest/config";
 // The server embeds the files by name, so that names are fixed; it tells browsers whether one has changed.
 export default defineConfig({
   esbuild: { jsx: "automatic", jsxImportSource: "preact" },
-  server: { proxy: { "/taclink.v1": "http://127.0.0.1:8080" } },
+  // By number: systems without a name for themselves have tests too.
+  server: { host: "127.0.0.1", proxy: { "/taclink.v1": "http://127.0.0.1:8080" } },
   build: {
     target: "es2022",
     modulePreload: false,
