@@ -198,6 +198,7 @@ struct LinkPipeline::Stages {
     double& sigma_px = shape_options.cameras.camera_sigma_px;
     sigma_px = std::max(sigma_px, rest->noise_px());
     shape_options.cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
+    shape_options.calibration_covariance = calibration->covariance;
     reconstructor.emplace(model, calibration->rig, shape_options);
     reconstructor->SetBaseline(rest->markers(), pressure_mpa);
     keeper.Take(rest_origin, pressure_mpa, times, clock);

@@ -34,6 +34,7 @@ ShapeReconstructor::ShapeReconstructor(const LinkModel& model, const StereoRig& 
     : model_rest_mm_(model.RestMarkers()),
       estimator_(model, options.estimator),
       evidence_(model, rig, estimator_.basis(), options.cameras),
+      doubt_(model, rig, options.calibration_covariance),
       rest_u_(Eigen::VectorXd::Zero(3 * model.markers.count())) {}
 
 void ShapeReconstructor::SetBaseline(const LabelledMarkers& rest, double pressure_mpa, bool keep_unseen) {
@@ -80,7 +81,8 @@ void ShapeReconstructor::Write(SkinShape& shape) const {
     const Vec3 u = estimator_.displacements().segment<3>(3 * marker);
     shape.positions_mm[i] = model_rest_mm_[i] + frame * u;
     shape.displacements_mm[i] = frame * (u - rest_u_.segment<3>(3 * marker));
-    shape.covariances_mm2[i] = Turned(frame, estimator_.covariances()[i]);
+    shape.covariances_mm2[i] =
+        Turned(frame, estimator_.covariances()[i]) + doubt_.Of(i, shape.displacements_mm[i]);
     shape.sources[i] =
         SourceOf(evidence_.Uses(marker, CameraId::kTop), evidence_.Uses(marker, CameraId::kBottom));
     for (const CameraId id : kBothCameras) {

@@ -6,6 +6,7 @@
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
 #include "sensing/core/skin_shape.h"
+#include "sensing/shape/calibration_doubt.h"
 #include "sensing/shape/camera_evidence.h"
 #include "sensing/shape/shape_estimator.h"
 
@@ -14,6 +15,8 @@ namespace taclink {
 struct ShapeOptions {
   CameraEvidenceOptions cameras;
   ShapeEstimatorOptions estimator;
+  /// As CalibrationSummary::covariance; empty: the cameras are taken as known.
+  Eigen::MatrixXd calibration_covariance = {};
 };
 
 /// Labelled markers to 3-D positions of all markers, each with covariance and source: the most probable shape
@@ -49,6 +52,7 @@ class ShapeReconstructor {
   const std::vector<Vec3> model_rest_mm_;
   ShapeEstimator estimator_;
   CameraEvidence evidence_;
+  const CalibrationDoubt doubt_;
   Eigen::VectorXd rest_u_;  // of the skin in the rest pictures, own frames
 };
 

@@ -50,10 +50,10 @@ void SkinBasis::Solve(const LinkModel& model, const SkinBasisOptions& options) {
   const LinearShell shell(model, markers() < options.coarse_from_markers ? options.refinement : 1);
   const ShellMesh& mesh = shell.mesh();
   const double offset = model.thickness_mm / 2 - model.markers.center_depth_mm;
-  const auto stack = [&](const ShellDisplacement& u, auto&& column) {
+  const auto stack = [&](const ShellDisplacement& u, const ShellMesh& of, auto&& column) {
     for (int m = 0; m < markers(); ++m) {
       column.template segment<3>(3 * m) =
-          Frame(m).transpose() * u.AtOffset(mesh, mesh.NodeOfMarker(model, m), offset);
+          Frame(m).transpose() * u.AtOffset(of, of.NodeOfMarker(model, m), offset);
     }
   };
   const bool halves = mesh.refinement % 2 == 0;
@@ -63,7 +63,7 @@ void SkinBasis::Solve(const LinkModel& model, const SkinBasisOptions& options) {
   const auto add = [&](int node, const Vec3& direction, int ring) {
     const NodalLoad load{node, direction};
     const auto column = static_cast<Eigen::Index>(ring_of_column_.size());
-    stack(shell.Solve({&load, 1}), responses_.col(column));
+    stack(shell.Solve({&load, 1}), mesh, responses_.col(column));
     ring_of_column_.push_back(std::clamp(ring, 0, rings_ - 1));
   };
   const auto normal = [&](int node) { return mesh.normals[static_cast<size_t>(node)]; };
@@ -82,7 +82,8 @@ void SkinBasis::Solve(const LinkModel& model, const SkinBasisOptions& options) {
     }
   }
   per_pressure_.resize(3 * markers());
-  stack(shell.PerPressure(), per_pressure_);
+  const LinearShell fine(model, std::max(mesh.refinement, options.pressure_refinement));
+  stack(fine.PerPressure(), fine.mesh(), per_pressure_);
 }
 
 Eigen::MatrixXd SkinBasis::Harmonic(int h) const {

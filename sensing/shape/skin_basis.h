@@ -18,6 +18,8 @@ struct SkinBasisOptions {
   int max_modes = 48;
   /// Elements per interval of the marker grid, and the number of markers from which it is 1.
   int refinement = 2;
+  /// The same for what pressure does: beside the clamps the skin bends within less than an interval.
+  int pressure_refinement = 3;
   int coarse_from_markers = 400;
 };
 
