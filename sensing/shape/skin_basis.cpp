@@ -47,7 +47,8 @@ SkinBasis::SkinBasis(const LinkModel& model, const SkinBasisOptions& options)
 }
 
 void SkinBasis::Solve(const LinkModel& model, const SkinBasisOptions& options) {
-  const LinearShell shell(model, markers() < options.coarse_from_markers ? options.refinement : 1);
+  const bool coarse = markers() >= options.coarse_from_markers;
+  const LinearShell shell(model, coarse ? 1 : options.refinement);
   const ShellMesh& mesh = shell.mesh();
   const double offset = model.thickness_mm / 2 - model.markers.center_depth_mm;
   const auto stack = [&](const ShellDisplacement& u, const ShellMesh& of, auto&& column) {
@@ -82,7 +83,7 @@ void SkinBasis::Solve(const LinkModel& model, const SkinBasisOptions& options) {
     }
   }
   per_pressure_.resize(3 * markers());
-  const LinearShell fine(model, std::max(mesh.refinement, options.pressure_refinement));
+  const LinearShell fine(model, coarse ? 1 : options.pressure_refinement);
   stack(fine.PerPressure(), fine.mesh(), per_pressure_);
 }
 

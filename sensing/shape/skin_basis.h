@@ -16,9 +16,9 @@ struct SkinBasisOptions {
   /// Modes whose largest displacement has a smaller standard deviation are left out, and all but so many.
   double least_mode_mm = 0.01;
   int max_modes = 48;
-  /// Elements per interval of the marker grid, and the number of markers from which it is 1.
+  /// Elements per interval of the marker grid: of what loads do, and of what pressure does, for beside the
+  /// clamps the skin bends within less than an interval. From so many markers on they are 1.
   int refinement = 2;
-  /// The same for what pressure does: beside the clamps the skin bends within less than an interval.
   int pressure_refinement = 3;
   int coarse_from_markers = 400;
 };

@@ -58,7 +58,7 @@ Result<LogPictures> FindPictures(const mcap::Reader& reader, const std::string& 
     if (!message && message.error().code == ErrorCode::kEndOfData) break;
     if (!message) return message.error();
     if (message->publish_time_ns > at_ns) continue;
-    if (found && message->sequence != static_cast<uint32_t>(out.sequence)) break;  // an older frame's
+    if (found && message->sequence != out.sequence) break;  // an older frame's
     if (missing.erase(message->channel_id) == 0) continue;
     found = true;
     out.sequence = message->sequence;

@@ -13,7 +13,7 @@ namespace taclink::server {
 
 /// What a link's cameras saw in one frame of a log.
 struct LogPictures {
-  uint64_t sequence = 0;  ///< of the frame
+  uint32_t sequence = 0;  ///< of the frame, its low 32 bits
   int64_t exposure_utc_ns = 0;
   std::array<RawImage, kCameraCount> images;
 };

@@ -53,7 +53,8 @@ TEST(HttpTarget, NothingLeadsOutOfTheRoot) {
 TEST(HttpTarget, GzipOnlyForWhoTakesIt) {
   for (const char* yes : {"gzip", "gzip, deflate, br", "br;q=1.0, gzip;q=0.8", "deflate,gzip"})
     EXPECT_TRUE(TakesGzip(yes)) << yes;
-  for (const char* no : {"", "br", "gzip;q=0", "x-gzip", "gzipped", "identity, *;q=0"})
+  for (const char* no :
+       {"", "br", "gzip;q=0", "gzip;q=0.0", "gzip; q=0.000", "x-gzip", "gzipped", "identity, *;q=0"})
     EXPECT_FALSE(TakesGzip(no)) << no;
 }
 
