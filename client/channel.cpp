@@ -1,5 +1,6 @@
 #include "client/channel.h"
 
+#include <arpa/inet.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/client_interceptor.h>
@@ -11,6 +12,9 @@
 
 namespace taclink::client {
 namespace {
+
+constexpr int kKeepaliveMs = 10'000;
+constexpr int kKeepaliveTimeoutMs = 5'000;
 
 // gRPC's own call credentials refuse to go without TLS, also to this machine itself.
 class TokenInterceptor final : public grpc::experimental::Interceptor {
@@ -39,11 +43,13 @@ class TokenInterceptorFactory final : public grpc::experimental::ClientIntercept
   const std::string authorization_;
 };
 
+// Not by its beginning: 127.0.0.1.example.com is a name like any other.
 bool StaysHere(const std::string& address) {
-  for (const char* here : {"unix:", "localhost:", "127.", "[::1]:"}) {
-    if (address.starts_with(here)) return true;
-  }
-  return false;
+  if (address.starts_with("unix:")) return true;
+  const std::string host = address.substr(0, address.rfind(':'));
+  if (host == "localhost" || host == "[::1]") return true;
+  in_addr ip{};
+  return inet_pton(AF_INET, host.c_str(), &ip) == 1 && ntohl(ip.s_addr) >> 24 == 127;
 }
 
 Result<std::string> ReadFile(const std::string& path) {
@@ -87,6 +93,10 @@ Result<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);  // robots are on the local network
   // A connection of its own: on a shared one, a stream that is not read would hold up the others.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  // A server that is cut off says nothing: it is asked while calls are open, also when none of them sends.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
   if (!credentials.token.empty())
     interceptors.push_back(std::make_unique<TokenInterceptorFactory>(credentials.token));

@@ -27,6 +27,7 @@ pkg_check_modules(Deflate REQUIRED IMPORTED_TARGET libdeflate)
 pkg_check_modules(Zstd REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(Lz4 REQUIRED IMPORTED_TARGET liblz4)
 find_package(PNG REQUIRED)
+find_library(NATS_LIBRARY nats REQUIRED)  # its own config file is broken
 if(TACLINK_BUILD_TESTS)
   find_package(GTest REQUIRED)
   include(GoogleTest)

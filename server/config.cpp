@@ -167,6 +167,7 @@ Result<Config> ParseConfig(const std::string& name, std::string_view text, const
   config.security = ReadSecurity(root, path);
   config.events = ReadEvents(root, folder);
   config.recording = ReadRecording(root, path);
+  config.publish = ReadPublish(root, path);
   ReadArm(root, reader, config);
   root.Done();
   if (const auto finished = file->Finish(); !finished) return finished.error();

@@ -17,6 +17,7 @@
 #include "server/config_limits.h"
 #include "server/config_operations.h"
 #include "server/config_pressure.h"
+#include "server/config_publish.h"
 #include "server/config_recording.h"
 #include "server/config_security.h"
 #include "server/events/options.h"
@@ -83,6 +84,7 @@ struct Config {
   SecurityConfig security;
   EventOptions events;
   RecordingConfig recording;
+  PublishConfig publish;
   std::string arm_name;
   KinematicsConfig kinematics;
   std::vector<LinkConfig> links;

@@ -67,6 +67,7 @@ std::string ConfigText(const Config& config) {
       << LimitsText(config.limits) << HttpText(config.http) << SecurityText(config.security)
       << EventsText(config.events);
   WriteRecording(out, config.recording);
+  WritePublish(out, config.publish);
   WriteLog(out, config.log);
   WriteShutdown(out, config.shutdown);
   WriteWatchdog(out, config.watchdog);

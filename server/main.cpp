@@ -16,6 +16,7 @@
 #include "server/config.h"
 #include "server/gateway/setup.h"
 #include "server/log.h"
+#include "server/publish/publisher.h"
 #include "server/recording/recorder.h"
 #include "server/reload.h"
 #include "server/rpc/rpc_server.h"
@@ -133,6 +134,13 @@ Result<ReplayedArm> MakeArm(const Options& options, const Config& config) {
   return BuildReplayedArm(*log, config, TACLINK_VERSION, SystemClock());
 }
 
+// Null: nothing is to be published.
+Result<std::unique_ptr<Publisher>> StartPublisher(Arm& arm, const PublishConfig& config) {
+  if (config.url.empty()) return std::unique_ptr<Publisher>();
+  spdlog::info("publishing to {} as taclink.{}.>", config.url, config.site);
+  return Publisher::Start(arm, config);
+}
+
 Result<void> Run(const Options& options, const Config& config) {
   Signals signals;
   const SystemdNotifier systemd = SystemdNotifier::FromEnvironment();
@@ -145,7 +153,9 @@ Result<void> Run(const Options& options, const Config& config) {
   const auto server =
       RpcServer::Start(config.listen, arm, ToServiceLimits(config.limits), *security, &recorder);
   if (!server) return server.error();
-  const auto gateway = StartGateway(config.http, arm, **server, *security);
+  auto publisher = StartPublisher(arm, config.publish);
+  if (!publisher) return publisher.error();
+  const auto gateway = StartGateway(config.http, arm, **server, *security, publisher->get());
   if (!gateway) return gateway.error();
   (*security)->Watch();
   PingSystemd(arm, systemd);
@@ -162,6 +172,7 @@ Result<void> Run(const Options& options, const Config& config) {
   if (*gateway) (*gateway)->Drain();
   (*server)->Shutdown("server is shutting down", config.shutdown.limit);
   arm.Stop();
+  if (*publisher) (*publisher)->Close(config.shutdown.limit);
   recorder.Close();
   spdlog::info("stopped");
   for (size_t link = 0; link < config.links.size(); ++link) {

@@ -27,6 +27,7 @@ struct Options {
   ServerLoad one = {.links = 0};  // no links: the whole program
   std::string detail = "full";
   std::string taclinkd;
+  std::string publish;  // URL of a NATS server; empty: none
   std::string json, markdown, svg;
 };
 
@@ -124,7 +125,9 @@ Result<std::vector<LoadResult>> Run(const std::vector<ServerLoad>& loads, const 
       ++end;
     const std::vector<ServerLoad> group(loads.begin() + static_cast<std::ptrdiff_t>(begin),
                                         loads.begin() + static_cast<std::ptrdiff_t>(end));
-    auto measured = MeasureLoads(group, pictures, options.taclinkd, options.seconds);
+    const std::string more =
+        options.publish.empty() ? "" : "publish: {url: \"" + options.publish + "\", site: bench}\n";
+    auto measured = MeasureLoads(group, pictures, options.taclinkd, options.seconds, more);
     if (!measured) return measured.error();
     results.insert(results.end(), measured->begin(), measured->end());
     begin = end;
@@ -205,6 +208,7 @@ void AddBenchServer(const Arguments& bench, Selected& selected) {
       .Needs(links)
       .ShowDefault();
   server.AddOption("--taclinkd", options->taclinkd, "The server's program (the one beside this)");
+  server.AddOption("--publish", options->publish, "URL of a NATS server to which the server publishes");
   server.AddOption("--json", options->json, "File for all numbers");
   server.AddOption("--markdown", options->markdown,
                    "File for the tables, or a page with marks to put them between");

@@ -246,11 +246,11 @@ std::string LoadConfigText(const LoadPictures& pictures, int links, double rate_
 
 Result<std::vector<LoadResult>> MeasureLoads(const std::vector<ServerLoad>& loads,
                                              const LoadPictures& pictures, const std::string& taclinkd,
-                                             double seconds) {
+                                             double seconds, const std::string& more) {
   const int links = loads.front().links;
   const auto folder = std::filesystem::path(pictures.folder);
   const std::string config = (folder / "load.yaml").string(), log = (folder / "load.log").string();
-  std::ofstream(config) << LoadConfigText(pictures, links, loads.front().rate_hz);
+  std::ofstream(config) << LoadConfigText(pictures, links, loads.front().rate_hz) << more;
   const auto server = ServerProcess::Start(taclinkd, config, log);
   if (!server) return server.error();
   auto connection = client::Client::Connect((*server)->address(), std::chrono::seconds(10));

@@ -51,9 +51,9 @@ Result<void> WaitUntilMeasuring(client::Client& connection);
 Result<uint64_t> FramesSkipped(client::Client& connection);
 
 /// Starts one server for loads of the same links and rate, and its clients one load after another.
-/// `seconds`: of each measurement.
+/// `seconds`: of each measurement. `more`: lines of the server's configuration.
 Result<std::vector<LoadResult>> MeasureLoads(const std::vector<ServerLoad>& loads,
                                              const LoadPictures& pictures, const std::string& taclinkd,
-                                             double seconds);
+                                             double seconds, const std::string& more = "");
 
 }  // namespace taclink::command

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "client/taclink/client.h"
+#include "taclink/client.h"
 
 namespace taclink::client {
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "client/taclink/events.h"
-#include "sensing/core/result.h"
+#include "taclink/events.h"
+#include "taclink/result.h"
 
 /// Client of a TacLINK server. Everything is in SI units (m, N, Pa, s, rad); vectors of a link are in its
 /// frame: origin in the centre of the clamped end at the top camera's side, +z along the axis.

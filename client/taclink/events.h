@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "sensing/core/result.h"
+#include "taclink/result.h"
 
 /// Taring, force thresholds and events of a TacLINK server. SI units, link frame.
 namespace taclink::client {

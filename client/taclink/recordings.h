@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/taclink/client.h"
+#include "taclink/client.h"
 
 namespace taclink::client {
 

@@ -7,9 +7,9 @@
 #include <variant>
 #include <vector>
 
-#include "client/taclink/arm_contacts.h"
-#include "client/taclink/client.h"
-#include "client/taclink/events.h"
+#include "taclink/arm_contacts.h"
+#include "taclink/client.h"
+#include "taclink/events.h"
 
 /// Logs of a TacLINK server, played by it. Times of the log are ns since 1970-01-01 UTC.
 namespace taclink::client {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -20,12 +21,26 @@ namespace {
 // Below these fractions of seen markers a link is called degraded, or lost.
 constexpr double kDegradedFraction = 0.7;
 constexpr double kLostFraction = 0.4;
+// Forces were compared with the truth down to dents of 15 mm.
+constexpr double kDeepestDentMm = 16;
 // Markers are followed across a gap of so many frames.
 constexpr uint64_t kMaxStep = 3;
 // Between a refused rest pair and the next that is tried, of exposure time: labelling what is no rest picture
 // takes far longer than a frame. Begins with the first and doubles; with the second a link still begins
 // within a second once its pictures serve.
 constexpr int64_t kFirstWaitNs = 66'000'000, kLongestWaitNs = 600'000'000;
+
+// Towards the axis since the baseline, of the marker that went furthest.
+double DeepestDent(const SkinShape& shape) {
+  double deepest_mm = 0;
+  for (size_t i = 0; i < shape.displacements_mm.size(); ++i) {
+    const Vec3& moved = shape.displacements_mm[i];
+    const Vec3 before = shape.positions_mm[i] - moved;
+    const double radius_mm = before.head<2>().norm();
+    if (radius_mm > 0) deepest_mm = std::max(deepest_mm, -before.head<2>().dot(moved.head<2>()) / radius_mm);
+  }
+  return deepest_mm;
+}
 
 void SetStatus(LinkState& state, LinkStatus status, std::string reason) {
   state.status = status;
@@ -222,6 +237,11 @@ struct LinkPipeline::Stages {
       SetStatus(state, LinkStatus::kDegraded, "the pressure is not known: " + state.pressure.trouble);
     } else if (keeper.HasDriftedFar()) {
       SetStatus(state, LinkStatus::kDegraded, keeper.DriftAdvice());
+    } else if (const double dent_mm = DeepestDent(state.shape); dent_mm > kDeepestDentMm) {
+      char text[120];
+      std::snprintf(text, sizeof text, "pressed in by %.0f mm: beyond %.0f mm forces read too little",
+                    dent_mm, kDeepestDentMm);
+      SetStatus(state, LinkStatus::kDegraded, text);
     } else {
       SetStatus(state, LinkStatus::kOk, "");
     }

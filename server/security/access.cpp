@@ -33,6 +33,8 @@ constexpr AccessRule kTable[] = {
     {"/grpc.health.v1.Health/Check", Role::kNobody},
     {"/grpc.health.v1.Health/Watch", Role::kNobody},
     {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", Role::kViewer},
+    // Is not there: clients that ask for it first are to hear that, and fall back.
+    {"/grpc.reflection.v1.ServerReflection/ServerReflectionInfo", Role::kViewer},
     {"/healthz", Role::kNobody},
     {"/readyz", Role::kNobody},
     {"/metrics", Role::kViewer},

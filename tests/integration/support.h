@@ -30,7 +30,8 @@ class TestServer {
  public:
   using MakePressure = std::function<std::unique_ptr<PressureSource>(size_t link, Clock& clock)>;
   explicit TestServer(ServiceLimits limits = TestLimits(), std::unique_ptr<ArmPoses> poses = nullptr,
-                      const MakePressure& pressure = {}, const RecordingConfig& recording = {}) {
+                      const MakePressure& pressure = {}, const RecordingConfig& recording = {},
+                      const std::string& address = "127.0.0.1:0") {
     for (size_t link = 0; link < 2; ++link) {
       links_.push_back(MakeLink(link));
       if (pressure) links_.back().pressure = pressure(link, clock_);
@@ -40,7 +41,7 @@ class TestServer {
                               ArmOptions{.worker = {.poll = std::chrono::milliseconds(5)}}, std::move(poses));
     recorder_ = std::make_unique<Recorder>(
         *arm_, recording, LogPreamble{.files = {}, .metadata = {{"taclink", {{"arm", "test"}}}}});
-    auto server = RpcServer::Start("127.0.0.1:0", *arm_, limits, nullptr, recorder_.get());
+    auto server = RpcServer::Start(address, *arm_, limits, nullptr, recorder_.get());
     EXPECT_TRUE(server.ok()) << server.error().message;
     server_ = std::move(*server);
   }

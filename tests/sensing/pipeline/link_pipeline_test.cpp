@@ -160,6 +160,24 @@ TEST_F(LinkPipelineTest, WithOneCameraThePositionsAreKnownWorseAndTheReasonIsPas
   EXPECT_LT(mean_variance_mm2(), 1.1 * both_mm2);
 }
 
+// Deeper than forces were ever compared with the truth.
+TEST_F(LinkPipelineTest, ADeepDentIsDegraded) {
+  Scene scene = LinearPress();
+  *scene.contacts[0].force_n *= 3;
+  skin_ = SimulatedSkin::Make(model_, scene).value();
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  bool was_ok = false;
+  for (double time_s = 1.4; time_s < 2.1; time_s += 1.0 / 30) {
+    pipeline.Process(Frame(time_s), state_);
+    was_ok = was_ok || (state_.status == LinkStatus::kOk && !state_.contacts.empty());
+  }
+  EXPECT_TRUE(was_ok);
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  EXPECT_THAT(state_.status_reason, HasSubstr("forces read too little"));
+  EXPECT_TRUE(state_.measured());
+}
+
 TEST_F(LinkPipelineTest, DarkPicturesAreLostNotZero) {
   LinkPipeline pipeline(model_, options_);
   TakeRest(pipeline);

@@ -1,0 +1,158 @@
+"""What is asked of a server with one answer, for both kinds of client."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from taclink.errors import InvalidArgument
+from taclink.messages.arm import Arm, arm_from
+from taclink.messages.baseline import LinkTare, tares_from
+from taclink.messages.force_level import ForceLevelState, force_level_state_from
+from taclink.messages.others import Caller, ReplayPictures, caller_from, replay_pictures_from
+from taclink.messages.recording import (
+    Log,
+    LogDescription,
+    RecorderStatus,
+    description_from,
+    logs_from,
+    recorder_from,
+)
+from taclink.names import Compression, ForceModel, number_of
+from taclink.v1 import events_pb2, operations_pb2, recording_pb2, tactile_pb2, tare_pb2
+
+T = TypeVar("T")
+
+# Waits for frames, a new model or the disk; servers answer all else at once.
+SLOW_S = 60.0
+
+
+@dataclass(frozen=True)
+class Call(Generic[T]):
+    """`method` of `service` (tactile, operations or recording), and what its answer means."""
+
+    service: str
+    method: str
+    request: Any
+    result: Callable[[Any], T]
+    timeout_s: float | None = None  # None: the client's
+
+
+def names(links: str | Iterable[str]) -> list[str]:
+    """One name, or several; none: all links."""
+    return [links] if isinstance(links, str) else list(links)
+
+
+def _nothing(_: Any) -> None:
+    return None
+
+
+def arm() -> Call[Arm]:
+    return Call("tactile", "GetArm", tactile_pb2.GetArmRequest(), lambda answer: arm_from(answer.arm))
+
+
+def caller() -> Call[Caller]:
+    return Call("operations", "GetCaller", operations_pb2.GetCallerRequest(), caller_from)
+
+
+def restart_link(link: str) -> Call[None]:
+    return Call("operations", "RestartLink", operations_pb2.RestartLinkRequest(link=link), _nothing)
+
+
+def tare(
+    links: str | Iterable[str], force: bool, frames: int, timeout: float
+) -> Call[tuple[LinkTare, ...]]:
+    request = tare_pb2.TareRequest(links=names(links), force=force, frames=frames)
+    return Call("tactile", "Tare", request, tares_from, timeout)
+
+
+def set_thresholds(
+    link: str, warning_n: float, alarm_n: float, hysteresis_n: float, region: str
+) -> Call[ForceLevelState]:
+    request = events_pb2.SetThresholdsRequest(
+        link=link,
+        region=region,
+        thresholds=events_pb2.Thresholds(warning_n=warning_n, alarm_n=alarm_n, hysteresis_n=hysteresis_n),
+    )
+    return Call(
+        "tactile", "SetThresholds", request, lambda answer: force_level_state_from(answer.state)
+    )
+
+
+def set_force_model(link: str, model: str, timeout: float) -> Call[None]:
+    number = number_of(ForceModel, model, "model")
+    request = tactile_pb2.SetForceModelRequest(link=link, model=number)
+    return Call("tactile", "SetForceModel", request, _nothing, timeout)
+
+
+def set_camera(
+    link: str,
+    camera: str,
+    automatic_exposure: bool,
+    exposure_s: float | None,
+    gain: int | None,
+    timeout: float,
+) -> Call[None]:
+    if automatic_exposure and exposure_s is not None:
+        raise InvalidArgument("either the camera decides on the exposure, or exposure_s says it")
+    request = tactile_pb2.SetCameraRequest(link=link, camera=camera, exposure_s=exposure_s, gain=gain)
+    if automatic_exposure:
+        request.automatic = True
+    return Call("tactile", "SetCamera", request, _nothing, timeout)
+
+
+def calibrate_request(link: str, pairs: int, save: bool, force: bool) -> tactile_pb2.CalibrateRequest:
+    return tactile_pb2.CalibrateRequest(link=link, pairs=pairs, save=save, force=force)
+
+
+def start_recording(
+    name: str, links: str | Iterable[str], pictures: bool, compression: str, note: str, timeout: float
+) -> Call[RecorderStatus]:
+    request = recording_pb2.StartRecordingRequest(
+        name=name,
+        links=names(links),
+        pictures=pictures,
+        compression=number_of(Compression, compression, "compression"),
+        note=note,
+    )
+    return Call("recording", "StartRecording", request, _status_of, timeout)
+
+
+def _status_of(answer: Any) -> RecorderStatus:
+    return recorder_from(answer.status)
+
+
+def stop_recording(timeout: float) -> Call[RecorderStatus]:
+    return Call(
+        "recording", "StopRecording", recording_pb2.StopRecordingRequest(), _status_of, timeout
+    )
+
+
+def recorder() -> Call[RecorderStatus]:
+    return Call("recording", "GetRecorder", recording_pb2.GetRecorderRequest(), _status_of)
+
+
+def logs(timeout: float) -> Call[tuple[Log, ...]]:
+    return Call("recording", "ListLogs", recording_pb2.ListLogsRequest(), logs_from, timeout)
+
+
+def describe_log(log: str, timeout: float) -> Call[LogDescription]:
+    return Call(
+        "recording", "DescribeLog", recording_pb2.DescribeLogRequest(log=log), description_from, timeout
+    )
+
+
+def delete_log(log: str) -> Call[None]:
+    return Call("recording", "DeleteLog", recording_pb2.DeleteLogRequest(log=log), _nothing)
+
+
+def control_replay(player: str, **action: Any) -> Call[None]:
+    """`action`: one field of ControlReplayRequest.action."""
+    request = recording_pb2.ControlReplayRequest(player=player, **action)
+    return Call("recording", "ControlReplay", request, _nothing)
+
+
+def replay_pictures(player: str, link: str, utc_ns: int) -> Call[ReplayPictures]:
+    request = recording_pb2.GetReplayPicturesRequest(player=player, link=link, utc_ns=utc_ns)
+    return Call("recording", "GetReplayPictures", request, replay_pictures_from)

@@ -1,0 +1,356 @@
+"""The client that blocks. SI units: m, N, Pa, s, rad; times in ns since 1970-01-01 UTC."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from types import TracebackType
+
+import grpc
+
+from taclink import _calls, _channel, _requests, errors
+from taclink._blocking import Connection
+from taclink._calls import SLOW_S
+from taclink._channel import DEFAULT_ADDRESS, FilePath
+from taclink._download import Download
+from taclink._reconnect import OnReconnect, attempts
+from taclink.messages.arm import Arm
+from taclink.messages.baseline import CalibrationResult, LinkTare, calibration_from
+from taclink.messages.events import EventPlace
+from taclink.messages.force_level import ForceLevelState
+from taclink.messages.others import Caller
+from taclink.messages.recording import Log, LogDescription, RecorderStatus
+from taclink.streams import (
+    ContactStream,
+    EventStream,
+    FrameStream,
+    JointStateWriter,
+    PressureWriter,
+    PreviewStream,
+    Replay,
+)
+from taclink.v1 import contacts_pb2, preview_pb2
+
+
+class Client:
+    """A connection to one server; `with Client() as client:`, or close().
+
+    address: host:port, or unix:PATH. It is connected to with the first call.
+    token: shows who calls; never sent in the clear to another machine.
+    ca_file: PEM; the server's certificate must be signed by one of these. None: no TLS.
+    certificate_file, key_file: PEM; this client's own, for servers that ask for one.
+    timeout: s that a call, or the beginning of a stream, may take. What takes longer by nature has its own.
+
+    Errors of all methods, beside those they name (all TaclinkError): Unavailable, Timeout, Unauthenticated,
+    PermissionDenied; of streams also ResourceExhausted. Errors of the constructor: InvalidArgument, NotFound (a file).
+    Calls may come from several threads; one stream belongs to one.
+    """
+
+    def __init__(
+        self,
+        address: str = DEFAULT_ADDRESS,
+        *,
+        token: str | None = None,
+        ca_file: FilePath | None = None,
+        certificate_file: FilePath | None = None,
+        key_file: FilePath | None = None,
+        timeout: float = 10.0,
+    ) -> None:
+        settings = _channel.settings(address, token, ca_file, certificate_file, key_file)
+        self._connection = Connection(settings, timeout)
+
+    @property
+    def address(self) -> str:
+        """As given."""
+        return self._connection.address
+
+    def close(self) -> None:
+        """Ends all streams of this client, too."""
+        self._connection.close()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # What the arm is and does.
+
+    def arm(self) -> Arm:
+        """The links, their models and poses, how they do now; joints of the URDF."""
+        return self._connection.ask(_calls.arm())
+
+    def frames(
+        self,
+        links: str | Iterable[str] = (),
+        detail: str = "contacts",
+        *,
+        max_rate_hz: float = 0,
+        every: bool = False,
+        deadband_force_n: float = 0,
+        deadband_move_m: float = 0,
+        reconnect: bool = False,
+        on_reconnect: OnReconnect = None,
+    ) -> FrameStream:
+        """Frames of links as they are solved; link frame.
+
+        links: names; none: all. detail: "contacts", "geometry" (and positions) or "full" (and displacements,
+        covariances, nodal forces). max_rate_hz: of each link; 0: all. every: all wait in order in a bounded
+        queue; else only the newest of each link waits. A link that changes by less than the deadbands (N of a
+        contact's force, m of a marker) is sent once a second only (Frame.unchanged); both 0: always.
+        reconnect: a broken stream is opened anew, with growing pauses, until it is closed; before each try
+        on_reconnect(error, attempt, delay_s) is called. The first opening is not retried.
+
+        Errors: NotFound (no such link), InvalidArgument.
+        """
+        request = _requests.frames(links, detail, max_rate_hz, every, deadband_force_n, deadband_move_m)
+        return FrameStream(
+            self._connection, request, self._connection.timeout_s, attempts(reconnect, on_reconnect)
+        )
+
+    def contacts(
+        self, max_rate_hz: float = 0, *, reconnect: bool = False, on_reconnect: OnReconnect = None
+    ) -> ContactStream:
+        """All contacts of the arm in its base frame, and the joint torques that they cause.
+
+        The first at once, then whenever a link publishes, at most max_rate_hz (0: no limit) and at least once a
+        second. reconnect: as of frames().
+        """
+        request = contacts_pb2.StreamContactsRequest(max_rate_hz=max_rate_hz)
+        return ContactStream(
+            self._connection, request, self._connection.timeout_s, attempts(reconnect, on_reconnect)
+        )
+
+    def events(
+        self,
+        links: str | Iterable[str] = (),
+        kinds: str | Iterable[str] = (),
+        *,
+        after: EventPlace | None = None,
+        reconnect: bool = False,
+        on_reconnect: OnReconnect = None,
+    ) -> EventStream:
+        """What happens to links, each event at least once.
+
+        links, kinds: names (kinds: of EventKind); none: all. after: what came after that place, for which
+        EventStream.place is; EventPlace(): all that the server still has; None: from now on. reconnect: as of
+        frames(); the stream goes on after the last event that was had.
+
+        Errors: NotFound (no such link), InvalidArgument.
+        """
+        request = _requests.events(links, kinds, after)
+        return EventStream(
+            self._connection, request, self._connection.timeout_s, attempts(reconnect, on_reconnect)
+        )
+
+    def preview(self, link: str, max_rate_hz: float = 0) -> PreviewStream:
+        """What a link's cameras see, and the markers found there; at most max_rate_hz (to 30; 0: 5) a second.
+
+        Errors, at the first picture: NotFound (no such link), InvalidArgument, Refused (a log is played).
+        """
+        request = preview_pb2.StreamPreviewRequest(link=link, max_rate_hz=max_rate_hz)
+        return PreviewStream(self._connection, request, self._connection.timeout_s)
+
+    def caller(self) -> Caller:
+        """Who the server takes this client for."""
+        return self._connection.ask(_calls.caller())
+
+    # What operators do.
+
+    def tare(
+        self,
+        links: str | Iterable[str] = (),
+        *,
+        force: bool = False,
+        frames: int = 10,
+        timeout: float = SLOW_S,
+    ) -> tuple[LinkTare, ...]:
+        """Makes what the links show now (none: all) their untouched skins, each accepted or refused for itself.
+
+        force: even while touched, moved or with few markers. frames: to average over, 1 to 300.
+        Errors: NotFound (no such link), InvalidArgument.
+        """
+        return self._connection.ask(_calls.tare(links, force, frames, timeout))
+
+    def calibrate(
+        self,
+        link: str,
+        *,
+        pairs: int = 8,
+        save: bool = False,
+        force: bool = False,
+        on_progress: Callable[[int, int], object] | None = None,
+        timeout: float = SLOW_S,
+    ) -> CalibrationResult:
+        """Finds a link's cameras and rest shape anew; nothing may touch its skin. Waits for the end.
+
+        pairs: of pictures to average over, 1 to 300. save: also write the link's configured calibration file on
+        the server. force: even if the newest frame shows contacts. on_progress(taken, wanted): as pairs are
+        taken; an exception in it cancels, and then the link stays as it was.
+        Errors: NotFound (no such link), InvalidArgument, Refused (touched, moved, does not fit: the message says).
+        """
+        request = _calls.calibrate_request(link, pairs, save, force)
+        channel = self._connection.channel()
+        call = channel.start("tactile", "Calibrate", request, timeout)
+        try:
+            for message in call:
+                if message.WhichOneof("message") == "result":
+                    return calibration_from(message.result)
+                if on_progress is not None:
+                    on_progress(message.progress.pairs_taken, message.progress.pairs_wanted)
+        except grpc.RpcError as error:
+            raise self._connection.failure(error, channel) from error
+        finally:
+            call.cancel()
+        raise errors.Internal("the server ended the calibration without a result")
+
+    def set_thresholds(
+        self,
+        link: str,
+        *,
+        warning_n: float = 0,
+        alarm_n: float = 0,
+        hysteresis_n: float = 0.05,
+        region: str = "",
+    ) -> ForceLevelState:
+        """Force thresholds (N; 0: no such level) of a link, or of a region of it, until the server ends.
+
+        Errors: NotFound (no such link or region), InvalidArgument.
+        """
+        return self._connection.ask(_calls.set_thresholds(link, warning_n, alarm_n, hysteresis_n, region))
+
+    def set_force_model(self, link: str, model: str, *, timeout: float = SLOW_S) -> None:
+        """Computes the link's forces by "linear", "pressurised", "nonlinear" or "literal" until the server ends.
+
+        Errors: NotFound (no such link), InvalidArgument, Refused (a log is played).
+        """
+        self._connection.ask(_calls.set_force_model(link, model, timeout))
+
+    def set_camera(
+        self,
+        link: str,
+        camera: str = "",
+        *,
+        automatic_exposure: bool = False,
+        exposure_s: float | None = None,
+        gain: int | None = None,
+        timeout: float = SLOW_S,
+    ) -> None:
+        """How "top", "bottom" or (empty) both expose, until the server ends; what is not given stays.
+
+        exposure_s: in steps of 0.1 ms. gain: in the camera's own units. Errors: NotFound (no such link),
+        InvalidArgument (also what the camera does not take), Refused (a log is played), Unsupported (nothing to set).
+        """
+        self._connection.ask(
+            _calls.set_camera(link, camera, automatic_exposure, exposure_s, gain, timeout)
+        )
+
+    def restart_link(self, link: str) -> None:
+        """A fresh source and processor for a link; arm() tells how it goes. Errors: NotFound (no such link)."""
+        self._connection.ask(_calls.restart_link(link))
+
+    def update_joint_states(self) -> JointStateWriter:
+        """Begins to tell the server where the arm's joints are."""
+        return JointStateWriter(self._connection)
+
+    def update_pressure(self) -> PressureWriter:
+        """Begins to tell the server the pressure inside skins."""
+        return PressureWriter(self._connection)
+
+    # Recordings; they lie on the server.
+
+    def start_recording(
+        self,
+        name: str = "",
+        *,
+        links: str | Iterable[str] = (),
+        pictures: bool = False,
+        compression: str = "configured",
+        note: str = "",
+        timeout: float = SLOW_S,
+    ) -> RecorderStatus:
+        """name: part of the logs' names; empty: the arm's. links: none: all. compression: "none", "zstd" or "lz4".
+
+        Errors: Refused (one is under way; no folder is configured), InvalidArgument, NotFound (no such link).
+        """
+        return self._connection.ask(
+            _calls.start_recording(name, links, pictures, compression, note, timeout)
+        )
+
+    def stop_recording(self, *, timeout: float = SLOW_S) -> RecorderStatus:
+        """Returns when the last log is closed. Errors: Refused (none is under way)."""
+        return self._connection.ask(_calls.stop_recording(timeout))
+
+    def recorder(self) -> RecorderStatus:
+        """How the server's recorder does."""
+        return self._connection.ask(_calls.recorder())
+
+    def logs(self, *, timeout: float = SLOW_S) -> tuple[Log, ...]:
+        """In the server's folder, oldest first."""
+        return self._connection.ask(_calls.logs(timeout))
+
+    def describe_log(self, log: str, *, timeout: float = SLOW_S) -> LogDescription:
+        """What a log holds. Errors: NotFound, DataLoss (damaged)."""
+        return self._connection.ask(_calls.describe_log(log, timeout))
+
+    def download_log(
+        self,
+        log: str,
+        path: FilePath,
+        *,
+        on_progress: Callable[[int, int], object] | None = None,
+    ) -> Path:
+        """Copies a log into the file or folder `path`; returns the file's path.
+
+        Until it is whole it lies in FILE.download, from which the same call goes on after a break. A file that is
+        there is replaced. on_progress(bytes, of). Errors: NotFound, Unavailable (broke off), OSError (the file).
+        """
+        with Download(log, path) as download:
+            channel = self._connection.channel()
+            call = channel.start("recording", "DownloadLog", download.request())
+            try:
+                for piece in call:
+                    download.take(piece)
+                    if on_progress is not None:
+                        on_progress(download.taken, download.size)
+            except grpc.RpcError as error:
+                raise download.explained(self._connection.failure(error, channel)) from error
+            finally:
+                call.cancel()
+            return download.finish()
+
+    def delete_log(self, log: str) -> None:
+        """Errors: NotFound, Refused (it is being written)."""
+        self._connection.ask(_calls.delete_log(log))
+
+    def replay(
+        self,
+        log: str,
+        *,
+        links: str | Iterable[str] = (),
+        detail: str = "full",
+        from_utc_ns: int = 0,
+        to_utc_ns: int = 0,
+        speed: float = 1,
+        loop: bool = False,
+        paused: bool = False,
+        frames: bool = True,
+        events: bool = True,
+        contacts: bool = True,
+        arm: bool = True,
+        timeout: float = SLOW_S,
+    ) -> Replay:
+        """Plays a log: what frames(), contacts() and events() gave then, at its pace, with the times of then.
+
+        links: of frames and events; none: all. from_utc_ns, to_utc_ns: times of the log, both included; 0: its
+        first, its last. speed: 0.1 to 100; 0: as fast as it is read. loop: begins anew at the end of the range.
+        paused: begins so. frames, events, contacts, arm: wanted. timeout: for opening the log.
+        Errors: NotFound (no such log or link), InvalidArgument (range, speed), DataLoss (damaged beyond reading).
+        """
+        without = {"frames": not frames, "events": not events, "contacts": not contacts, "arm": not arm}
+        request = _requests.replay(
+            log, links, detail, from_utc_ns, to_utc_ns, speed, loop, paused, without
+        )
+        return Replay(self._connection, request, timeout)

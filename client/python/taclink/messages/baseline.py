@@ -1,0 +1,60 @@
+"""Against what displacements and forces are measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from taclink.messages.arrays import alike
+from taclink.names import BaselineOrigin, DriftState, name_of
+from taclink.v1 import tactile_pb2, tare_pb2
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, slots=True)
+class Baseline:
+    origin: BaselineOrigin
+    taken_utc_ns: int  # since 1970-01-01; 0: there is none
+    drift_m: float  # how far it has followed the skin since, of the marker that went furthest
+    drift_state: DriftState
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, slots=True)
+class LinkTare:
+    """What became of one link's tare."""
+
+    link: str
+    accepted: bool  # False: the old baseline stays
+    reason: str  # why not, and what to do
+    forced: bool  # force was needed
+    frames: int
+    shift_m: float  # against the old baseline, of the marker that is furthest off
+    previous_age_s: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, slots=True)
+class CalibrationResult:
+    """How well a link's cameras fit its rest markers; RMS."""
+
+    markers_used: int  # seen by both cameras
+    rms_px: float  # of the reprojection, each axis
+    rmse_r_m: float  # of the triangulated markers: from the axis, around it, along it
+    rmse_tangential_m: float
+    rmse_z_m: float
+    file_text: str  # of the calibration file (YAML)
+    saved_to: str  # on the server; empty: nowhere
+
+
+def baseline_from(message: tare_pb2.Baseline) -> Baseline:
+    return alike(
+        Baseline,
+        message,
+        origin=name_of(BaselineOrigin, message.origin),
+        drift_state=name_of(DriftState, message.drift_state),
+    )
+
+
+def tares_from(message: tare_pb2.TareResponse) -> tuple[LinkTare, ...]:
+    return tuple(alike(LinkTare, link) for link in message.links)
+
+
+def calibration_from(message: tactile_pb2.CalibrationResult) -> CalibrationResult:
+    return alike(CalibrationResult, message)

@@ -1,0 +1,214 @@
+"""All that one moment told about one link."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from taclink.messages.arrays import (
+    ByteArray,
+    FloatArray,
+    IntArray,
+    alike,
+    covariance,
+    covariances,
+    numbers,
+    optional,
+    rows,
+    small_numbers,
+    vector,
+    whole_numbers,
+)
+from taclink.messages.baseline import Baseline, baseline_from
+from taclink.names import (
+    AcquireReason,
+    Detail,
+    ForceModel,
+    LinkStatus,
+    PressureOrigin,
+    TrackingMode,
+    name_of,
+)
+from taclink.v1 import frame_pb2, pressure_pb2, tactile_pb2
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, slots=True)
+class Contact:
+    """A connected region of the skin that something pushes on; link frame."""
+
+    id: int  # lasts while the contact does
+    center_m: FloatArray  # (3,), on the deformed outer surface
+    normal: FloatArray  # (3,), unit, away from the axis
+    force_n: FloatArray  # (3,), what the world exerts on the skin
+    force_covariance_n2: FloatArray | None  # (3, 3); None: not known
+    center_covariance_m2: FloatArray | None  # (3, 3); likewise
+    normal_force_n: float  # pressing in is positive
+    area_m2: float
+    markers: IntArray  # (k,), indices of the loaded markers
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class FrameTimes:
+    """ns; 0: has not happened. utc: since 1970-01-01; all else: the server's CLOCK_MONOTONIC."""
+
+    exposure_utc_ns: int
+    exposure_ns: int
+    received_ns: int
+    tracked_ns: int
+    solved_ns: int
+    published_ns: int
+    client_utc_ns: int  # this client had it; 0: it comes from a log
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StageTimes:
+    """How long each stage took, s; 0: did not run."""
+
+    decode_s: float
+    detect_s: float
+    register_s: float
+    reconstruct_s: float
+    force_s: float
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CameraCounts:
+    """What one camera's picture gave."""
+
+    detections: int
+    labelled: int
+    share_read: float  # of the picture's pixels, 0 to 1
+    verified: int
+    measured: int
+    searched: int
+    found: int
+    dropped: int
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PressureReport:
+    """How the pressure inside a skin is known."""
+
+    origin: PressureOrigin
+    assumed: bool  # configured, or taken as 0: not measured
+    stale: bool  # the sensor's newest reading is too old, or there is none
+    pressure_pa: float  # gauge
+    age_s: float | None  # from the reading to the exposure; None: there is no reading
+    trouble: str  # empty: nothing
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, slots=True)
+class Frame:
+    """Vectors are in the link frame; arrays by marker have no rows below their detail, or where nothing is measured."""
+
+    link: str
+    link_index: int
+    sequence: int  # counts exposures of this link's source
+    # Exposures of the link between its frame before in this stream and this one: not solved, dropped, or left out
+    # as the stream asked for. None: there is no frame before, or the count has begun anew.
+    gap: int | None
+    times: FrameTimes
+    status: LinkStatus
+    status_reason: str  # empty when the status is OK
+    detail: Detail
+    pressure_pa: float | None  # gauge; None: not measured
+    pressure: PressureReport | None  # None: a frame without a picture
+    markers_seen: int
+    markers_inferred: int
+    contacts: tuple[Contact, ...]
+    total_force_n: FloatArray  # (3,)
+    force_model: ForceModel
+    baseline_age_s: float
+    baseline: Baseline
+    stage_times: StageTimes
+    cameras: tuple[CameraCounts, ...]  # top, bottom
+    tracking_mode: TrackingMode
+    acquire_reason: AcquireReason
+    labels_rejected: int
+    unchanged: bool  # within the stream's deadband
+    replayed: bool  # from a log: the times are those of then
+    # Detail geometry.
+    positions_m: FloatArray  # (markers, 3), on the deformed skin
+    # Detail full.
+    displacements_m: FloatArray  # (markers, 3), from the baseline
+    displacement_covariances_m2: FloatArray  # (markers, 3, 3)
+    nodal_forces_n: FloatArray  # (markers, 3)
+    nodal_force_sigmas_n: FloatArray  # (markers,), along the normal; 0 where the force is 0
+    marker_sources: ByteArray  # (markers,), of MarkerSource
+    force_residual: float  # RMS that the forces do not explain, in standard deviations
+    force_converged: bool
+
+    @property
+    def latency_s(self) -> float | None:
+        """From exposure to this client; right as far as both machines' clocks agree. None: not known."""
+        if self.times.exposure_utc_ns == 0 or self.times.client_utc_ns == 0 or self.replayed:
+            return None
+        return (self.times.client_utc_ns - self.times.exposure_utc_ns) * 1e-9
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StreamCounts:
+    """Frames of a link since the stream began, as the server counts them."""
+
+    link: str
+    frames_sent: int
+    frames_dropped: int  # because this client was too slow
+    frames_dropped_for_bytes: int  # of these, because of the bytes that waited, not their number
+    frames_unchanged: int  # left out because of the deadband
+
+
+def times_from(message: frame_pb2.FrameTimes, client_utc_ns: int) -> FrameTimes:
+    return alike(FrameTimes, message, client_utc_ns=client_utc_ns)
+
+
+def _contact_from(message: frame_pb2.Contact) -> Contact:
+    return alike(
+        Contact,
+        message,
+        center_m=vector(message.center_m),
+        normal=vector(message.normal),
+        force_n=vector(message.force_n),
+        force_covariance_n2=covariance(message.force_covariance_n2),
+        center_covariance_m2=covariance(message.center_covariance_m2),
+        markers=whole_numbers(message.markers),
+    )
+
+
+def _pressure_from(message: pressure_pb2.PressureReport) -> PressureReport:
+    return alike(
+        PressureReport,
+        message,
+        origin=name_of(PressureOrigin, message.origin),
+        age_s=optional(message, "age_s"),
+    )
+
+
+def frame_from(message: frame_pb2.LinkFrame, client_utc_ns: int = 0, gap: int | None = None) -> Frame:
+    return alike(
+        Frame,
+        message,
+        gap=gap,
+        times=times_from(message.times, client_utc_ns),
+        status=name_of(LinkStatus, message.status),
+        detail=name_of(Detail, message.detail),
+        pressure_pa=optional(message, "pressure_pa"),
+        pressure=_pressure_from(message.pressure) if message.HasField("pressure") else None,
+        contacts=tuple(map(_contact_from, message.contacts)),
+        total_force_n=vector(message.total_force_n),
+        force_model=name_of(ForceModel, message.force_model),
+        baseline=baseline_from(message.baseline),
+        stage_times=alike(StageTimes, message.stage_times),
+        cameras=tuple(alike(CameraCounts, camera) for camera in message.cameras),
+        tracking_mode=name_of(TrackingMode, message.tracking_mode),
+        acquire_reason=name_of(AcquireReason, message.acquire_reason),
+        positions_m=rows(message.positions_m, 3),
+        displacements_m=rows(message.displacements_m, 3),
+        displacement_covariances_m2=covariances(message.displacement_covariances_m2),
+        nodal_forces_n=rows(message.nodal_forces_n, 3),
+        nodal_force_sigmas_n=numbers(message.nodal_force_sigmas_n),
+        marker_sources=small_numbers(message.marker_sources),
+        force_converged=not message.force_not_converged,
+    )
+
+
+def counts_from(message: tactile_pb2.StreamStatus) -> tuple[StreamCounts, ...]:
+    return tuple(alike(StreamCounts, link) for link in message.links)

@@ -1,0 +1,77 @@
+"""The examples, as a user runs them."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import server as servers
+
+ALL = sorted(path.name for path in servers.EXAMPLES.glob("*.py") if path.name != "common.py")
+
+
+def test_print_contacts(server: servers.Server, touched: None, library: Path, tmp_path: Path) -> None:
+    options = ("--server", server.address, "--count", "2", "--rate", "10")
+    done = servers.run_example(library, tmp_path, "print_contacts.py", *options)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0] == "test: 2 links"
+    assert re.match(r"  pressed +ok +cylinder, 24 x 10 markers, 198 mm", lines[1])
+    assert lines[3] == "-- 1 contacts, 0.20 N together"
+    assert re.match(r"pressed +#\d+ +0\.20 N +at \( *-?[\d.]+, *-?[\d.]+, *-?[\d.]+\) mm +\d+ mm2", lines[4])
+    assert len(lines) == 7
+
+
+def test_record_and_replay(server: servers.Server, touched: None, library: Path, tmp_path: Path) -> None:
+    done = servers.run_example(library, tmp_path, "record_and_replay.py", "--server", server.address, "--seconds", "2")
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"^  \S+\.mcap  \d+\.\d s  \S*(pressed|idle).* \d+ frames$", done.stdout, re.MULTILINE)
+    assert re.search(r"^\d{19}  pressed +frame \d+   0\.20 N$", done.stdout, re.MULTILINE)
+    assert done.stdout.splitlines()[-1] == "end of the log"
+
+
+def test_live_plot(server: servers.Server, touched: None, library: Path, tmp_path: Path) -> None:
+    options = ("--server", server.address, "--seconds", "1", "--save", "plot.png")
+    done = servers.run_example(library, tmp_path, "live_plot.py", *options)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "plot.png written\n"
+    assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "plot.png").stat().st_size > 5000
+
+
+def test_async_contacts(server: servers.Server, touched: None, library: Path, tmp_path: Path) -> None:
+    expected = [r"event 1: link_status of (pressed|idle)\n", r"pressed +ok +1 contacts  0\.20 N  \d+\.\d ms old\n"]
+    process = subprocess.Popen(
+        [sys.executable, str(servers.EXAMPLES / "async_contacts.py"), "--server", server.address, "--seconds", "100"],
+        env=servers.environment_of(library, tmp_path),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            expected = [pattern for pattern in expected if not re.fullmatch(pattern, line)]
+            if not expected:
+                break
+        process.send_signal(signal.SIGINT)
+        process.stdout.read()
+        assert process.wait(servers.PATIENCE_S) == 0
+    assert expected == []
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_without_a_server_one_line_says_so(name: str, library: Path, tmp_path: Path) -> None:
+    done = servers.run_example(library, tmp_path, name, "--server", f"unix:{tmp_path}/none")
+    assert done.returncode == 1
+    assert re.fullmatch(r"no server answers at .*; start taclinkd there .*\n", done.stderr)
+
+
+def test_credentials_that_cannot_be_used_are_one_line(library: Path, tmp_path: Path) -> None:
+    done = servers.run_example(library, tmp_path, "print_contacts.py", "--server", "robot:50051", "--token", "secret")
+    assert done.returncode == 1 and done.stderr.endswith("in the clear; use TLS (ca_file)\n")
+    done = servers.run_example(library, tmp_path, "print_contacts.py", "--tls-ca", "none.pem")
+    assert done.returncode == 1 and done.stderr.startswith("none.pem cannot be read")

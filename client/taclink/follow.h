@@ -1,0 +1,68 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "taclink/arm_contacts.h"
+#include "taclink/client.h"
+#include "taclink/events.h"
+
+/// Streams that are handed to callbacks and begin anew when the server goes away and comes back.
+namespace taclink::client {
+
+/// Why nothing comes now, and when it is tried again.
+struct Disconnection {
+  Error error;
+  int attempt = 0;                     ///< since something came last, from 1
+  std::chrono::milliseconds delay{0};  ///< until the next
+};
+
+/// Callbacks run on the subscription's own thread, one at a time; they may be empty and must not throw.
+struct FollowOptions {
+  std::string address = "127.0.0.1:50051";
+  Credentials credentials = {};
+  /// Each attempt waits twice as long as the one before, within these, a fifth more or less at random so that
+  /// many clients do not come back at once.
+  std::chrono::milliseconds first_delay{250}, longest_delay{10'000};
+  std::function<void()> on_connected = {};  ///< the server has accepted, for the first time or again
+  std::function<void(const Disconnection&)> on_disconnected = {};
+  /// The server refuses for good (kInvalidArgument, kNotFound, kUnauthenticated, kPermissionDenied,
+  /// kUnsupported, or files that cannot be read): the subscription has ended.
+  std::function<void(const Error&)> on_refused = {};
+};
+
+/// Ends with it. Not to be destroyed or moved from by its own callbacks; they may call Stop.
+class Subscription {
+ public:
+  ~Subscription();
+  Subscription(const Subscription&) = delete;
+  Subscription& operator=(const Subscription&) = delete;
+
+  /// No callback runs after it returns, but the one that calls it. May take 3 s while there is no server.
+  void Stop();
+  /// By Stop or because the server refused.
+  bool ended() const;
+
+  class Worker;  // internal to the library
+  explicit Subscription(std::unique_ptr<Worker> worker);
+
+ private:
+  std::unique_ptr<Worker> worker_;
+};
+
+/// What was published while there was no connection is missing: Frame::sequence shows the gap.
+std::unique_ptr<Subscription> FollowFrames(FollowOptions options, StreamOptions stream,
+                                           std::function<void(const Frame&)> on_frame);
+
+/// `max_rate_hz` 0: whenever a link publishes.
+std::unique_ptr<Subscription> FollowContacts(FollowOptions options, double max_rate_hz,
+                                             std::function<void(const ArmContacts&)> on_contacts);
+
+/// Goes on after the event that came last: none is missed as long as the server still has it in its history
+/// and was not started anew.
+std::unique_ptr<Subscription> FollowEvents(FollowOptions options, EventOptions events,
+                                           std::function<void(const Event&)> on_event);
+
+}  // namespace taclink::client

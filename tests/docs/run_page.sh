@@ -1,0 +1,28 @@
+# Runs a page's blocks of `sh` in order, in a folder of their own, beside a server with the simulated arm where the page
+# talks to one: run_page.sh PAGE BIN-FOLDER
+set -euo pipefail
+page=$1 bin=$2
+folder=$(mktemp -d)
+server=
+trap '[ -z "$server" ] || kill "$server"; rm -rf "$folder"' EXIT
+awk '/^```sh$/ {on = 1; next} /^```/ {on = 0} on' "$page" >"$folder/page.sh"
+[ -s "$folder/page.sh" ] || { echo "$page has no blocks of sh" >&2; exit 1; }
+cd "$folder"
+export PATH=$bin:$PATH XDG_STATE_HOME=$folder/state
+
+if grep -qE 'taclink (list|watch|contacts|events|record|tare|set|thresholds)' page.sh; then
+  taclinkd --listen 127.0.0.1:0 --http-listen 127.0.0.1:0 >server.log 2>&1 &
+  server=$!
+  for ((i = 0; i < 1200; i++)); do
+    address=$(sed -n 's/.*listening on \(127.*\)/\1/p' server.log)
+    if [ -n "$address" ]; then
+      export TACLINK_SERVER=$address
+      # All links measure.
+      taclink list | awk 'NR > 1 && $2 != "ok" {waits = 1} END {exit waits}' && break
+    fi
+    kill -0 "$server" || { cat server.log; exit 1; }
+    sleep 0.1
+  done
+  [ "$i" -lt 1200 ] || { echo "the server's links do not measure" >&2; cat server.log; exit 1; }
+fi
+bash -euo pipefail -x page.sh
