@@ -96,7 +96,8 @@ bool GoodName(const std::string& name) {
 LinkConfig Reader::ReadLink(YamlMap link) const {
   LinkConfig config;
   config.name = link.Text("name");
-  if (!GoodName(config.name)) link.Fail("name", "must be 1 to 64 letters, digits, '_', '-' or '.'");
+  if (link.Has("name") && !GoodName(config.name))
+    link.Fail("name", "must be 1 to 64 letters, digits, '_', '-' or '.'");
   config.model = NameOrPath(link.Text("model"));
   config.source = ReadSource(link);
   if (link.Has("calibration")) config.calibration = Path(link.Text("calibration"));
@@ -134,7 +135,8 @@ void ReadServer(YamlMap& root, Config& config) {
 void ReadArm(YamlMap& root, const Reader& reader, Config& config) {
   YamlMap arm = root.Map("arm");
   config.arm_name = arm.Text("name");
-  if (!GoodName(config.arm_name)) arm.Fail("name", "must be 1 to 64 letters, digits, '_', '-' or '.'");
+  if (arm.Has("name") && !GoodName(config.arm_name))
+    arm.Fail("name", "must be 1 to 64 letters, digits, '_', '-' or '.'");
   config.kinematics = ReadKinematics(arm, reader.folder);
   std::set<std::string> names;
   for (YamlMap& link : arm.Maps("links")) {

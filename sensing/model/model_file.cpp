@@ -136,7 +136,7 @@ Result<LinkModel> ReadLinkModel(YamlFile file) {
   LinkModel model;
   const int version = root.Integer("taclink_model", {.min = 1, .max = kFormatVersion});
   model.name = root.Text("name");
-  model.description = root.Text("description", "");
+  model.description = root.Prose("description", "");
   ReadSkin(root.Map("skin"), version, model);
   if (auto good = file.Finish(); !good) return good.error();
   ReadMarkers(root.Map("markers"), model);

@@ -106,7 +106,7 @@ Result<Scene> ReadScene(YamlFile file) {
   Scene scene;
   root.Integer("taclink_scene", {.min = kFormatVersion, .max = kFormatVersion});
   scene.name = root.Text("name");
-  scene.description = root.Text("description", "");
+  scene.description = root.Prose("description", "");
   scene.model = root.Text("model", "cylinder");
   scene.skin =
       root.Choice("skin", {"linear", "nonlinear"}, 1) == 0 ? SkinKind::kLinear : SkinKind::kNonlinear;

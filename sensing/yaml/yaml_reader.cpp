@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <sstream>
+#include <type_traits>
 
 namespace taclink {
 namespace {
@@ -23,6 +24,10 @@ std::string Shown(double value) {
   std::ostringstream out;
   out << value;
   return out.str();
+}
+
+bool IsControl(char c) {
+  return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
 }
 
 // After a failure readers go on to the end: with numbers that they can count with.
@@ -60,9 +65,10 @@ YAML::Node YamlMap::Find(const std::string& key, bool required) {
 
 void YamlMap::FailAt(const YAML::Node& node, const std::string& key, const std::string& what) {
   if (context_->error && !context_->only_missing) return;
-  context_->error =
-      Error{ErrorCode::kInvalidArgument,
-            context_->file + ":" + std::to_string(LineOf(node, line_)) + ": '" + path_ + key + "' " + what};
+  std::string message =
+      context_->file + ":" + std::to_string(LineOf(node, line_)) + ": '" + path_ + key + "' " + what;
+  std::replace_if(message.begin(), message.end(), IsControl, ' ');  // a message is one line
+  context_->error = Error{ErrorCode::kInvalidArgument, std::move(message)};
   context_->only_missing = false;
 }
 
@@ -78,7 +84,16 @@ template <typename T>
 T YamlMap::Scalar(const std::string& key, const YAML::Node& node, const char* expected) {
   if (!node.IsDefined()) return {};
   T value{};
-  if (node.IsScalar() && YAML::convert<T>::decode(node, value)) return value;
+  if (node.IsScalar() && YAML::convert<T>::decode(node, value)) {
+    if constexpr (std::is_same_v<T, std::string>) {
+      if (std::any_of(value.begin(), value.end(), IsControl)) {
+        FailAt(node, key,
+               "must be on one line, without control characters (is a quote or a bracket missing?)");
+        return {};
+      }
+    }
+    return value;
+  }
   FailAt(node, key,
          std::string("must be ") + expected + (node.IsScalar() ? ", not '" + node.Scalar() + "'" : ""));
   return {};
@@ -135,6 +150,17 @@ std::string YamlMap::Text(const std::string& key) {
 std::string YamlMap::Text(const std::string& key, std::string fallback) {
   asked_.insert(key);
   return Has(key) ? Text(key) : fallback;
+}
+
+std::string YamlMap::Prose(const std::string& key, std::string fallback) {
+  const YAML::Node node = Find(key, false);
+  if (!node.IsDefined()) return fallback;
+  std::string text;
+  if (!node.IsScalar() || !YAML::convert<std::string>::decode(node, text))
+    FailAt(node, key, "must be a text");
+  std::replace_if(text.begin(), text.end(), IsControl, ' ');
+  text.erase(text.find_last_not_of(' ') + 1);
+  return text;
 }
 
 size_t YamlMap::Choice(const std::string& key, const std::vector<std::string_view>& choices) {

@@ -36,8 +36,11 @@ class YamlMap {
   int Integer(const std::string& key, Range range = {});
   int Integer(const std::string& key, int fallback, Range range = {});
   bool Bool(const std::string& key, bool fallback);
+  /// On one line, without control characters: names and paths.
   std::string Text(const std::string& key);
   std::string Text(const std::string& key, std::string fallback);
+  /// May be written on several lines; returned on one.
+  std::string Prose(const std::string& key, std::string fallback);
   /// One of `choices`; returns its position.
   size_t Choice(const std::string& key, const std::vector<std::string_view>& choices);
   size_t Choice(const std::string& key, const std::vector<std::string_view>& choices, size_t fallback);

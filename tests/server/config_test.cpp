@@ -263,6 +263,9 @@ TEST(Config, MistakesAreNamedWithFileAndLine) {
   EXPECT_THAT(Complaint(Replaced(kGood, "\"[::1]:80\"", "unix:/a")), HasSubstr("not a unix socket"));
   EXPECT_THAT(Complaint(Replaced(kGood, "idle_timeout_s: 2.5", "idle_timeout_s: 0")),
               HasSubstr("idle_timeout_s"));
+  EXPECT_THAT(Complaint(Replaced(kGood, "folder: pictures", "folder: \"pic\\ntures\"")),
+              HasSubstr("on one line"));
+  EXPECT_THAT(Complaint(Replaced(kGood, "name: lower", "\"na\\nme\": lower")), HasSubstr("[1].na me'"));
   EXPECT_THAT(Complaint("taclink_config: 1\narm: {name: a}\n"), HasSubstr("at least one link"));
   EXPECT_THAT(Complaint("taclink_config: 1\n"), HasSubstr("arm"));
   EXPECT_THAT(Complaint(""), HasSubstr("mapping"));
