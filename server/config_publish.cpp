@@ -16,12 +16,12 @@ bool IsToken(const std::string& text) {
   });
 }
 
-void CheckUrl(YamlMap& map, const std::string& urls) {
+void CheckUrl(YamlMap& map, const char* key, const std::string& urls) {
   for (const std::string& url : SplitUrls(urls)) {
     if (!url.starts_with("nats://") && !url.starts_with("tls://"))
-      map.Fail("url", "must be nats://HOST:PORT or tls://HOST:PORT, several with commas between");
+      map.Fail(key, "must be nats://HOST:PORT or tls://HOST:PORT, several with commas between");
     if (url.find('@') != std::string::npos)
-      map.Fail("url", "must not hold a password; use token_file or credentials");
+      map.Fail(key, "must not hold a password; use token_file or credentials");
   }
 }
 
@@ -40,13 +40,19 @@ std::vector<std::string> SplitUrls(const std::string& urls) {
 PublishConfig ReadPublish(YamlMap& root, const std::function<std::string(const std::string&)>& path) {
   PublishConfig config;
   if (!root.Has("publish")) return config;
+  if (root.HasScalar("publish")) {
+    config.url = root.Text("publish");
+    config.stream = "TACLINK_" + config.site;
+    CheckUrl(root, "publish", config.url);
+    return config;
+  }
   YamlMap map = root.Map("publish");
   const auto file = [&](const char* key) {
     const std::string name = map.Text(key, "");
     return name.empty() ? name : path(name);
   };
   config.url = map.Text("url");
-  if (!config.url.empty()) CheckUrl(map, config.url);
+  if (!config.url.empty()) CheckUrl(map, "url", config.url);
   config.site = map.Text("site", config.site);
   if (!IsToken(config.site)) map.Fail("site", "must be letters, digits, '-' and '_'");
   config.stream = map.Text("stream", "TACLINK_" + config.site);

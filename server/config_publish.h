@@ -29,7 +29,7 @@ struct PublishConfig {
 /// PublishConfig::url in its parts.
 std::vector<std::string> SplitUrls(const std::string& urls);
 
-/// `path` makes a path of the file usable.
+/// A mapping, or the URL alone. `path` makes a path of the file usable.
 PublishConfig ReadPublish(YamlMap& root, const std::function<std::string(const std::string&)>& path);
 void WritePublish(std::ostream& out, const PublishConfig& config);
 

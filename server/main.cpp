@@ -16,6 +16,7 @@
 #include "server/config.h"
 #include "server/gateway/setup.h"
 #include "server/log.h"
+#include "server/publish/nats_connection.h"
 #include "server/publish/publisher.h"
 #include "server/recording/recorder.h"
 #include "server/reload.h"
@@ -183,9 +184,12 @@ Result<void> Run(const Options& options, const Config& config) {
   return {};
 }
 
-int Check(const Config& config) {
+int Check(const Options& options, const Config& config) {
   if (const auto log = SetUpLog({.level = "warning"}); !log) return Complain(log.error().message, kFailed);
-  const ConfigFindings findings = CheckConfig(config);
+  ConfigFindings findings = CheckConfig(config, options.insecure_open);
+  if (!config.publish.url.empty())
+    if (const auto publish = CheckPublish(config.publish); !publish)
+      findings.errors.push_back(publish.error().message);
   for (const auto& note : findings.notes) std::fprintf(stderr, "taclinkd: note: %s\n", note.c_str());
   for (const auto& error : findings.errors) Complain(error, kFailed);
   if (!findings.errors.empty()) return kFailed;
@@ -229,7 +233,7 @@ int Main(int argc, char** argv) {
     std::fputs(ConfigText(*config).c_str(), stdout);
     return 0;
   }
-  if (options.check_config) return Check(*config);
+  if (options.check_config) return Check(options, *config);
   if (const auto log = SetUpLog(config->log); !log) return Complain(log.error().message, kFailed);
   spdlog::flush_every(kLogFlush);  // also tells what the rate limit swallowed
   const auto exposure = CheckExposure(*config, options.insecure_open);

@@ -25,7 +25,7 @@ struct FollowOptions {
   Credentials credentials = {};
   /// Each attempt waits twice as long as the one before, within these, a fifth more or less at random so that
   /// many clients do not come back at once.
-  std::chrono::milliseconds first_delay{250}, longest_delay{10'000};
+  std::chrono::milliseconds first_delay{250}, longest_delay{2000};
   std::function<void()> on_connected = {};  ///< the server has accepted, for the first time or again
   std::function<void(const Disconnection&)> on_disconnected = {};
   /// The server refuses for good (kInvalidArgument, kNotFound, kUnauthenticated, kPermissionDenied,

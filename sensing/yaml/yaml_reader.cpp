@@ -50,6 +50,10 @@ bool YamlMap::Has(const std::string& key) const {
   return node_.IsMap() && node_[key].IsDefined();
 }
 
+bool YamlMap::HasScalar(const std::string& key) const {
+  return Has(key) && node_[key].IsScalar();
+}
+
 YAML::Node YamlMap::Find(const std::string& key, bool required) {
   asked_.insert(key);
   if (node_.IsMap()) {

@@ -30,6 +30,8 @@ inline constexpr Range kNotNegative{.min = 0};
 class YamlMap {
  public:
   bool Has(const std::string& key) const;
+  /// Whether a single value stands there, in place of a mapping or a list.
+  bool HasScalar(const std::string& key) const;
 
   double Number(const std::string& key, Range range = {});
   double Number(const std::string& key, double fallback, Range range = {});

@@ -6,6 +6,8 @@
 #include <map>
 
 #include "server/assembly/arm_builder.h"
+#include "server/security/exposure.h"
+#include "server/security/security.h"
 
 namespace taclink::server {
 namespace {
@@ -38,8 +40,15 @@ void CheckCameras(const LinkConfig& link, std::map<std::string, std::string>& us
 
 }  // namespace
 
-ConfigFindings CheckConfig(const Config& config) {
+ConfigFindings CheckConfig(const Config& config, bool insecure_open) {
   ConfigFindings out;
+  if (const auto security = Security::Load(config.security); !security)
+    out.errors.push_back(security.error().message);
+  if (const auto exposure = CheckExposure(config, insecure_open); exposure) {
+    out.notes = *exposure;
+  } else {
+    out.errors.push_back(exposure.error().message);
+  }
   for (const auto& link : BuildLinks(config, SystemClock()))
     if (!link) out.errors.push_back(link.error().message);
   std::map<std::string, std::string> users;  // camera: link

@@ -12,8 +12,9 @@ struct ConfigFindings {
   std::vector<std::string> notes;   ///< it would, but see to it
 };
 
-/// Makes all that the configuration names (models, scenes, calibrations, picture folders) without starting
-/// anything, and looks at the cameras' names.
-ConfigFindings CheckConfig(const Config& config);
+/// Makes all that the configuration names (models, scenes, calibrations, picture folders; certificate and
+/// tokens) without starting anything, and looks at the cameras' names and at what is open to other machines,
+/// which `insecure_open` allows.
+ConfigFindings CheckConfig(const Config& config, bool insecure_open);
 
 }  // namespace taclink::server

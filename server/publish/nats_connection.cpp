@@ -171,6 +171,12 @@ struct NatsConnection::State {
   std::string trouble;  // guarded by mutex
 };
 
+Result<void> CheckPublish(const PublishConfig& config) {
+  NatsConnection::State state(config, "", {});
+  const auto options = state.MakeOptions();
+  return options ? Result<void>() : options.error();
+}
+
 NatsConnection::NatsConnection(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 NatsConnection::~NatsConnection() {

@@ -10,6 +10,9 @@
 
 namespace taclink::server {
 
+/// Whether files and URLs are usable; connects to nothing. Errors: kNotFound, kInvalidArgument.
+Result<void> CheckPublish(const PublishConfig& config);
+
 /// A connection to JetStream that comes back by itself. Callbacks come from NATS' threads.
 class NatsConnection {
  public:
@@ -40,6 +43,7 @@ class NatsConnection {
   Result<void> Send(const OutMessage& message);
 
  private:
+  friend Result<void> CheckPublish(const PublishConfig& config);
   struct State;
   explicit NatsConnection(std::unique_ptr<State> state);
 

@@ -1,17 +1,19 @@
 # Runs a page's blocks of `sh` in order, in a folder of their own, beside a server with the simulated arm where the page
-# talks to one: run_page.sh PAGE BIN-FOLDER
+# talks to one: run_page.sh PAGE BIN-FOLDER [ARGUMENTS OF THE SERVER...]
 set -euo pipefail
 page=$1 bin=$2
+shift 2
 folder=$(mktemp -d)
 server=
 trap '[ -z "$server" ] || kill "$server"; rm -rf "$folder"' EXIT
 awk '/^```sh$/ {on = 1; next} /^```/ {on = 0} on' "$page" >"$folder/page.sh"
 [ -s "$folder/page.sh" ] || { echo "$page has no blocks of sh" >&2; exit 1; }
+ln -s "$(realpath "$(dirname "$page")/../deploy")" "$folder/deploy"
 cd "$folder"
 export PATH=$bin:$PATH XDG_STATE_HOME=$folder/state
 
-if grep -qE 'taclink (list|watch|contacts|events|record|tare|set|thresholds)' page.sh; then
-  taclinkd --listen 127.0.0.1:0 --http-listen 127.0.0.1:0 >server.log 2>&1 &
+if grep -qE 'taclink (list|watch|contacts|events|record|tare|set|thresholds|joints|restart)' page.sh; then
+  taclinkd "$@" --listen 127.0.0.1:0 --http-listen 127.0.0.1:0 >server.log 2>&1 &
   server=$!
   for ((i = 0; i < 1200; i++)); do
     address=$(sed -n 's/.*listening on \(127.*\)/\1/p' server.log)

@@ -43,9 +43,16 @@ TEST(ConfigPublish, IsOffUnlessTold) {
   EXPECT_THAT(ConfigText(*Parse("")), Not(HasSubstr("publish")));
 }
 
+TEST(ConfigPublish, AUrlAloneIsEnough) {
+  const auto config = Parse("publish: nats://a:4222\n");
+  ASSERT_TRUE(config.ok()) << config.error().message;
+  EXPECT_EQ(ConfigText(*config), ConfigText(*Parse("publish: {url: 'nats://a:4222'}\n")));
+}
+
 TEST(ConfigPublish, MistakesAreNamed) {
   for (const char* wrong :
-       {"publish: {}\n", "publish: {url: 'http://a'}\n", "publish: {url: 'nats://a,b'}\n",
+       {"publish: on\n", "publish:\n", "publish: [a]\n", "publish: nats://me:secret@a\n", "publish: {}\n",
+        "publish: {url: 'http://a'}\n", "publish: {url: 'nats://a,b'}\n",
         "publish: {url: 'nats://me:secret@a'}\n", "publish: {url: 'nats://a', site: a.b}\n",
         "publish: {url: 'nats://a', stream: 'x y'}\n", "publish: {url: 'nats://a', certificate: c.pem}\n",
         "publish: {url: 'nats://a', frames_detail: most}\n", "publish: {url: 'nats://a', que_mb: 1}\n"}) {

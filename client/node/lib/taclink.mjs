@@ -62,6 +62,8 @@ export async function connect({ server = "127.0.0.1:50051", ...secrets } = {}) {
   const metadata = callMetadata({ server, ...secrets });
   const channel = new grpc.Channel(server, channelCredentials(secrets), {
     "grpc.enable_http_proxy": 0, // robots are on the local network
+    "grpc.keepalive_time_ms": 10_000, // a server that hangs, or whose network is gone, is noticed
+    "grpc.keepalive_timeout_ms": 5_000,
     "grpc.use_local_subchannel_pool": 1,
   });
   const connection = {

@@ -20,9 +20,9 @@ OPTIONS: tuple[tuple[str, int], ...] = (
     ("grpc.enable_http_proxy", 0),  # robots are on the local network
     # A connection of its own: on a shared one, a stream that is not read would hold up the others.
     ("grpc.use_local_subchannel_pool", 1),
-    # A server or a network that vanished without a word is noticed within 20 s. Servers allow a ping each 5 s.
+    # A server or a network that vanished without a word is noticed within 15 s. Servers allow a ping each 5 s.
     ("grpc.keepalive_time_ms", 10_000),
-    ("grpc.keepalive_timeout_ms", 10_000),
+    ("grpc.keepalive_timeout_ms", 5_000),
     ("grpc.http2.max_pings_without_data", 0),
 )
 

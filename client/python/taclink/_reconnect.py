@@ -8,7 +8,7 @@ from typing import Optional
 
 from taclink.errors import TaclinkError, Timeout, Unavailable
 
-FIRST_DELAY_S = 0.2
+FIRST_DELAY_S = 0.25
 LONGEST_DELAY_S = 2.0
 RETRIED = (Unavailable, Timeout)
 
