@@ -85,7 +85,7 @@ def check_config(page: str, block: str) -> None:
         for key, value in part.items():
             target[key] = value
         config["arm"].setdefault("name", "arm")
-        config["arm"]["links"] = [{**link, **given} for given in config["arm"].get("links", [link])]
+        config["arm"]["links"] = [given if "source" in given else {**link, **given} for given in config["arm"].get("links", [link])]
         complaint = is_accepted(config)
         if not complaint:
             return
@@ -104,7 +104,9 @@ for path in pages:
         for part in [block] if len(keys) == len(set(keys)) else block.splitlines():
             check_config(page, part)
             configurations += 1
-    for name in re.findall(rf"(?<![\w./-])((?:{folders})/[\w./-]*\w)", "\n".join(code(text))):
+    for name in re.findall(rf"(?<![\w./-])((?:{folders})/[\w./-]*\w)(?![\w./*-])", "\n".join(code(text))):
+        if "/my-" in name:  # the user's own
+            continue
         files += 1
         if not (root / name).exists() and not (path.parent / name).exists():
             wrong.append(f"{page}: {name} is not there")

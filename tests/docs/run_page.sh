@@ -1,7 +1,7 @@
 # Runs a page's blocks of `sh` in order, in a folder of their own, beside a server with the simulated arm where the page
 # talks to one: run_page.sh PAGE BIN-FOLDER [ARGUMENTS OF THE SERVER...]
 set -euo pipefail
-page=$1 bin=$2
+page=$1 bin=$(realpath "$2")
 shift 2
 folder=$(mktemp -d)
 server=
