@@ -1,6 +1,7 @@
 #include "server/publish/nats_connection.h"
 
 #include <nats/nats.h>
+#include <pthread.h>
 
 #include <array>
 #include <fstream>
@@ -23,6 +24,21 @@ struct OptionsDeleter {
   void operator()(natsOptions* options) const { natsOptions_Destroy(options); }
 };
 using OptionsPtr = std::unique_ptr<natsOptions, OptionsDeleter>;
+
+// Threads that are made meanwhile have this name, for top -H and gdb.
+class NamesThreads {
+ public:
+  explicit NamesThreads(const char* name) {
+    pthread_getname_np(pthread_self(), own_.data(), own_.size());
+    pthread_setname_np(pthread_self(), name);
+  }
+  ~NamesThreads() { pthread_setname_np(pthread_self(), own_.data()); }
+  NamesThreads(const NamesThreads&) = delete;
+  NamesThreads& operator=(const NamesThreads&) = delete;
+
+ private:
+  std::array<char, 16> own_ = {};
+};
 
 Error Wrong(const std::string& what, natsStatus status) {
   const char* const last = nats_GetLastError(nullptr);
@@ -74,6 +90,7 @@ struct NatsConnection::State {
   Result<void> Connect() {
     const auto options = MakeOptions();
     if (!options) return options.error();
+    const NamesThreads names("nats");
     const natsStatus connected = natsConnection_Connect(&connection, options->get());
     if (connected != NATS_OK && connected != NATS_NOT_YET_CONNECTED)
       return Wrong("url " + config.url, connected);
