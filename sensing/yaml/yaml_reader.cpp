@@ -219,13 +219,14 @@ std::vector<std::string> YamlMap::Texts(const std::string& key) {
 
 YamlMap YamlMap::Map(const std::string& key) {
   YAML::Node node = Find(key, false);
+  const int line = LineOf(node, line_);
   if (!node.IsDefined() || node.IsNull()) {
     node = YAML::Node(YAML::NodeType::Map);
   } else if (!node.IsMap()) {
     FailAt(node, key, "must be a mapping (key: value)");
     node = YAML::Node(YAML::NodeType::Map);
   }
-  return {context_, node, path_ + key + ".", line_};
+  return {context_, node, path_ + key + ".", line};
 }
 
 std::vector<YamlMap> YamlMap::Maps(const std::string& key) {
