@@ -14,6 +14,14 @@ int LineOf(const YAML::Node& node, int otherwise) {
   return node.IsDefined() && node.Mark().line >= 0 ? node.Mark().line + 1 : otherwise;
 }
 
+// Of an empty value the parser tells where the next one begins.
+int KeyLine(const YAML::Node& map, const std::string& key, int otherwise) {
+  if (!map.IsMap()) return otherwise;
+  for (const auto& entry : map)
+    if (entry.first.IsScalar() && entry.first.Scalar() == key) return LineOf(entry.first, otherwise);
+  return otherwise;
+}
+
 std::string Quoted(const std::vector<std::string_view>& choices) {
   std::string text;
   for (const auto choice : choices) text += (text.empty() ? "" : ", ") + std::string(choice);
@@ -219,14 +227,13 @@ std::vector<std::string> YamlMap::Texts(const std::string& key) {
 
 YamlMap YamlMap::Map(const std::string& key) {
   YAML::Node node = Find(key, false);
-  const int line = LineOf(node, line_);
   if (!node.IsDefined() || node.IsNull()) {
     node = YAML::Node(YAML::NodeType::Map);
   } else if (!node.IsMap()) {
     FailAt(node, key, "must be a mapping (key: value)");
     node = YAML::Node(YAML::NodeType::Map);
   }
-  return {context_, node, path_ + key + ".", line};
+  return {context_, node, path_ + key + ".", KeyLine(node_, key, line_)};
 }
 
 std::vector<YamlMap> YamlMap::Maps(const std::string& key) {
