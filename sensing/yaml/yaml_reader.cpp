@@ -48,11 +48,8 @@ double Within(Range range, double value) {
 
 }  // namespace
 
-YamlMap::YamlMap(std::shared_ptr<Context> context, YAML::Node node, std::string path, int line)
-    : context_(std::move(context)),
-      node_(std::move(node)),
-      path_(std::move(path)),
-      line_(LineOf(node_, line)) {}
+YamlMap::YamlMap(std::shared_ptr<Context> context, const YAML::Node& node, std::string path, int line)
+    : context_(std::move(context)), node_(node), path_(std::move(path)), line_(LineOf(node_, line)) {}
 
 bool YamlMap::Has(const std::string& key) const {
   return node_.IsMap() && node_[key].IsDefined();
@@ -65,7 +62,7 @@ bool YamlMap::HasScalar(const std::string& key) const {
 YAML::Node YamlMap::Find(const std::string& key, bool required) {
   asked_.insert(key);
   if (node_.IsMap()) {
-    YAML::Node found = node_[key];
+    const YAML::Node found = node_[key];
     if (found.IsDefined()) return found;
   }
   if (required && !context_->error) {
@@ -161,7 +158,7 @@ std::string YamlMap::Text(const std::string& key) {
 
 std::string YamlMap::Text(const std::string& key, std::string fallback) {
   asked_.insert(key);
-  return Has(key) ? Text(key) : fallback;
+  return Has(key) ? Text(key) : std::move(fallback);
 }
 
 std::string YamlMap::Prose(const std::string& key, std::string fallback) {
@@ -289,8 +286,8 @@ Result<YamlFile> YamlFile::Parse(const std::string& name, std::string_view conte
 }
 
 Result<void> YamlFile::Finish() {
-  if (root_.context_->error) return *root_.context_->error;
-  return {};
+  const std::optional<Error>& error = root_.context_->error;
+  return error ? Result<void>(*error) : Result<void>();
 }
 
 }  // namespace taclink

@@ -69,7 +69,7 @@ class YamlMap {
     std::optional<Error> error;
     bool only_missing = false;  // the error is a missing key: a misspelt one explains more
   };
-  YamlMap(std::shared_ptr<Context> context, YAML::Node node, std::string path, int line);
+  YamlMap(std::shared_ptr<Context> context, const YAML::Node& node, std::string path, int line);
 
   YAML::Node Find(const std::string& key, bool required);
   template <typename T>
