@@ -25,4 +25,11 @@ metrics=$(grep -rhoE '"taclink_[a-z_]+' ../../server/gateway | tr -d '"')
 for name in $(grep -rhoE 'taclink_[a-z_]+' base/alerts.yml base/grafana-dashboard.json | sed -E 's/_(bucket|sum|count)$//' | sort -u); do
   grep -qx "$name" <<<"$metrics" || { echo "no metric is called $name" >&2; exit 1; }
 done
+# With secrets as docs/fleet.md makes them.
+mkdir "$made/tls" "$made/tokens" "$made/nats"
+openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 1 -subj /CN=site -keyout "$made/tls/tls.key" \
+  -out "$made/tls/tls.crt" 2>/dev/null
+"$(dirname "$3")/taclink" token site --role viewer >"$made/tokens/tokens" 2>/dev/null
+openssl rand -hex 24 >"$made/nats/token"
+sed -i "s|/etc/taclink|$made|g" "$made/taclinkd.yaml"
 "$3" --check-config --config "$made/taclinkd.yaml"
