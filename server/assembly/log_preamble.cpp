@@ -23,7 +23,7 @@ std::string HostName() {
 }
 
 void AddFile(const std::string& name, const char* media_type, const std::string& path, LogPreamble& out) {
-  std::ifstream in(path);
+  const std::ifstream in(path);
   std::ostringstream text;
   text << in.rdbuf();
   if (in) {

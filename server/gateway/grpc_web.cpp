@@ -105,14 +105,14 @@ Result<std::vector<std::string>> DecodeMessages(WebFormat format, std::string_vi
 }
 
 std::string EncodeMessage(WebFormat format, std::string_view message) {
-  std::string frame = Frame(0, message);
+  const std::string frame = Frame(0, message);
   return format == WebFormat::kText ? EncodeBase64(frame) : frame;
 }
 
 std::string EncodeTrailers(WebFormat format, const WebStatus& status) {
   std::string text = "grpc-status: " + std::to_string(status.code) + "\r\n";
   if (!status.message.empty()) text += "grpc-message: " + PercentEncoded(status.message) + "\r\n";
-  std::string frame = Frame(kTrailers, text);
+  const std::string frame = Frame(kTrailers, text);
   return format == WebFormat::kText ? EncodeBase64(frame) : frame;
 }
 

@@ -52,7 +52,7 @@ std::optional<grpc::ByteBuffer> ContactStream::Next() {
   message_.set_sequence(++sent_);
   message_.set_utc_ns(arm_.clock().UtcNs());
   unsent_ = false;
-  grpc::Slice slice(message_.SerializeAsString());
+  const grpc::Slice slice(message_.SerializeAsString());
   return grpc::ByteBuffer(&slice, 1);
 }
 

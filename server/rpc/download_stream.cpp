@@ -44,7 +44,7 @@ void DownloadStream::Read() {
     const auto read = source_->Read(offset_, std::as_writable_bytes(std::span(*response.mutable_data())));
     if (read) {
       offset_ += bytes;
-      grpc::Slice slice(response.SerializeAsString());
+      const grpc::Slice slice(response.SerializeAsString());
       piece_ = grpc::ByteBuffer(&slice, 1);
     } else {
       failed_ = ToGrpc(read.error());

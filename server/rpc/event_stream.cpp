@@ -8,7 +8,7 @@ namespace taclink::server {
 namespace {
 
 grpc::ByteBuffer Bytes(const v1::StreamEventsResponse& response) {
-  grpc::Slice slice(response.SerializeAsString());
+  const grpc::Slice slice(response.SerializeAsString());
   return {&slice, 1};
 }
 

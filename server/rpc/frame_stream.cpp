@@ -69,7 +69,7 @@ grpc::ByteBuffer FrameStream::Status(const std::string& end_reason) {
   status.set_end_reason(end_reason);
   status_sent_ = true;
   status_time_ = steady_clock::now();
-  grpc::Slice slice(response.SerializeAsString());
+  const grpc::Slice slice(response.SerializeAsString());
   return {&slice, 1};
 }
 

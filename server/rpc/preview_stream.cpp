@@ -59,7 +59,7 @@ std::optional<grpc::ByteBuffer> PreviewStream::Next() {
     message.set_exposure_utc_ns(state.times.exposure_utc_ns);
     message.set_status(wire::ToWire(state.status));
     for (size_t camera = 0; camera < kCameraCount; ++camera) Fill(*pictures, camera, *message.add_pictures());
-    grpc::Slice slice(message.SerializeAsString());
+    const grpc::Slice slice(message.SerializeAsString());
     return grpc::ByteBuffer(&slice, 1);
   }
   return std::nullopt;
