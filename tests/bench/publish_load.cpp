@@ -50,7 +50,12 @@ class Sender {
         config, "load",
         {.changed = [] {},
          .answered = [this](const std::string& id, const std::string& error) { Answered(id, error); }}));
-    while (!connection_->connected()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    while (!connection_->connected()) {
+      if (std::chrono::steady_clock::now() > limit)
+        std::fprintf(stderr, "no NATS server at %s within 10 s\n", url.c_str()), std::exit(1);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
     if (const auto good = connection_->PrepareStream(); !good)
       std::fprintf(stderr, "%s\n", good.error().message.c_str()), std::exit(1);
   }

@@ -64,8 +64,8 @@ def code(text: str) -> list[str]:
     return lines
 
 
-def is_accepted(config: dict) -> str:
-    """Empty, or what the server says of it."""
+def complaint_about(config: dict) -> str:
+    """What the server says of it; empty: it takes it."""
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
         yaml.safe_dump(config, file)
         file.flush()
@@ -86,7 +86,7 @@ def check_config(page: str, block: str) -> None:
             target[key] = value
         config["arm"].setdefault("name", "arm")
         config["arm"]["links"] = [given if "source" in given else {**link, **given} for given in config["arm"].get("links", [link])]
-        complaint = is_accepted(config)
+        complaint = complaint_about(config)
         if not complaint:
             return
         complaints.append(complaint)
