@@ -227,6 +227,11 @@ Contact From(const v1::Contact& message) {
   contact.normal_force_n = message.normal_force_n();
   contact.area_m2 = message.area_m2();
   for (const uint32_t marker : message.markers()) contact.markers.push_back(static_cast<int>(marker));
+  contact.moment_nm = From(message.moment_nm());
+  contact.peak_pressure_pa = message.peak_pressure_pa();
+  contact.major_axis_m = From(message.major_axis_m());
+  contact.minor_axis_m = From(message.minor_axis_m());
+  contact.outline_m = Grouped<3>(message.outline_m());
   return contact;
 }
 
@@ -347,6 +352,11 @@ Frame FromMessage(const v1::LinkFrame& message) {
   frame.status_reason = message.status_reason();
   if (message.has_pressure_pa()) frame.pressure_pa = message.pressure_pa();
   frame.pressure = From(message.pressure());
+  for (const auto& reason : message.status_reasons())
+    frame.status_reasons.push_back({reason.id(), reason.text()});
+  if (message.has_pressure_estimate())
+    frame.pressure_estimate = {message.pressure_estimate().pressure_pa(),
+                               message.pressure_estimate().sigma_pa()};
   frame.markers_seen = static_cast<int>(message.markers_seen());
   frame.markers_inferred = static_cast<int>(message.markers_inferred());
   for (const auto& contact : message.contacts()) frame.contacts.push_back(From(contact));

@@ -85,6 +85,7 @@ std::optional<PressureConfig> ReadPressure(YamlMap& link, bool simulated, const 
   }
   if (IsSensor(config))
     config.stale_after_s = map.Number("stale_after_s", config.stale_after_s, {.min = 0.01, .max = 3600});
+  if (map.Has("sigma_pa")) config.sigma_pa = map.Number("sigma_pa", {.min = 0.1, .max = 1e5});
   map.Done();
   return config;
 }
@@ -98,6 +99,7 @@ std::string PressureText(const std::optional<PressureConfig>& config) {
   if (HasUnits(*config))
     out << ", kpa_per_unit: " << config->kpa_per_unit << ", offset_kpa: " << config->offset_kpa;
   if (IsSensor(*config)) out << ", stale_after_s: " << config->stale_after_s;
+  if (config->sigma_pa) out << ", sigma_pa: " << *config->sigma_pa;
   out << "}\n";
   return out.str();
 }

@@ -34,6 +34,8 @@ struct PressureConfig {
   double kpa_per_unit = 1;  ///< of files and serial lines: kPa = kpa_per_unit * number + offset_kpa
   double offset_kpa = 0;
   double stale_after_s = 1;  ///< of sensors: an older reading is not used
+  /// Standard deviation of the pressure; none: as is usual for the source (PressureSigma).
+  std::optional<double> sigma_pa = {};
 };
 
 /// Reads a link's 'pressure', or its short form 'pressure_kpa'; none: the picture source's, or 0.

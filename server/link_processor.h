@@ -10,7 +10,10 @@
 #include "sensing/core/link_state.h"
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
-#include "sensing/force/force_estimator.h"
+
+namespace taclink {
+class StateEstimator;  // handed on only: whoever runs links needs no estimator's library
+}
 
 namespace taclink::server {
 
@@ -62,7 +65,7 @@ class LinkProcessor {
   /// What was found in the pictures of the last frame that was measured; null: not known.
   virtual const LabelledMarkers* labels() const { return nullptr; }
   /// Computes the forces so from the next frame on. Not null. Errors: kUnsupported.
-  virtual Result<void> UseEstimator(std::unique_ptr<ForceEstimator>) {
+  virtual Result<void> UseEstimator(std::shared_ptr<StateEstimator>) {
     return Error{ErrorCode::kUnsupported, "this link computes no forces"};
   }
 };

@@ -42,7 +42,7 @@ struct LinkFactories {
   std::function<Result<std::unique_ptr<FrameSource>>()> source = {};
   std::function<Result<std::unique_ptr<LinkProcessor>>()> processor = {};
   /// Makes the forces' part of a processor by another model. None: the link has no forces to compute.
-  std::function<std::unique_ptr<ForceEstimator>(ForceModel)> estimator = {};
+  std::function<std::shared_ptr<StateEstimator>(ForceModel)> estimator = {};
   /// Processors that are made from now on compute so.
   std::function<void(ForceModel)> choose = {};
 };

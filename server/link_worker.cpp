@@ -169,13 +169,13 @@ Result<void> LinkWorker::Calibrate(const CalibrationOrder& order, CalibrationObs
   return {};
 }
 
-void LinkWorker::UseEstimator(std::unique_ptr<ForceEstimator> estimator) {
+void LinkWorker::UseEstimator(std::shared_ptr<StateEstimator> estimator) {
   const std::lock_guard lock(estimator_mutex_);
   estimator_ = std::move(estimator);
 }
 
 void LinkWorker::TakeEstimator() {
-  std::unique_ptr<ForceEstimator> estimator;
+  std::shared_ptr<StateEstimator> estimator;
   {
     const std::lock_guard lock(estimator_mutex_);
     estimator = std::move(estimator_);

@@ -85,7 +85,7 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   void EndCameraOrders(const Error& why) { cameras_.End(why); }
 
   /// From the next frame on. Not null. Any thread.
-  void UseEstimator(std::unique_ptr<ForceEstimator> estimator);
+  void UseEstimator(std::shared_ptr<StateEstimator> estimator);
 
   LinkStatistics Statistics() const { return outlet_->Statistics(); }
   SourceCondition source_condition() const { return supervisor_.condition(); }
@@ -139,7 +139,7 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   bool calibration_closed_ = false;
 
   std::mutex estimator_mutex_;
-  std::unique_ptr<ForceEstimator>
+  std::shared_ptr<StateEstimator>
       estimator_;  // guarded by estimator_mutex_: to be used from the next frame on
 
   // Used by the FEM thread only.

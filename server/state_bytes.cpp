@@ -17,8 +17,7 @@ size_t StateBytes(const LinkState& state) {
   bytes += Bytes(state.shape.positions_mm) + Bytes(state.shape.displacements_mm) +
            Bytes(state.shape.covariances_mm2) + Bytes(state.shape.sources) + Bytes(state.shape.measured) +
            Bytes(state.shape.rejected);
-  bytes += Bytes(state.forces.forces_n) + Bytes(state.forces.sigmas_n) + Bytes(state.forces.loaded) +
-           static_cast<size_t>(state.forces.loaded_covariance.size()) * sizeof(double);
+  bytes += Bytes(state.forces.forces_n) + Bytes(state.forces.sigmas_n) + Bytes(state.forces.loaded);
   bytes += Bytes(state.contacts);
   for (const Contact& contact : state.contacts) bytes += Bytes(contact.markers);
   return bytes;

@@ -65,7 +65,7 @@ std::optional<Mat3> CovarianceFrom(const google::protobuf::RepeatedField<double>
   return covariance;
 }
 
-void FillContact(const Contact& contact, v1::Contact& out) {
+void FillContact(const Contact& contact, Detail detail, v1::Contact& out) {
   out.set_id(contact.id);
   Fill(contact.center_mm, kMetresPerMm, *out.mutable_center_m());
   Fill(contact.normal, 1, *out.mutable_normal());
@@ -79,6 +79,11 @@ void FillContact(const Contact& contact, v1::Contact& out) {
   out.set_normal_force_n(contact.normal_force_n);
   out.set_area_m2(contact.area_mm2 * kSquareMetresPerMm2);
   for (const int marker : contact.markers) out.add_markers(static_cast<uint32_t>(marker));
+  Fill(contact.moment_nmm, kMetresPerMm, *out.mutable_moment_nm());
+  out.set_peak_pressure_pa(contact.peak_pressure_mpa * kPascalsPerMpa);
+  Fill(contact.major_axis_mm, kMetresPerMm, *out.mutable_major_axis_m());
+  Fill(contact.minor_axis_mm, kMetresPerMm, *out.mutable_minor_axis_m());
+  if (detail != Detail::kContacts) FillVectors(contact.outline_mm, kMetresPerMm, *out.mutable_outline_m());
 }
 
 Contact ContactFrom(const v1::Contact& message) {
@@ -92,6 +97,11 @@ Contact ContactFrom(const v1::Contact& message) {
   contact.normal_force_n = message.normal_force_n();
   contact.area_mm2 = message.area_m2() / kSquareMetresPerMm2;
   for (const uint32_t marker : message.markers()) contact.markers.push_back(static_cast<int>(marker));
+  contact.moment_nmm = FromWire(message.moment_nm(), 1 / kMetresPerMm);
+  contact.peak_pressure_mpa = message.peak_pressure_pa() / kPascalsPerMpa;
+  contact.major_axis_mm = FromWire(message.major_axis_m(), 1 / kMetresPerMm);
+  contact.minor_axis_mm = FromWire(message.minor_axis_m(), 1 / kMetresPerMm);
+  contact.outline_mm = VectorsFrom(message.outline_m(), 1 / kMetresPerMm);
   return contact;
 }
 
@@ -181,8 +191,17 @@ void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFra
   if (state.times.exposure_monotonic_ns != 0) Fill(state.pressure, *out.mutable_pressure());
   out.set_markers_seen(static_cast<uint32_t>(state.shape.seen()));
   out.set_markers_inferred(static_cast<uint32_t>(state.shape.CountOf(MarkerSource::kInferred)));
-  for (const Contact& contact : state.contacts) FillContact(contact, *out.add_contacts());
+  for (const Contact& contact : state.contacts) FillContact(contact, detail, *out.add_contacts());
   Fill(state.total_force_n, 1, *out.mutable_total_force_n());
+  for (const Reason& reason : state.reasons) {
+    v1::StatusReason& added = *out.add_status_reasons();
+    added.set_id(Name(reason.id));
+    added.set_text(reason.text);
+  }
+  if (state.pressure_estimate) {
+    out.mutable_pressure_estimate()->set_pressure_pa(state.pressure_estimate->mpa * kPascalsPerMpa);
+    out.mutable_pressure_estimate()->set_sigma_pa(state.pressure_estimate->sigma_mpa * kPascalsPerMpa);
+  }
   out.set_force_model(ToWire(state.forces.model));
   out.set_baseline_age_s(state.baseline_age_s);
   Fill(state.baseline, *out.mutable_baseline());
@@ -242,6 +261,12 @@ Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
   if (frame.has_pressure()) state.pressure = FromWire(frame.pressure());
   if (frame.has_pressure_pa()) state.pressure_mpa = frame.pressure_pa() / kPascalsPerMpa;
   for (const auto& contact : frame.contacts()) state.contacts.push_back(ContactFrom(contact));
+  for (const v1::StatusReason& reason : frame.status_reasons()) {
+    if (const auto id = ReasonNamed(reason.id())) state.reasons.push_back({*id, reason.text()});
+  }
+  if (frame.has_pressure_estimate())
+    state.pressure_estimate = {frame.pressure_estimate().pressure_pa() / kPascalsPerMpa,
+                               frame.pressure_estimate().sigma_pa() / kPascalsPerMpa};
   state.total_force_n = FromWire(frame.total_force_n(), 1);
   state.forces.model = FromWire(frame.force_model());
   state.baseline_age_s = frame.baseline_age_s();

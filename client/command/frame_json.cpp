@@ -21,7 +21,12 @@ Json ContactJson(const client::Contact& contact) {
           {"force_sigma_n", SigmasJson(contact.force_covariance_n2, 1)},
           {"center_sigma_mm", SigmasJson(contact.center_covariance_m2, kMmPerMetre)},
           {"normal_force_n", contact.normal_force_n},
-          {"area_mm2", contact.area_m2 * kMm2PerSquareMetre}};
+          {"area_mm2", contact.area_m2 * kMm2PerSquareMetre},
+          {"moment_nm", contact.moment_nm},
+          {"peak_pressure_kpa", contact.peak_pressure_pa * kKpaPerPascal},
+          {"outline_mm", ToJson(contact.outline_m, kMmPerMetre)},
+          {"major_axis_mm", ToJson(contact.major_axis_m, kMmPerMetre)},
+          {"minor_axis_mm", ToJson(contact.minor_axis_m, kMmPerMetre)}};
 }
 
 Json PressureJson(const client::PressureReport& pressure) {
@@ -33,9 +38,18 @@ Json PressureJson(const client::PressureReport& pressure) {
           {"trouble", pressure.trouble}};
 }
 
+// The pressure and its standard deviation.
+Json EstimateJson(const std::optional<client::PressureEstimate>& estimate) {
+  if (!estimate) return nullptr;
+  return Json::array({estimate->pressure_pa * kKpaPerPascal, estimate->sigma_pa * kKpaPerPascal});
+}
+
 }  // namespace
 
 std::string FrameJson(const client::Frame& frame) {
+  Json reasons = Json::array();
+  for (const auto& reason : frame.status_reasons)
+    reasons.push_back({{"id", reason.id}, {"text", reason.text}});
   const auto latency = frame.latency_s();
   Json contacts = Json::array();
   for (const auto& contact : frame.contacts) contacts.push_back(ContactJson(contact));
@@ -45,8 +59,10 @@ std::string FrameJson(const client::Frame& frame) {
                {"latency_ms", latency ? Json(*latency * 1e3) : Json(nullptr)},
                {"status", client::Name(frame.status)},
                {"reason", frame.status_reason},
+               {"reasons", std::move(reasons)},
                {"pressure_kpa", frame.pressure_pa ? Json(*frame.pressure_pa * kKpaPerPascal) : Json(nullptr)},
                {"pressure", PressureJson(frame.pressure)},
+               {"pressure_estimate_kpa", EstimateJson(frame.pressure_estimate)},
                {"force_model", client::Name(frame.force_model)},
                {"markers", {{"seen", frame.markers_seen}, {"inferred", frame.markers_inferred}}},
                {"tracked", frame.tracked},

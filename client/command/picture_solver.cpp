@@ -7,7 +7,8 @@ namespace taclink::command {
 
 Result<std::unique_ptr<PictureSolver>> PictureSolver::Make(const LinkModel& model, PipelineOptions options,
                                                            const std::string& calibration,
-                                                           const std::vector<std::string>& rest) {
+                                                           const std::vector<std::string>& rest,
+                                                           double rest_pressure_mpa) {
   options.rest_frames = 1;
   if (!calibration.empty()) {
     auto rig = LoadCalibration(calibration, model);
@@ -15,7 +16,7 @@ Result<std::unique_ptr<PictureSolver>> PictureSolver::Make(const LinkModel& mode
     options.rig = *rig;
   }
   std::unique_ptr<PictureSolver> solver(new PictureSolver(model, options));
-  const auto state = solver->Solve(rest, 0);
+  const auto state = solver->Solve(rest, rest_pressure_mpa);
   if (!state) return state.error();
   if (!solver->pipeline_.calibration()) {
     return Error{ErrorCode::kInvalidArgument, "the rest pictures can't be used: " + state->status_reason};

@@ -10,14 +10,16 @@
 
 namespace taclink::command {
 
-/// Pictures of files, one pair after the other, beginning with a rest pair without pressure.
+/// Pictures of files, one pair after the other, beginning with a rest pair.
 class PictureSolver {
  public:
-  /// `calibration`: file; empty: the rest pair calibrates. `rest`, as all pairs: top, bottom.
+  /// `calibration`: file; empty: the rest pair calibrates. `rest`, as all pairs: top, bottom; taken under
+  /// `rest_pressure_mpa`.
   /// Errors: kNotFound, kInvalidArgument (unreadable, of no use; why).
   static Result<std::unique_ptr<PictureSolver>> Make(const LinkModel& model, PipelineOptions options,
                                                      const std::string& calibration,
-                                                     const std::vector<std::string>& rest);
+                                                     const std::vector<std::string>& rest,
+                                                     double rest_pressure_mpa = 0);
 
   /// Whether it was measured is in the state.
   Result<LinkState> Solve(const std::vector<std::string>& pair, double pressure_mpa);

@@ -8,7 +8,7 @@
 #include "client/command/marker_csv.h"
 #include "client/command/picture_solver.h"
 #include "sensing/model/model_file.h"
-#include "sensing/shape/inference.h"
+#include "sensing/pipeline/judge.h"
 
 namespace taclink::command {
 namespace {
@@ -18,7 +18,8 @@ struct SolveOptions {
   std::string markers;
   std::vector<std::string> rest, images;
   std::string calibration;
-  double pressure_kpa = 0;
+  double pressure_kpa = 0, baseline_pressure_kpa = 0;
+  std::optional<double> pressure_sigma_pa;
   double sigma_mm = 0.05;
   std::string force_model = "auto";
   int force_refinement = 0;
@@ -44,7 +45,29 @@ Json ContactJson(const Contact& contact) {
           {"force_sigma_n", SigmasJson(contact.force_covariance_n2)},
           {"center_sigma_mm", SigmasJson(contact.center_covariance_mm2)},
           {"normal_force_n", contact.normal_force_n},
+          {"moment_nm", ToJson(Vec3(1e-3 * contact.moment_nmm))},
+          {"peak_pressure_kpa", 1e3 * contact.peak_pressure_mpa},
+          {"outline_mm", ToJson(contact.outline_mm)},
+          {"major_axis_mm", ToJson(contact.major_axis_mm)},
+          {"minor_axis_mm", ToJson(contact.minor_axis_mm)},
           {"area_mm2", contact.area_mm2}};
+}
+
+bool IsInvalid(const LinkState& state) {
+  return !state.measured() || !state.forces.converged;
+}
+
+Json ValidityJson(const LinkState& state) {
+  Json reasons = Json::array();
+  for (const Reason& reason : state.reasons)
+    reasons.push_back({{"id", Name(reason.id)}, {"text", reason.text}});
+  const char* status = IsInvalid(state) ? "invalid" : state.reasons.empty() ? "ok" : "degraded";
+  return {{"status", status}, {"reasons", reasons}};
+}
+
+Json PressureJson(const LinkState& state) {
+  if (!state.pressure_estimate) return nullptr;
+  return Json::array({1e3 * state.pressure_estimate->mpa, 1e3 * state.pressure_estimate->sigma_mpa});
 }
 
 void PrintJson(const LinkModel& model, const LinkState& state) {
@@ -55,6 +78,10 @@ void PrintJson(const LinkModel& model, const LinkState& state) {
       {"model", model.name},
       {"force_model", Name(state.forces.model)},
       {"markers", {{"seen", state.shape.seen()}, {"inferred", state.shape.CountOf(MarkerSource::kInferred)}}},
+      {"validity", ValidityJson(state)},
+      {"converged", state.forces.converged},
+      {"residual_chi2_per_dof", state.forces.residual * state.forces.residual},
+      {"pressure_estimate_kpa", PressureJson(state)},
       {"contacts", contacts},
       {"total_force_n", ToJson(state.total_force_n)},
       {"positions_mm", ToJson(state.shape.positions_mm)},
@@ -78,20 +105,29 @@ void PrintText(const LinkModel& model, const LinkState& state) {
   }
 }
 
+double SigmaMpa(const SolveOptions& options) {
+  return 1e-6 * options.pressure_sigma_pa.value_or(1e6 * PressureSigma(PressureOrigin::kFile));
+}
+
 Result<LinkState> SolveMarkers(const SolveOptions& options, const LinkModel& model) {
   auto shape = ReadMarkerCsv(options.markers, model, options.sigma_mm);
   if (!shape) return shape.error();
   LinkState state;
   state.shape = std::move(*shape);
-  InferUnseen(model, {.mpa = options.pressure_kpa * 1e-3}, state.shape);
-  const auto estimator = MakeForceEstimator(
+  const auto estimator = MakeStateEstimator(
       model, {.model = ForceModelNamed(options.force_model), .refinement = options.force_refinement});
   ContactFinder finder(model);
+  const PressureReading now{1e-3 * options.pressure_kpa, SigmaMpa(options)};
+  const double baseline_kpa = options.baseline_pressure_kpa;
+  const PressureReading baseline{1e-3 * baseline_kpa, baseline_kpa == 0 ? 0 : SigmaMpa(options)};
   const int64_t start = SystemClock().MonotonicNs();
-  estimator->Estimate(state.shape, options.pressure_kpa * 1e-3, state.forces);
-  finder.Find(state.shape, state.forces, state.contacts);
+  estimator->Estimate({.now = now, .baseline = baseline}, finder, state.shape, state.forces, state.contacts);
   state.stage_ms.force = static_cast<double>(SystemClock().MonotonicNs() - start) * 1e-6;
   for (const auto& contact : state.contacts) state.total_force_n += contact.force_n;
+  const SkinEstimate& estimate = estimator->estimate();
+  if (state.forces.converged)
+    state.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
+  Judge({.model = model, .camera_trouble = "", .drift_advice = "", .told = now, .estimate = estimate}, state);
   return state;
 }
 
@@ -99,13 +135,11 @@ Result<LinkState> SolvePictures(const SolveOptions& options, const LinkModel& mo
   PipelineOptions pipeline_options;
   pipeline_options.force.model = ForceModelNamed(options.force_model);
   pipeline_options.force.refinement = options.force_refinement;
-  const auto solver = PictureSolver::Make(model, pipeline_options, options.calibration, options.rest);
+  pipeline_options.pressure_sigma_mpa = SigmaMpa(options);
+  const auto solver = PictureSolver::Make(model, pipeline_options, options.calibration, options.rest,
+                                          1e-3 * options.baseline_pressure_kpa);
   if (!solver) return solver.error();
-  auto state = (*solver)->Solve(options.images, options.pressure_kpa * 1e-3);
-  if (state && !state->measured()) {
-    return Error{ErrorCode::kInvalidArgument, "the pictures can't be solved: " + state->status_reason};
-  }
-  return state;
+  return (*solver)->Solve(options.images, options.pressure_kpa * 1e-3);
 }
 
 Result<void> Solve(const SolveOptions& options) {
@@ -113,14 +147,19 @@ Result<void> Solve(const SolveOptions& options) {
   if (!model) return model.error();
   const auto state = options.markers.empty() ? SolvePictures(options, *model) : SolveMarkers(options, *model);
   if (!state) return state.error();
-  if (state->status != LinkStatus::kOk && !state->status_reason.empty()) {
-    std::fprintf(stderr, "taclink: worse than it could be: %s\n", state->status_reason.c_str());
+  const bool invalid = IsInvalid(*state);
+  if (!invalid) {
+    for (const Reason& reason : state->reasons)
+      std::fprintf(stderr, "taclink: worse than it could be: %s (%s)\n", reason.text.c_str(),
+                   Name(reason.id));
   }
   if (options.json) {
     PrintJson(*model, *state);
-  } else {
+  } else if (!invalid) {
     PrintText(*model, *state);
   }
+  if (invalid)
+    return Error{ErrorCode::kFailedPrecondition, "there is no valid answer: " + state->status_reason};
   return {};
 }
 
@@ -143,6 +182,15 @@ void AddSolve(const Arguments& app, Selected& selected) {
   images.Needs(rest).Excludes(markers);
   command.AddOption("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin")
       .Must(Within(-20, 20));
+  command
+      .AddOption(
+          "--baseline-pressure-kpa", options->baseline_pressure_kpa,
+          "Gauge pressure under which the baseline was taken, from which displacements count: that of --rest")
+      .Must(Within(-20, 20));
+  command
+      .AddOption("--pressure-sigma-pa", options->pressure_sigma_pa,
+                 "Standard deviation of these pressures; 50 Pa if not given")
+      .Must(Within(0.01, 1e5));
   command
       .AddOption("--sigma-mm", options->sigma_mm,
                  "With --markers: their standard deviation in x and y; z: 3 times")

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "sensing/capture/decode.h"
+#include "sensing/pipeline/judge.h"
 #include "wire/frame_codec.h"
 #include "wire/log/picture.h"
 #include "wire/log/scene.h"
@@ -82,7 +83,7 @@ void LogLinkSolver::Begin() {
   if (report_.from_pictures && !pipeline_)
     pipeline_ = std::make_unique<LinkPipeline>(settings_.model, settings_.options);
   if (!report_.from_pictures && !estimator_) {
-    estimator_ = MakeForceEstimator(settings_.model, settings_.options.force);
+    estimator_ = MakeStateEstimator(settings_.model, settings_.options.force);
     finder_ = std::make_unique<ContactFinder>(settings_.model, settings_.options.contact);
   }
 }
@@ -198,29 +199,38 @@ Result<void> LogLinkSolver::SolveMarkers(v1::LinkFrame& solved) {
                      settings_.model.name + "' has " + std::to_string(markers) +
                      ": another number of markers takes pictures"};
   }
-  const double pressure_mpa = FramePressure() - baseline_mpa_;
+  const double sigma_mpa =
+      settings_.options.pressure_sigma_mpa.value_or(PressureSigma(recorded_.pressure.origin));
+  const PressurePair pressure{.now = {FramePressure(), sigma_mpa}, .baseline = {baseline_mpa_, sigma_mpa}};
   state_ = std::move(recorded_);
   MeasureAgain(state_.shape);
-  SolveForces(pressure_mpa);
+  SolveForces(pressure);
   v1::LinkFrame forces;
   wire::Fill({solved.link(), solved.link_index()}, state_, Detail::kFull, forces);
   TakeForces(forces, solved);
   return {};
 }
 
-void LogLinkSolver::SolveForces(double pressure_mpa) {
+void LogLinkSolver::SolveForces(const PressurePair& pressure) {
   const auto start = std::chrono::steady_clock::now();
-  estimator_->Estimate(state_.shape, pressure_mpa, state_.forces);
-  finder_->Find(state_.shape, state_.forces, state_.contacts);
+  estimator_->Estimate(pressure, *finder_, state_.shape, state_.forces, state_.contacts);
   const double seconds = SecondsSince(start);
   state_.stage_ms.force = seconds * 1e3;
   report_.solve_s += seconds;
   state_.total_force_n.setZero();
   for (const Contact& contact : state_.contacts) state_.total_force_n += contact.force_n;
-  const bool good = state_.status == LinkStatus::kOk || state_.status_reason == kTooManyLoads;
-  if (!good) return;  // for another reason, which stays
-  state_.status = state_.forces.converged ? LinkStatus::kOk : LinkStatus::kDegraded;
-  state_.status_reason = state_.forces.converged ? "" : kTooManyLoads;
+  const SkinEstimate& estimate = estimator_->estimate();
+  state_.pressure_estimate.reset();
+  if (state_.forces.converged)
+    state_.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
+  // What the pictures were like, the log knows.
+  const std::string trouble = state_.status == LinkStatus::kOk ? "" : state_.status_reason;
+  Judge({.model = settings_.model,
+         .camera_trouble = trouble,
+         .drift_advice = "",
+         .told = pressure.now,
+         .estimate = estimate},
+        state_);
 }
 
 std::string LogLinkSolver::Scene(int64_t utc_ns) const {

@@ -11,8 +11,8 @@
 #include "sensing/contact/contact_finder.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/link_state.h"
-#include "sensing/force/force_estimator.h"
 #include "sensing/pipeline/link_pipeline.h"
+#include "sensing/pipeline/state_estimator.h"
 #include "taclink/v1/frame.pb.h"
 
 namespace taclink::command {
@@ -47,7 +47,7 @@ class LogLinkSolver {
   Result<RawImage> Image(CameraId camera, const std::optional<RecordedPicture>& picture) const;
   Result<void> SolveMarkers(v1::LinkFrame& solved);
   void FollowPressure();
-  void SolveForces(double pressure_mpa);  // gauge, less the baseline's
+  void SolveForces(const PressurePair& pressure);
   double FramePressure() const;
 
   // Constant after construction.
@@ -55,7 +55,7 @@ class LogLinkSolver {
 
   // Made with the first frame: takes a while.
   std::unique_ptr<LinkPipeline> pipeline_;
-  std::unique_ptr<ForceEstimator> estimator_;
+  std::unique_ptr<StateEstimator> estimator_;
   std::unique_ptr<ContactFinder> finder_;
 
   StereoFrame frame_;

@@ -146,6 +146,15 @@ struct Arm {
   std::vector<Joint> joints = {};  ///< from the base to the tips
 };
 
+/// Why a frame is worse than it could be; the id is stable.
+struct StatusReason {
+  std::string id, text;
+};
+/// Gauge pressure that the skin's shape and the sensor tell together, and its standard deviation.
+struct PressureEstimate {
+  double pressure_pa = 0, sigma_pa = 0;
+};
+
 struct Contact {
   uint64_t id = 0;                                  ///< lasts while the contact does
   Vector3 center_m{};                               ///< on the deformed outer surface
@@ -153,9 +162,14 @@ struct Contact {
   Vector3 force_n{};                                ///< what the world exerts on the skin
   std::optional<Covariance3> force_covariance_n2;   ///< none: not known
   std::optional<Covariance3> center_covariance_m2;  ///< likewise
-  double normal_force_n = 0;                        ///< pressing in is positive
+  /// Integral of the inward load: of a hug, whose resultant is none, all that it presses with.
+  double normal_force_n = 0;
   double area_m2 = 0;
   std::vector<int> markers;
+  Vector3 moment_nm{};  ///< of the load about the link frame's origin
+  double peak_pressure_pa = 0;
+  Vector3 major_axis_m{}, minor_axis_m{};  ///< as long as the load's standard deviation along them
+  std::vector<Vector3> outline_m;          ///< polygon on the deformed skin; from kGeometry on
 };
 
 /// Nanoseconds; 0: has not happened. Monotonic times are the server's.
@@ -190,7 +204,9 @@ struct Frame {
   FrameTimes times;
   LinkStatus status = LinkStatus::kUnknown;
   std::string status_reason;
-  std::optional<double> pressure_pa;  ///< measured
+  std::vector<StatusReason> status_reasons;  ///< all of them, the gravest first
+  std::optional<double> pressure_pa;         ///< measured
+  std::optional<PressureEstimate> pressure_estimate;
   PressureReport pressure;
   int markers_seen = 0;
   int markers_inferred = 0;

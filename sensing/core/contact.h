@@ -37,11 +37,9 @@ struct NodalForces {
   std::vector<Vec3> forces_n;    ///< by marker index
   std::vector<double> sigmas_n;  ///< by marker index: standard deviation of the force; 0 where there is none
   std::vector<int> loaded;       ///< indices of the markers with a force
-  /// Of the forces of `loaded`, in its order, three numbers each; N^2. May be larger, so as to be reused;
-  /// then the rest is 0.
-  Eigen::MatrixXd loaded_covariance;
-  double residual = 0;    ///< RMS of the unexplained displacement, in standard deviations
-  bool converged = true;  ///< false: the solver stopped at its limit of loads
+  double residual = 0;           ///< RMS of what the estimate does not explain, in standard deviations
+  double region_residual = 0;    ///< chi^2 per number of the worst region of 3 x 3 markers
+  bool converged = true;         ///< false: there is no estimate, the forces are none
 };
 
 /// A connected region of the skin that something pushes on. Link frame.
@@ -52,9 +50,18 @@ struct Contact {
   Vec3 force_n = Vec3::Zero();                ///< what the world exerts on the skin
   std::optional<Mat3> force_covariance_n2;    ///< none: not known
   std::optional<Mat3> center_covariance_mm2;  ///< likewise
-  double normal_force_n = 0;                  ///< pressing in is positive
-  double area_mm2 = 0;                        ///< of the loaded region, no finer than the marker grid
-  std::vector<int> markers;                   ///< indices of the loaded markers
+  /// Integral of the inward load: of a hug, whose resultant is none, all that it presses with.
+  double normal_force_n = 0;
+  double area_mm2 = 0;             ///< of the loaded region, no finer than the marker grid
+  std::vector<int> markers;        ///< indices of the loaded markers
+  Vec3 moment_nmm = Vec3::Zero();  ///< of the load about the link frame's origin
+  double peak_pressure_mpa = 0;    ///< of the inward load, over a site's area
+  /// Of the load's spread over the skin: along its longer and its shorter axis, as long as the standard
+  /// deviation of the load along it.
+  Vec3 major_axis_mm = Vec3::Zero(), minor_axis_mm = Vec3::Zero();
+  /// A polygon round the loaded region on the deformed outer surface, counter-clockwise seen from outside;
+  /// convex on the unrolled skin. Empty: not known.
+  std::vector<Vec3> outline_mm;
 };
 
 }  // namespace taclink

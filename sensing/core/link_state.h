@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sensing/core/baseline.h"
@@ -19,6 +20,36 @@ enum class LinkStatus : uint8_t {
   kOk,
   kDegraded,  ///< measures, but worse than it could: see the reason
   kLost,      ///< the source or the markers are gone; nothing is measured now
+};
+
+/// Why a state is worse than it could be. The names (Name) are stable.
+enum class ReasonId : uint8_t {
+  kFewMarkers,        ///< too few markers are seen
+  kCamera,            ///< a camera gives no picture, or none that can be read
+  kNotConverged,      ///< no loads and pressure were found that explain the markers
+  kImpossible,        ///< what was found is not physically possible
+  kNoEquilibrium,     ///< no skin of this model is stable under the pressure
+  kPressureUnknown,   ///< nobody tells the pressure; the skin's shape does
+  kPressureMismatch,  ///< the pressure that is told does not fit the skin's shape
+  kResidual,          ///< a region of markers contradicts the estimate
+  kLabels,            ///< markers of one region were left out as contradicting
+  kTooDeep,           ///< pressed in deeper than forces were compared with the truth
+  kBeyondMarkers,     ///< a load between a clamp and the first ring: how much of it is seen is not sure
+  kDrift,             ///< the baseline has drifted
+};
+inline constexpr int kReasonCount = static_cast<int>(ReasonId::kDrift) + 1;
+const char* Name(ReasonId id);
+/// None: another version's.
+std::optional<ReasonId> ReasonNamed(std::string_view name);
+
+struct Reason {
+  ReasonId id = ReasonId::kFewMarkers;
+  std::string text;  ///< for people, with what to do
+};
+
+/// A pressure that the estimate found.
+struct PressureEstimate {
+  double mpa = 0, sigma_mpa = 0;
 };
 
 /// How long each stage of a frame took, ms; 0: did not run.
@@ -41,9 +72,11 @@ struct LinkState {
   uint64_t sequence = 0;  ///< of the frame
   FrameTimes times;
   LinkStatus status = LinkStatus::kStarting;
-  std::string status_reason;           ///< empty when kOk
+  std::string status_reason;           ///< empty when kOk; of the first reason
+  std::vector<Reason> reasons;         ///< all that make it worse, the gravest first; of measured frames
   std::optional<double> pressure_mpa;  ///< measured; none: assumed, or the sensor's is stale
   PressureReport pressure;
+  std::optional<PressureEstimate> pressure_estimate;  ///< what the skin's shape and the sensor say together
 
   std::array<CameraCounts, kCameraCount> cameras;
   TrackingReport tracking;
@@ -68,8 +101,8 @@ struct LinkState {
     forces.forces_n.clear();
     forces.sigmas_n.clear();
     forces.loaded.clear();
-    forces.loaded_covariance.resize(0, 0);
-    forces.residual = 0;
+    forces.residual = forces.region_residual = 0;
+    pressure_estimate.reset();
     forces.converged = true;
     contacts.clear();
     total_force_n.setZero();

@@ -11,7 +11,8 @@
 #include "sensing/contact/contact_finder.h"
 #include "sensing/evaluation/child_process.h"
 #include "sensing/evaluation/thread_clock.h"
-#include "sensing/force/force_estimator.h"
+#include "sensing/pipeline/link_pipeline.h"
+#include "sensing/pipeline/state_estimator.h"
 #include "sensing/simulation/random.h"
 
 namespace taclink {
@@ -22,11 +23,16 @@ constexpr int kExactFrames = 2;
 constexpr double kFrameMm =
     1;  // that bodies move from frame to frame, at most: 30 mm/s at 30 frames a second
 
-std::unique_ptr<ForceEstimator> Make(const LinkModel& model, const AccuracyMethod& method) {
+std::unique_ptr<StateEstimator> Make(const LinkModel& model, const AccuracyMethod& method) {
   ForceOptions options;
   options.model = method.model;
   options.refinement = method.refinement;
-  return MakeForceEstimator(model, options);
+  return MakeStateEstimator(model, options);
+}
+
+// Displacements count from the slack skin.
+PressurePair PressuresOf(const PathTruth& path) {
+  return {.now = {path.path.pressure_mpa, PressureSigma(PressureOrigin::kSimulated)}, .baseline = {}};
 }
 
 double SecondsSince(int64_t start_ns) {
@@ -82,9 +88,8 @@ class Player {
     seed_ = MixBits(seed_);
     MakeShape(model_, stage, outcome_.noise_mm, seed_, shape_);
     const int64_t start = ThreadCpuClock().MonotonicNs();
-    estimator_->Estimate(shape_, path_->path.pressure_mpa, forces_);
+    estimator_->Estimate(PressuresOf(*path_), finder_, shape_, forces_, contacts_);
     if (times) times->push_back(static_cast<float>(1e3 * SecondsSince(start)));
-    finder_.Find(shape_, forces_, contacts_);
     ++outcome_.frames;
     outcome_.not_converged += forces_.converged ? 0 : 1;
     if (!stage.contacts.empty()) ++outcome_.answered[Name(forces_.model)];
@@ -103,7 +108,7 @@ class Player {
   const LinkModel& model_;
   const AccuracyOptions& options_;
   AccuracyOutcome& outcome_;
-  std::unique_ptr<ForceEstimator> estimator_;
+  std::unique_ptr<StateEstimator> estimator_;
   ContactFinder finder_;
   const PathTruth* path_ = nullptr;
   uint64_t seed_ = 0;
@@ -116,13 +121,15 @@ class Player {
 double MemoryOf(const LinkModel& model, const AccuracyMethod& method, const std::vector<PathTruth>& truths) {
   return ResidentGrowthMb([&] {
     auto estimator = Make(model, method);
+    ContactFinder finder(model);
     SkinShape shape;
     NodalForces forces;
+    std::vector<Contact> contacts;
     int shown = 0;
     for (const PathTruth& path : truths) {
       if (path.stages.empty() || ++shown > 3) continue;
       MakeShape(model, path.stages.back(), 0.05, 1, shape);
-      estimator->Estimate(shape, path.path.pressure_mpa, forces);
+      estimator->Estimate(PressuresOf(path), finder, shape, forces, contacts);
     }
     return estimator;
   });

@@ -6,9 +6,9 @@
 #include "sensing/evaluation/accuracy_bench.h"
 #include "sensing/evaluation/child_process.h"
 #include "sensing/evaluation/stability_cases.h"
-#include "sensing/force/force_estimator.h"
 #include "sensing/mechanics/pressed_skin.h"
 #include "sensing/mechanics/skin_push.h"
+#include "sensing/pipeline/link_pipeline.h"
 
 namespace taclink {
 namespace {
@@ -104,8 +104,8 @@ bool IsFinite(const NodalForces& forces) {
   const auto finite = [](double v) { return std::isfinite(v); };
   return std::all_of(forces.forces_n.begin(), forces.forces_n.end(),
                      [](const Vec3& f) { return f.allFinite(); }) &&
-         std::all_of(forces.sigmas_n.begin(), forces.sigmas_n.end(), finite) &&
-         forces.loaded_covariance.allFinite() && finite(forces.residual);
+         std::all_of(forces.sigmas_n.begin(), forces.sigmas_n.end(), finite) && finite(forces.residual) &&
+         finite(forces.region_residual);
 }
 
 Vec3 Total(const NodalForces& forces) {
@@ -137,11 +137,17 @@ void RunEstimator(const LinkModel& model, const AccuracyMethod& method, const Tr
   ForceOptions options;
   options.model = method.model;
   options.refinement = method.refinement;
-  const auto estimator = MakeForceEstimator(model, options);
+  const auto estimator = MakeStateEstimator(model, options);
+  ContactFinder finder(model);
+  std::vector<Contact> contacts;
+  const auto estimate = [&](double pressure_mpa, SkinShape& shape, NodalForces& forces) {
+    const PressureReading now{pressure_mpa, PressureSigma(PressureOrigin::kSimulated)};
+    estimator->Estimate({.now = now, .baseline = {}}, finder, shape, forces, contacts);
+  };
   SkinShape clean;
   MakeShape(model, truth, kNoiseMm, 1, clean);
   NodalForces forces;
-  estimator->Estimate(clean, kPressureMpa, forces);
+  estimate(kPressureMpa, clean, forces);
   const std::string who =
       "estimator " + method.name() +
       (method.model && forces.model != *method.model ? std::string(" (answers as ") + Name(forces.model) + ")"
@@ -157,7 +163,7 @@ void RunEstimator(const LinkModel& model, const AccuracyMethod& method, const Tr
       double pressure = kPressureMpa;
       input.spoil(shape, pressed, pressure);
       estimator->Restart();
-      estimator->Estimate(shape, pressure, forces);
+      estimate(pressure, shape, forces);
       return Judge(who + input.name, input.expected, forces, clean_n);
     }));
   }

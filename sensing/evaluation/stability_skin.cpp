@@ -30,7 +30,7 @@ struct Path {
 
 // All that acts at the end of a path, made anew.
 struct EndLoads {
-  EndLoads(const SkinCase& c, const Path& path) : pressure(c.model.thickness_mm, path.skin.pressure_mpa()) {
+  EndLoads(const SkinCase& c, const Path& path) : pressure(path.skin.pressure_mpa()) {
     const RigidContactOptions options{
         .spacing_mm = PressedSkinOptions{}.spacing_mm,
         .stiffness_n_mm3 =
@@ -58,19 +58,19 @@ double StoredOf(const PressedSkin& skin) {
   return skin.shell().Energy(skin.state(), {});
 }
 
-double VolumeOf(const SkinCase& c, const PressedSkin& skin) {
-  const FollowerPressure unit(c.model.thickness_mm, 1);
+double VolumeOf(const PressedSkin& skin) {
+  const FollowerPressure unit(1);
   const ElementLoad* const load[] = {&unit};
   return StoredOf(skin) - skin.shell().Energy(skin.state(), load);
 }
 
 // Work of the pressure is the integral of p by V = p V at the end less that of V by p.
 void Inflate(const SkinCase& c, Path& path) {
-  std::vector<double> volumes = {VolumeOf(c, path.skin)};
+  std::vector<double> volumes = {VolumeOf(path.skin)};
   const double step = c.pressure_mpa / kInflations;
   for (int i = 1; i <= kInflations && path.refused.empty(); ++i) {
     Note(path, path.skin.Inflate(i == kInflations ? c.pressure_mpa : i * step), "inflating");
-    volumes.push_back(VolumeOf(c, path.skin));
+    volumes.push_back(VolumeOf(path.skin));
   }
   if (path.refused.empty()) path.work_nmm = c.pressure_mpa * volumes.back() - Simpson(volumes, step);
 }

@@ -55,7 +55,7 @@ DiscSkin::DiscSkin(const LinkModel& model, const std::vector<double>& disc_diame
       options_(options),
       mesh_(MakeShellMesh(model, options.refinement)),
       shell_(SkinSurface(mesh_), model.material),
-      pressure_(model.thickness_mm, 0),
+      pressure_(0),
       factor_(std::make_unique<Factor>(shell_.Pattern())) {
   const RigidContactOptions contact = {
       .spacing_mm = options.spacing_mm,
@@ -83,7 +83,7 @@ RigidBody DiscSkin::BodyOf(size_t disc, const SkinDisc& place, double depth_mm) 
 }
 
 void DiscSkin::Apply(const SkinLoad& load, const SkinBalance& balance) {
-  pressure_ = FollowerPressure(model_.thickness_mm, load.pressure_mpa);
+  pressure_ = FollowerPressure(load.pressure_mpa);
   loads_ = {&pressure_};
   if (tube_) loads_.push_back(tube_.get());
   searched_.clear();

@@ -10,28 +10,18 @@ Mat3 Skew(const Vec3& v) {
   return m;
 }
 
-// By the corners' points and directors, of a derivative by the wall's points.
-void AddWallStiffness(double half_thickness_mm, size_t i, size_t j, const Mat3& k, ElementHessian& hessian) {
-  const auto row = static_cast<Eigen::Index>(6 * i), column = static_cast<Eigen::Index>(6 * j);
-  const Mat3 by_director = -half_thickness_mm * k;
-  hessian.block<3, 3>(row, column) += k;
-  hessian.block<3, 3>(row, column + 3) += by_director;
-  hessian.block<3, 3>(row + 3, column) += by_director;
-  hessian.block<3, 3>(row + 3, column + 3) -= half_thickness_mm * by_director;
-}
-
 }  // namespace
 
-// Volume = 1/3 sum X . (X_xi x X_eta) over Gauss points, X the wall's points; differentiated by its corners.
-// The second derivative by corners i and j is the cross product with a vector, and minus that vector for j
-// and i.
+// Volume = 1/3 sum X . (X_xi x X_eta) over Gauss points, X the surface's points; differentiated by its
+// corners. The second derivative by corners i and j is the cross product with a vector, and minus that vector
+// for j and i.
 void FollowerPressure::Add(DerivativeOrder order, int /*element*/, const ElementState& state,
                            ElementResponse& response) const {
-  Eigen::Matrix<double, 3, 4> wall;
-  for (Eigen::Index i = 0; i < 4; ++i)
-    wall.col(i) = state.segment<3>(6 * i) - half_thickness_mm_ * state.segment<3>(6 * i + 3);
+  Eigen::Matrix<double, 3, 4> corners;
+  for (Eigen::Index i = 0; i < 4; ++i) corners.col(i) = state.segment<3>(6 * i);
   const auto& [value, by_xi, by_eta] = ShapesAtGaussPoints();
-  const Lanes3 x = Interpolate(wall, value), x1 = Interpolate(wall, by_xi), x2 = Interpolate(wall, by_eta);
+  const Lanes3 x = Interpolate(corners, value), x1 = Interpolate(corners, by_xi),
+               x2 = Interpolate(corners, by_eta);
   const Lanes3 area = Cross(x1, x2);
   const double scale = -pressure_mpa_ / 3;
   response.energy_nmm += scale * Sum(Dot(x, area));
@@ -43,9 +33,7 @@ void FollowerPressure::Add(DerivativeOrder order, int /*element*/, const Element
       force[static_cast<Eigen::Index>(a)] =
           scale * Sum(value[i] * area[a] + by_xi[i] * side1[a] + by_eta[i] * side2[a]);
     }
-    const auto at = static_cast<Eigen::Index>(6 * i);
-    response.gradient.segment<3>(at) += force;
-    response.gradient.segment<3>(at + 3) -= half_thickness_mm_ * force;
+    response.gradient.segment<3>(static_cast<Eigen::Index>(6 * i)) += force;
   }
   if (order == DerivativeOrder::kGradient) return;
   for (size_t i = 0; i < 4; ++i) {
@@ -56,8 +44,9 @@ void FollowerPressure::Add(DerivativeOrder order, int /*element*/, const Element
       Vec3 turning;
       for (size_t a = 0; a < 3; ++a)
         turning[static_cast<Eigen::Index>(a)] = scale * Sum(by_x1 * x1[a] + by_x2 * x2[a] + by_x * x[a]);
-      AddWallStiffness(half_thickness_mm_, i, j, Skew(turning), response.hessian);
-      AddWallStiffness(half_thickness_mm_, j, i, -Skew(turning), response.hessian);
+      const auto row = static_cast<Eigen::Index>(6 * i), column = static_cast<Eigen::Index>(6 * j);
+      response.hessian.block<3, 3>(row, column) += Skew(turning);
+      response.hessian.block<3, 3>(column, row) -= Skew(turning);
     }
   }
 }

@@ -66,7 +66,7 @@ void LinearShell::Solver::Factorise(const Material& material) {
 Eigen::VectorXd LinearShell::Solver::UnitPressureLoad() const {
   Eigen::VectorXd load = Eigen::VectorXd::Zero(DofCount());
   for (const auto& element : mesh.elements) {
-    const ElementVector f = InnerPressureLoad(CornersOf(mesh, element), mesh.thickness_mm);
+    const ElementVector f = PressureLoad(CornersOf(mesh, element));
     for (int i = 0; i < 4; ++i) {
       const int node = element[static_cast<size_t>(i)];
       if (mesh.IsClamped(node)) continue;

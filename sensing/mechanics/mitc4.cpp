@@ -135,22 +135,15 @@ ElementMatrix Mitc4Stiffness(const std::array<ShellCorner, 4>& corners, double t
   return stiffness;
 }
 
-ElementVector InnerPressureLoad(const std::array<ShellCorner, 4>& corners, double thickness_mm) {
+ElementVector PressureLoad(const std::array<ShellCorner, 4>& corners) {
   ElementVector load = ElementVector::Zero();
   for (const double xi : {-kGauss, kGauss}) {
     for (const double eta : {-kGauss, kGauss}) {
-      const PointKinematics k = KinematicsAt(corners, thickness_mm, xi, eta, -1);
+      const PointKinematics k = KinematicsAt(corners, 0, xi, eta, 0);
       const Vec3 outward_area = k.base[0].cross(k.base[1]);
       for (size_t i = 0; i < 4; ++i) {
         const double n = 0.25 * (1 + kXi[i] * xi) * (1 + kEta[i] * eta);
-        const Vec3 force = n * outward_area;
-        const auto at = static_cast<Eigen::Index>(i) * kDofsPerNode;
-        load.segment<3>(at) += force;
-        for (Eigen::Index t = 0; t < 2; ++t) {
-          const Vec3 motion =
-              corners[i].tangents[static_cast<size_t>(t)].cross(-0.5 * thickness_mm * corners[i].director);
-          load[at + 3 + t] += force.dot(motion);
-        }
+        load.segment<3>(static_cast<Eigen::Index>(i) * kDofsPerNode) += n * outward_area;
       }
     }
   }

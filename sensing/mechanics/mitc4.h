@@ -30,7 +30,8 @@ using ElementVector = Eigen::Matrix<double, kElementDofs, 1>;
 ElementMatrix Mitc4Stiffness(const std::array<ShellCorner, 4>& corners, double thickness_mm,
                              const Material& material);
 
-/// Nodal loads of a gauge pressure of 1 MPa on the inner wall, pushing outwards; N and N mm per MPa.
-ElementVector InnerPressureLoad(const std::array<ShellCorner, 4>& corners, double thickness_mm);
+/// Nodal loads of a gauge pressure of 1 MPa inside, pushing outwards on the mid-surface (see
+/// FollowerPressure); N per MPa.
+ElementVector PressureLoad(const std::array<ShellCorner, 4>& corners);
 
 }  // namespace taclink

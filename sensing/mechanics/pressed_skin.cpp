@@ -56,9 +56,10 @@ PressedSkin::PressedSkin(const LinkModel& model, const PressedSkinOptions& optio
     : model_(model),
       options_(options),
       mesh_(MakeShellMesh(model, options.refinement)),
+      markers_(model, mesh_),
       shell_(SkinSurface(mesh_), model.material),
       solver_(shell_, SolverOptions(model)),
-      pressure_(model.thickness_mm, 0),
+      pressure_(0),
       state_(shell_.Rest()) {
   if (model.tube_outer_radius_mm > 0) {
     tube_ = std::make_unique<RigidContact>(shell_, ContactOptions(model, options, false));
@@ -77,8 +78,7 @@ RigidContact::Summary PressedSkin::TubeContact() const {
 }
 
 Vec3 PressedSkin::Marker(int marker) const {
-  return state_.AtOffset(mesh_.NodeOfMarker(model_, marker),
-                         model_.thickness_mm / 2 - model_.markers.center_depth_mm);
+  return markers_.Position(state_.mids_mm, state_.directors, marker);
 }
 
 EquilibriumSummary PressedSkin::Settle(ShellState& state) {
@@ -177,7 +177,7 @@ PressSummary PressedSkin::Inflate(double pressure_mpa) {
   const double usual_mm = radius * std::abs(change) / PressureScale(model_);
   return Follow(longest, longest / 256, usual_mm, [&](double at) {
     pressure_mpa_ = from + at * change;
-    pressure_ = FollowerPressure(model_.thickness_mm, pressure_mpa_);
+    pressure_ = FollowerPressure(pressure_mpa_);
   });
 }
 

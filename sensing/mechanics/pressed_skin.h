@@ -8,6 +8,7 @@
 
 #include "sensing/core/link_model.h"
 #include "sensing/mechanics/equilibrium.h"
+#include "sensing/mechanics/marker_map.h"
 #include "sensing/mechanics/rigid_contact.h"
 #include "sensing/mechanics/shell_mesh.h"
 
@@ -27,7 +28,7 @@ struct PressedSkinOptions {
   double spacing_mm = 0.8;               ///< of contact points
   /// Of the wall under a body, times Young's modulus / thickness: a soft wall gives way locally, which a
   /// shell does not know. The default makes its forces those of three-dimensional bricks (docs/calculix.md).
-  double stiffness = 0.35;
+  double stiffness = 0.45;
 };
 
 /// Why a skin's way to a new state ended, and what it took.
@@ -86,6 +87,7 @@ class PressedSkin {
   LinkModel model_;
   PressedSkinOptions options_;
   ShellMesh mesh_;
+  MarkerMap markers_;
   NonlinearShell shell_;
   EquilibriumSolver solver_;
   FollowerPressure pressure_;

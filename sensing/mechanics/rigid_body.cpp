@@ -29,20 +29,30 @@ Gap GapTo(const RigidBar& s, const Vec3& p) {
   return RoundGap(across * (p - s.point_mm), s.radius_mm, across, s.axis.unitOrthogonal());
 }
 
-// Height above the face, and above a parabola beyond the flat part: the side would throw out points that a
-// long step has put deep behind the face.
+// How far a stamp's rim has fallen off at a distance beyond the flat part: along a circle at first, then
+// straight on along its tangent.
+struct Fall {
+  double mm, slope, curvature_per_mm;
+};
+constexpr double kSteepest = 1.7320508075688772, kSteepestCosine = 0.5;  // 60 degrees
+Fall FallOf(double rim_radius_mm, double out_mm) {
+  const double edge = rim_radius_mm * kSteepestCosine * kSteepest;
+  if (out_mm > edge)
+    return {rim_radius_mm * (1 - kSteepestCosine) + kSteepest * (out_mm - edge), kSteepest, 0};
+  const double left = std::sqrt(rim_radius_mm * rim_radius_mm - out_mm * out_mm);
+  return {rim_radius_mm - left, out_mm / left, rim_radius_mm * rim_radius_mm / (left * left * left)};
+}
+
+// Height above the face, and above the rim's profile beyond the flat part: the side would throw out points
+// that a long step has put deep behind the face.
 Gap GapTo(const RigidStamp& s, const Vec3& p) {
   const Mat3 across = Mat3::Identity() - s.axis * s.axis.transpose();
   const Vec3 d = p - s.face_center_mm;
   const Gap side = RoundGap(across * d, s.radius_mm - s.rim_radius_mm, across, s.axis.unitOrthogonal());
-  const double out = std::max(side.distance_mm, 0.0);
-  Gap gap{s.axis.dot(d) + 0.5 * out * out / s.rim_radius_mm, s.axis + out / s.rim_radius_mm * side.normal,
-          Mat3::Zero()};
-  if (out > 0) {
-    gap.curvature_per_mm =
-        (side.normal * side.normal.transpose() + out * side.curvature_per_mm) / s.rim_radius_mm;
-  }
-  return gap;
+  if (side.distance_mm <= 0) return {s.axis.dot(d), s.axis, Mat3::Zero()};
+  const Fall fall = FallOf(s.rim_radius_mm, side.distance_mm);
+  return {s.axis.dot(d) + fall.mm, s.axis + fall.slope * side.normal,
+          fall.curvature_per_mm * side.normal * side.normal.transpose() + fall.slope * side.curvature_per_mm};
 }
 
 template <typename Shape>
@@ -68,8 +78,8 @@ bool IsBeyondReach(const RigidBody& body, const Vec3& point_mm, double reach_mm)
   const Vec3 d = point_mm - stamp->face_center_mm;
   const double up = stamp->axis.dot(d);
   if (up > reach_mm) return true;
-  // How wide the parabola is as far down as the reach goes.
-  const double widest = stamp->radius_mm + std::sqrt(2 * stamp->rim_radius_mm * (reach_mm - up));
+  // No wider, as far down as the reach goes, than a cone of that slope from where the rim would end.
+  const double widest = stamp->radius_mm + (reach_mm - up) / kSteepest;
   return (d - up * stamp->axis).norm() > widest + reach_mm;
 }
 

@@ -22,7 +22,7 @@ struct RigidBar {
   Vec3 axis;
   double radius_mm = 0;
 };
-/// Flat-ended round stamp, like a force probe; its rim falls off as a parabola.
+/// Flat-ended round stamp, like a force probe; its rim is round, down to 60 degrees, and a cone further down.
 struct RigidStamp {
   Vec3 face_center_mm;
   Vec3 axis;  ///< from the face towards the skin

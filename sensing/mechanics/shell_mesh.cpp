@@ -38,11 +38,17 @@ ShellMesh MakeShellMesh(const LinkModel& model, int refinement) {
   assert(refinement >= 1);
   const double widest = model.markers.path_pitch_rad() / RadFromDeg(kMaxElementDeg);
   refinement = std::max(refinement, static_cast<int>(std::ceil(widest - 1e-9)));
+  return MakeShellMesh(model, {refinement, refinement});
+}
+
+ShellMesh MakeShellMesh(const LinkModel& model, const MeshRefinement& refinement) {
+  assert(refinement.around >= 1 && refinement.along >= 1);
   ShellMesh mesh;
-  mesh.refinement = refinement;
+  mesh.refinement = refinement.around;
+  mesh.refinement_along = refinement.along;
   mesh.thickness_mm = model.thickness_mm;
-  const auto rows_z = RowPositions(model, refinement);
-  mesh.columns = model.markers.paths * refinement;
+  const auto rows_z = RowPositions(model, refinement.along);
+  mesh.columns = model.markers.paths * refinement.around;
   mesh.rows = static_cast<int>(rows_z.size());
   for (const double z : rows_z) {
     for (int column = 0; column < mesh.columns; ++column) {

@@ -131,7 +131,7 @@ Result<SkinPushResult> PushNonlinear(const LinkModel& model, const SkinPush& pus
   if (way > 0) {
     const Vec3 face = mesh.mid_mm[center] + (model.thickness_mm / 2 + start) * axis;
     const double radius = std::max(push.patch_diameter_mm / 2, kRimMm);
-    skin.AddBody(RigidStamp{face, -axis, radius, kRimMm}, true);
+    skin.AddBody(RigidStamp{face, -axis, radius, kRimMm}, false);
     const Vec3 by = -way * axis;
     const PressSummary pushed = skin.Move({&by, 1});
     if (!pushed.ok()) return NoEquilibrium("pushing", pushed);

@@ -59,40 +59,38 @@ std::optional<Result<TareSummary>> BaselineKeeper::TakeTareEnd() {
   return std::exchange(tare_end_, std::nullopt);
 }
 
-void BaselineKeeper::Apply(const ShapeReconstructor& reconstructor, double pressure_mpa, SkinShape& shape) {
-  frame_pressure_mpa_ = pressure_mpa;
+void BaselineKeeper::Apply(const PressureReading& pressure, const SkinEstimate& estimate,
+                           const SkinShape& shape) {
+  frame_pressure_ = pressure;
   off_mm_ = shape.displacements_mm;
-  const double change_mpa = PressureChange(pressure_mpa);
-  for (size_t m = 0; m < off_mm_.size() && change_mpa != 0; ++m)
-    off_mm_[m] -= reconstructor.PressureDisplacement(static_cast<int>(m), change_mpa);
-  if (!drift_) return;
   for (size_t m = 0; m < off_mm_.size(); ++m) {
-    shape.displacements_mm[m] -= follower_.drift_mm()[m];
-    shape.measured[m].displacement_mm -= follower_.drift_mm()[m];
+    const auto at = 3 * static_cast<Eigen::Index>(m);
+    off_mm_[m] -= estimate.inflated_mm.segment<3>(at) - estimate.baseline_mm.segment<3>(at);
+    if (drift_) off_mm_[m] += follower_.drift_mm()[m];
   }
 }
 
 void BaselineKeeper::Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels,
-                           ShapeReconstructor& reconstructor, const Clock& clock) {
+                           SkinStage& skin, StateEstimator& estimator, const Clock& clock) {
   if (drift_) FollowDrift(times, state, clock);
   state.baseline = baseline_;
   state.baseline.drift_mm = follower_.largest_mm();
   if (drift_) state.baseline.drift_state = follower_.following() ? DriftState::kFollowing : DriftState::kHeld;
   state.baseline_age_s = AgeS(times, clock);
-  if (tare_) TakeTareFrame(times, state, labels, reconstructor, clock);
+  if (tare_) TakeTareFrame(times, state, labels, skin, estimator, clock);
 }
 
 void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock) {
   // Degraded by nothing but the drift itself.
   const bool good = state.status == LinkStatus::kOk ||
                     (state.measured() && HasDriftedFar() && state.status_reason == DriftAdvice());
-  const bool sure = good && std::abs(PressureChange(frame_pressure_mpa_)) <= kSamePressureMpa;
+  const bool sure = good && std::abs(PressureChange(frame_pressure_.mpa)) <= kSamePressureMpa;
   follower_.Update(MonotonicNs(times, clock), sure ? std::optional(StrongestLoad(state)) : std::nullopt,
                    off_mm_);
 }
 
 void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& state,
-                                   const LabelledMarkers& labels, ShapeReconstructor& reconstructor,
+                                   const LabelledMarkers& labels, SkinStage& skin, StateEstimator& estimator,
                                    const Clock& clock) {
   const Result<bool> complete = tare_->Add(state, labels, off_mm_);
   if (complete && !*complete) return;
@@ -103,8 +101,10 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
                             .forced = tare_->forced(),
                             .shift_mm = tare_->shift_mm(),
                             .previous_age_s = AgeS(times, clock)};
-    reconstructor.Tare(tare_->markers(), frame_pressure_mpa_);
-    Take(tare_->forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, frame_pressure_mpa_, times,
+    // The pressure was good enough for this frame's estimate.
+    const auto inflation = estimator.InflationAt(frame_pressure_.mpa);
+    skin.Tare(tare_->markers(), frame_pressure_, inflation.value_or(estimator.estimate().baseline_mm));
+    Take(tare_->forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, frame_pressure_.mpa, times,
          clock);
   }
   tare_.reset();

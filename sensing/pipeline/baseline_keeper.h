@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,13 +13,14 @@
 #include "sensing/core/link_state.h"
 #include "sensing/core/markers.h"
 #include "sensing/pipeline/drift_follower.h"
+#include "sensing/pipeline/skin_stage.h"
 #include "sensing/pipeline/tare.h"
-#include "sensing/shape/reconstructor.h"
 
 namespace taclink {
 
 /// Knows what displacements are measured against: when and how it was taken, how far it has followed the skin
-/// since, and a tare under way. Used frame by frame: Apply before the forces, Learn after them.
+/// since, and a tare under way. Used frame by frame: Apply and Learn after the estimate, which takes DriftMm
+/// off.
 class BaselineKeeper {
  public:
   BaselineKeeper(const LinkModel& model, const std::optional<DriftOptions>& drift);
@@ -27,6 +29,8 @@ class BaselineKeeper {
   /// frames, so that pictures solved again later tell the same; the clock's for frames without.
   void Take(BaselineOrigin origin, double pressure_mpa, const FrameTimes& times, const Clock& clock);
   double PressureChange(double pressure_mpa) const { return pressure_mpa - pressure_mpa_; }
+  /// How far the untouched skin has gone since, by marker; empty: that is not followed.
+  std::span<const Vec3> DriftMm() const { return drift_ ? follower_.drift_mm() : std::span<const Vec3>(); }
 
   /// Errors: kFailedPrecondition (one is under way).
   Result<void> BeginTare(const TareOptions& options);
@@ -35,12 +39,12 @@ class BaselineKeeper {
   void AbortTare(const std::string& why);
   std::optional<Result<TareSummary>> TakeTareEnd();
 
-  /// Takes the drift off a frame's displacements.
-  void Apply(const ShapeReconstructor& reconstructor, double pressure_mpa, SkinShape& shape);
+  /// A frame's shape, of which what the pressure alone has changed since the baseline is left out.
+  void Apply(const PressureReading& pressure, const SkinEstimate& estimate, const SkinShape& shape);
   /// Follows drift and takes a tare's frame, which may be its last; fills what the state says of the
   /// baseline.
-  void Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels,
-             ShapeReconstructor& reconstructor, const Clock& clock);
+  void Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels, SkinStage& skin,
+             StateEstimator& estimator, const Clock& clock);
 
   bool HasDriftedFar() const { return drift_ && follower_.largest_mm() > drift_->limit_mm; }
   std::string DriftAdvice() const;
@@ -48,7 +52,7 @@ class BaselineKeeper {
  private:
   void FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock);
   void TakeTareFrame(const FrameTimes& times, const LinkState& state, const LabelledMarkers& labels,
-                     ShapeReconstructor& reconstructor, const Clock& clock);
+                     SkinStage& skin, StateEstimator& estimator, const Clock& clock);
   double AgeS(const FrameTimes& times, const Clock& clock) const;
 
   const LinkModel model_;
@@ -58,8 +62,8 @@ class BaselineKeeper {
   double pressure_mpa_ = 0;
   DriftFollower follower_;
 
-  double frame_pressure_mpa_ = 0;  // of the frame in work
-  std::vector<Vec3> off_mm_;       // likewise: against the baseline as it was taken, without pressure's part
+  PressureReading frame_pressure_;  // of the frame in work
+  std::vector<Vec3> off_mm_;        // likewise: against the baseline as it was taken, without pressure's part
 
   std::optional<TareCollector> tare_;
   std::optional<Result<TareSummary>> tare_end_;

@@ -12,17 +12,13 @@
 #include "sensing/markers/marker_tracker.h"
 #include "sensing/markers/path_tracker.h"
 #include "sensing/pipeline/baseline_keeper.h"
+#include "sensing/pipeline/judge.h"
 #include "sensing/pipeline/rest_pose.h"
-#include "sensing/shape/reconstructor.h"
+#include "sensing/pipeline/skin_stage.h"
 
 namespace taclink {
 namespace {
 
-// Below these fractions of seen markers a link is called degraded, or lost.
-constexpr double kDegradedFraction = 0.7;
-constexpr double kLostFraction = 0.4;
-// Forces were compared with the truth down to dents of 15 mm.
-constexpr double kDeepestDentMm = 16;
 // Markers are followed across a gap of so many frames.
 constexpr uint64_t kMaxStep = 3;
 // Between a refused rest pair and the next that is tried, of exposure time: labelling what is no rest picture
@@ -30,21 +26,10 @@ constexpr uint64_t kMaxStep = 3;
 // within a second once its pictures serve.
 constexpr int64_t kFirstWaitNs = 66'000'000, kLongestWaitNs = 600'000'000;
 
-// Towards the axis since the baseline, of the marker that went furthest.
-double DeepestDent(const SkinShape& shape) {
-  double deepest_mm = 0;
-  for (size_t i = 0; i < shape.displacements_mm.size(); ++i) {
-    const Vec3& moved = shape.displacements_mm[i];
-    const Vec3 before = shape.positions_mm[i] - moved;
-    const double radius_mm = before.head<2>().norm();
-    if (radius_mm > 0) deepest_mm = std::max(deepest_mm, -before.head<2>().dot(moved.head<2>()) / radius_mm);
-  }
-  return deepest_mm;
-}
-
 void SetStatus(LinkState& state, LinkStatus status, std::string reason) {
   state.status = status;
   state.status_reason = std::move(reason);
+  state.reasons.clear();
 }
 
 }  // namespace
@@ -54,7 +39,7 @@ struct LinkPipeline::Stages {
       : model(link_model),
         options(pipeline_options),
         clock(pipeline_clock),
-        estimator(MakeForceEstimator(link_model, pipeline_options.force)),
+        estimator(MakeStateEstimator(link_model, pipeline_options.force)),
         finder(link_model, pipeline_options.contact),
         keeper(link_model, pipeline_options.drift) {
     BeginRest(options.rig, options.rest_frames, BaselineOrigin::kStart);
@@ -77,14 +62,14 @@ struct LinkPipeline::Stages {
   std::optional<CalibrationSummary> calibration;
   std::optional<PathTracker> acquirer;
   std::optional<MarkerTracker> tracker;
-  std::optional<ShapeReconstructor> reconstructor;
+  std::optional<SkinStage> skin;
 
   MarkerTracker::Pictures pictures;              // of the frame in work; empty where there is none
   AcquireReason reason = AcquireReason::kFirst;  // of the frame in work
   uint64_t sequence = 0;                         // of the frame before
   LabelledMarkers acquired, labels;
   std::vector<Vec3> predicted_mm;  // the shape of the last frame that had one
-  std::unique_ptr<ForceEstimator> estimator;
+  std::shared_ptr<StateEstimator> estimator;
   ContactFinder finder;
   BaselineKeeper keeper;
 
@@ -193,8 +178,14 @@ struct LinkPipeline::Stages {
   }
 
   // A pair before the baseline is known.
-  void TakeRest(const FrameTimes& times, double pressure_mpa, LinkState& state) {
+  void TakeRest(const FrameTimes& times, const PressureReading& pressure, LinkState& state) {
     Forget(state);
+    const auto inflation = estimator->InflationAt(pressure.mpa);
+    if (!inflation)
+      return SetStatus(
+          state, LinkStatus::kCalibrating,
+          "no skin of this model is stable under the pressure that is told; check the pressure and "
+          "the model's material");
     if (!camera_trouble.empty()) return SetStatus(state, LinkStatus::kCalibrating, camera_trouble);
     const auto complete = rest->Add(detections);
     rest_progress.taken = rest->taken();
@@ -209,42 +200,14 @@ struct LinkPipeline::Stages {
     calibration = rest->calibration();
     acquirer.emplace(model, calibration->rig);
     tracker.emplace(model, calibration->rig, options.tracking);
-    ShapeOptions shape_options;
-    double& sigma_px = shape_options.cameras.camera_sigma_px;
-    sigma_px = std::max(sigma_px, rest->noise_px());
-    shape_options.cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
-    shape_options.calibration_covariance = calibration->covariance;
-    reconstructor.emplace(model, calibration->rig, shape_options);
-    reconstructor->SetBaseline(rest->markers(), pressure_mpa);
-    keeper.Take(rest_origin, pressure_mpa, times, clock);
+    CameraEvidenceOptions cameras;
+    cameras.camera_sigma_px = std::max(cameras.camera_sigma_px, rest->noise_px());
+    cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
+    skin.emplace(model, *calibration, cameras);
+    skin->SetBaseline(rest->markers(), pressure, *inflation);
+    keeper.Take(rest_origin, pressure.mpa, times, clock);
     predicted_mm.clear();
     rest.reset();
-  }
-
-  void Judge(LinkState& state) const {
-    const int seen = state.shape.seen(), all = model.markers.count();
-    const auto count = [&] { return std::to_string(seen) + " of " + std::to_string(all) + " markers seen"; };
-    if (seen < kLostFraction * all) {
-      SetStatus(state, LinkStatus::kLost, count() + (camera_trouble.empty() ? "" : "; " + camera_trouble));
-      state.ClearMeasurement();
-    } else if (!camera_trouble.empty()) {
-      SetStatus(state, LinkStatus::kDegraded, camera_trouble);
-    } else if (seen < kDegradedFraction * all) {
-      SetStatus(state, LinkStatus::kDegraded, count());
-    } else if (!state.forces.converged) {
-      SetStatus(state, LinkStatus::kDegraded, kTooManyLoads);
-    } else if (state.pressure.stale) {
-      SetStatus(state, LinkStatus::kDegraded, "the pressure is not known: " + state.pressure.trouble);
-    } else if (keeper.HasDriftedFar()) {
-      SetStatus(state, LinkStatus::kDegraded, keeper.DriftAdvice());
-    } else if (const double dent_mm = DeepestDent(state.shape); dent_mm > kDeepestDentMm) {
-      char text[120];
-      std::snprintf(text, sizeof text, "pressed in by %.0f mm: beyond %.0f mm forces read too little",
-                    dent_mm, kDeepestDentMm);
-      SetStatus(state, LinkStatus::kDegraded, text);
-    } else {
-      SetStatus(state, LinkStatus::kOk, "");
-    }
   }
 
   // Labels that contradict the shape are no labels.
@@ -281,6 +244,21 @@ struct LinkPipeline::Stages {
   }
 };
 
+double PressureSigma(PressureOrigin origin) {
+  switch (origin) {
+    case PressureOrigin::kSimulated:
+      return 2e-5;
+    case PressureOrigin::kFile:
+    case PressureOrigin::kSerial:
+    case PressureOrigin::kClient:
+      return 5e-5;
+    case PressureOrigin::kNone:
+    case PressureOrigin::kConstant:
+      break;
+  }
+  return 1e-4;
+}
+
 LinkPipeline::LinkPipeline(const LinkModel& model, const PipelineOptions& options, Clock& clock)
     : stages_(std::make_unique<Stages>(model, options, clock)) {}
 LinkPipeline::~LinkPipeline() = default;
@@ -292,11 +270,12 @@ void LinkPipeline::Restart() {
   stages_->acquirer.reset();
   stages_->tracker.reset();
   stages_->predicted_mm.clear();
-  stages_->reconstructor.reset();
+  stages_->skin.reset();
+  stages_->estimator->Restart();
   stages_->finder = ContactFinder(stages_->model, stages_->options.contact);
 }
 
-void LinkPipeline::UseEstimator(std::unique_ptr<ForceEstimator> estimator) {
+void LinkPipeline::UseEstimator(std::shared_ptr<StateEstimator> estimator) {
   stages_->estimator = std::move(estimator);
 }
 
@@ -314,14 +293,14 @@ void LinkPipeline::BeginRest(int pairs) {
   stages_->BeginRest(std::nullopt, pairs, BaselineOrigin::kCalibration);
 }
 void LinkPipeline::CancelRest() {
-  if (stages_->reconstructor) stages_->rest.reset();
+  if (stages_->skin) stages_->rest.reset();
 }
 const RestProgress& LinkPipeline::rest_progress() const {
   return stages_->rest_progress;
 }
 
 Result<void> LinkPipeline::BeginTare(const TareOptions& options) {
-  if (stages_->rest || !stages_->reconstructor)
+  if (stages_->rest || !stages_->skin)
     return Error{ErrorCode::kFailedPrecondition,
                  "the link's rest shape is being taken; wait until it measures"};
   return stages_->keeper.BeginTare(options);
@@ -341,10 +320,11 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.pressure = frame.pressure;
   state.stage_ms = {};
   const bool stale = frame.pressure.stale;
-  // A sensor that fell silent: the forces hold on to what it said last, the shape finds the pressure itself.
-  const double pressure_mpa =
-      stale ? frame.pressure.mpa : frame.pressure_mpa.value_or(s.options.pressure_mpa);
-  const std::optional<double> known_mpa = stale ? std::nullopt : std::optional(pressure_mpa);
+  PressureReading told{
+      .mpa = stale ? frame.pressure.mpa : frame.pressure_mpa.value_or(s.options.pressure_mpa),
+      .sigma_mpa = s.options.pressure_sigma_mpa.value_or(PressureSigma(frame.pressure.origin))};
+  // A sensor that fell silent: the shape tells the pressure.
+  const std::optional<PressureReading> known = stale ? std::nullopt : std::optional(told);
 
   const auto timed = [&s](double& stage_ms, auto&& stage) {
     const int64_t start = s.clock.MonotonicNs();
@@ -356,23 +336,32 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });
   if (s.rest) {
     if (stale) return s.WaitForPressure(state);
-    s.TakeRest(frame.times, pressure_mpa, state);
+    s.TakeRest(frame.times, told, state);
     return;
   }
   timed(state.stage_ms.register_, [&] { s.Label(state); });
   state.times.tracked_ns = s.clock.MonotonicNs();
-  timed(state.stage_ms.reconstruct, [&] { s.reconstructor->Reconstruct(s.labels, known_mpa, state.shape); });
+  timed(state.stage_ms.force,
+        [&] { s.skin->Run(s.labels, known, s.keeper.DriftMm(), *s.estimator, s.finder, state, told); });
   s.TakeBackRejected(state);
   s.predicted_mm = state.shape.positions_mm;
-  s.keeper.Apply(*s.reconstructor, pressure_mpa, state.shape);
-  timed(state.stage_ms.force, [&] {
-    s.estimator->Estimate(state.shape, s.keeper.PressureChange(pressure_mpa), state.forces);
-    s.finder.Find(state.shape, state.forces, state.contacts);
-  });
+  const SkinEstimate& estimate = s.estimator->estimate();
+  if (estimate.failure == EstimateFailure::kNone) {
+    s.keeper.Apply(told, estimate, state.shape);
+    state.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
+  } else {
+    state.pressure_estimate.reset();
+  }
   state.total_force_n.setZero();
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
-  s.Judge(state);
-  s.keeper.Learn(frame.times, state, s.labels, *s.reconstructor, s.clock);
+  Judge({.model = s.model,
+         .camera_trouble = s.camera_trouble,
+         .drift_advice = s.keeper.HasDriftedFar() ? s.keeper.DriftAdvice() : "",
+         .told = told,
+         .estimate = estimate},
+        state);
+  if (estimate.failure == EstimateFailure::kNone)
+    s.keeper.Learn(frame.times, state, s.labels, *s.skin, *s.estimator, s.clock);
   state.times.solved_ns = s.clock.MonotonicNs();
 }
 

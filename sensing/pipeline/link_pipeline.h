@@ -12,9 +12,9 @@
 #include "sensing/core/link_state.h"
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
-#include "sensing/force/force_estimator.h"
 #include "sensing/markers/marker_tracker.h"
 #include "sensing/pipeline/drift_options.h"
+#include "sensing/pipeline/state_estimator.h"
 
 namespace taclink {
 
@@ -23,6 +23,8 @@ struct PipelineOptions {
   std::optional<StereoRig> rig;
   /// Gauge pressure where the source does not measure it.
   double pressure_mpa = 0;
+  /// Standard deviation of the pressure, whoever tells it; none: as is usual for its source (PressureSigma).
+  std::optional<double> pressure_sigma_mpa;
   /// The baseline is the mean of so many rest pairs. They must be untouched.
   int rest_frames = 8;
   /// Search the full pictures in every frame instead of following the markers.
@@ -34,8 +36,9 @@ struct PipelineOptions {
   std::optional<DriftOptions> drift;
 };
 
-/// LinkState's reason where the forces did not converge.
-inline constexpr const char* kTooManyLoads = "more loads than the force model takes";
+/// Standard deviation of a gauge pressure by who tells it: a sensor's gauge is off by some 50 Pa, what a
+/// configuration says may be off by more, and a simulation knows.
+double PressureSigma(PressureOrigin origin);
 
 /// How the taking of rest pairs goes.
 struct RestProgress {
@@ -78,7 +81,7 @@ class LinkPipeline {
 
   /// Computes the forces so from the next frame on; baseline and contacts stay. Not null, and made for the
   /// same model.
-  void UseEstimator(std::unique_ptr<ForceEstimator> estimator);
+  void UseEstimator(std::shared_ptr<StateEstimator> estimator);
 
   const LinkModel& model() const;
   /// Of the last pair that was measured: which detection is which marker.

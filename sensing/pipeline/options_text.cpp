@@ -18,6 +18,7 @@ constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr const char* kForceModel = "force.model";
 constexpr const char* kForceRefinement = "force.refinement";
 constexpr const char* kPressure = "pressure_mpa";
+constexpr const char* kPressureSigma = "pressure_sigma_mpa";  // not there: as is usual for the source
 constexpr const char* kDriftFollow = "drift.follow";
 struct DriftNumber {
   const char* key;
@@ -115,6 +116,7 @@ TextMap OptionsText(const PipelineOptions& options) {
                   {kForceRefinement, std::to_string(options.force.refinement)},
                   {kPressure, NumberText(options.pressure_mpa)},
                   {kDriftFollow, options.drift ? "true" : "false"}};
+  if (options.pressure_sigma_mpa) text[kPressureSigma] = NumberText(*options.pressure_sigma_mpa);
   if (!options.drift) return text;
   for (const DriftNumber& number : kDriftNumbers)
     text[number.key] = NumberText((*options.drift).*number.value);
@@ -135,6 +137,7 @@ Result<PipelineOptions> ParseOptionsText(const TextMap& text) {
   if (options.force.refinement != refinement)
     reader.Fail(std::string("'") + kForceRefinement + "' is not a whole number");
   options.pressure_mpa = reader.Number(kPressure, -1, 1);
+  if (text.contains(kPressureSigma)) options.pressure_sigma_mpa = reader.Number(kPressureSigma, 1e-9, 1);
   if (reader.Bool(kDriftFollow)) options.drift = ReadDrift(reader);
   if (const std::string trouble = reader.Finish(); !trouble.empty()) return Bad(trouble);
   return options;

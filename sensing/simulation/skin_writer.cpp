@@ -14,7 +14,8 @@ double StartTruth(const Scene& scene, double time_s, SkinTruth& truth) {
   return t;
 }
 
-SkinWriter::SkinWriter(const LinkModel& model, const ShellMesh& mesh) : model_(model), mesh_(mesh) {
+SkinWriter::SkinWriter(const LinkModel& model, const ShellMesh& mesh)
+    : model_(model), mesh_(mesh), map_(model, mesh) {
   for (size_t i = 0; i < mesh.mid_mm.size(); ++i) {
     const Vec3 wall = mesh.mid_mm[i] - model.thickness_mm / 2 * mesh.normals[i];
     rest_wall_radius_mm_.push_back(wall.head<2>().norm());
@@ -49,13 +50,12 @@ void SkinWriter::WriteMarkers(const SkinNodes& nodes, SkinTruth& truth) const {
   truth.marker_mm.resize(count);
   truth.marker_wall_mm.resize(count);
   truth.marker_normal.resize(count);
-  const double half = model_.thickness_mm / 2;
   for (size_t m = 0; m < count; ++m) {
-    const auto node = static_cast<size_t>(mesh_.NodeOfMarker(model_, static_cast<int>(m)));
-    const Vec3& mid = nodes.mids_mm[node];
+    const auto marker = static_cast<int>(m);
+    const auto node = static_cast<size_t>(map_.node(marker));
     const Vec3& director = nodes.directors[node];
-    truth.marker_mm[m] = mid + (half - model_.markers.center_depth_mm) * director;
-    truth.marker_wall_mm[m] = mid - half * director;
+    truth.marker_mm[m] = map_.Position(nodes.mids_mm, nodes.directors, marker);
+    truth.marker_wall_mm[m] = nodes.mids_mm[node] - map_.HalfThickness(nodes.mids_mm, marker) * director;
     truth.marker_normal[m] = director.normalized();
   }
 }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sensing/core/link_model.h"
+#include "sensing/mechanics/marker_map.h"
 #include "sensing/mechanics/shell_mesh.h"
 #include "sensing/simulation/scene.h"
 #include "sensing/simulation/skin_truth.h"
@@ -33,6 +34,7 @@ class SkinWriter {
 
   LinkModel model_;
   const ShellMesh& mesh_;
+  const MarkerMap map_;
   std::vector<double> rest_wall_radius_mm_;
 };
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sensing/model/model_file.h"
+#include "sensing/pipeline/state_estimator.h"
 #include "server/assembly/encoder.h"
 #include "server/assembly/pressure_factory.h"
 #include "server/assembly/processor_factory.h"
@@ -48,7 +49,7 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
           [link, model = *model](ForceModel force_model) {
             LinkConfig changed = link;
             changed.force_model = force_model;
-            return MakeForceEstimator(model, ToPipelineOptions(changed).force);
+            return MakeStateEstimator(model, ToPipelineOptions(changed).force);
           },
       .choose = [chosen](ForceModel force_model) { chosen->Set(force_model); }};
   auto source = factories.source();

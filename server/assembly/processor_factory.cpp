@@ -10,7 +10,7 @@
 namespace taclink::server {
 namespace {
 
-constexpr double kMpaPerKpa = 1e-3;
+constexpr double kMpaPerKpa = 1e-3, kMpaPerPa = 1e-6;
 
 bool IsMissing(const std::string& path) {
   std::error_code ignored;
@@ -33,7 +33,7 @@ class PipelineProcessor final : public LinkProcessor {
   void CancelTare() override { pipeline_.CancelTare(); }
 
   const LabelledMarkers* labels() const override { return &pipeline_.labels(); }
-  Result<void> UseEstimator(std::unique_ptr<ForceEstimator> estimator) override {
+  Result<void> UseEstimator(std::shared_ptr<StateEstimator> estimator) override {
     pipeline_.UseEstimator(std::move(estimator));
     return {};
   }
@@ -98,6 +98,7 @@ PipelineOptions ToPipelineOptions(const LinkConfig& link) {
   if (link.pressure) {
     if (const auto* constant = std::get_if<ConstantPressureConfig>(&link.pressure->source))
       options.pressure_mpa = constant->kpa * kMpaPerKpa;
+    if (link.pressure->sigma_pa) options.pressure_sigma_mpa = *link.pressure->sigma_pa * kMpaPerPa;
   }
   return options;
 }

@@ -49,7 +49,7 @@ TEST(CalculiX, PushesNeedTheSameForce) {
     if (judged.quantity != "probe_force" || (judged.name != "push-j5" && judged.name != "push-j8")) continue;
     const int ring = judged.name == "push-j5" ? 5 : 8;
     const double force_n = Pushed(SkinOf(judged.law), ring, judged.depth_mm, judged.pressure_kpa).force_n;
-    EXPECT_NEAR(force_n / judged.value, 1, 0.06) << judged.name << " " << judged.law << " " << judged.depth_mm
+    EXPECT_NEAR(force_n / judged.value, 1, 0.04) << judged.name << " " << judged.law << " " << judged.depth_mm
                                                  << " mm " << judged.pressure_kpa << " kPa";
     std::printf("%s %s %g mm %g kPa: bricks %.4f N, shell %.4f N\n", judged.name.c_str(), judged.law.c_str(),
                 judged.depth_mm, judged.pressure_kpa, judged.value, force_n);
@@ -63,7 +63,8 @@ TEST(CalculiX, InflationIsTheSame) {
   for (const Judged& judged : Judgements()) {
     if (judged.name != "tube-inflation" || judged.quantity != "radial_middle:middle") continue;
     const double inflation_mm = Pushed(SkinOf(judged.law), 5, -9, judged.pressure_kpa).inflation_mm;
-    EXPECT_NEAR(inflation_mm / judged.value, 1, 0.08) << judged.law << " " << judged.pressure_kpa << " kPa";
+    // 1 % of it is the bricks' nu = 0.49 (docs/calculix.md).
+    EXPECT_NEAR(inflation_mm / judged.value, 1, 0.02) << judged.law << " " << judged.pressure_kpa << " kPa";
     std::printf("inflation %s %g kPa: bricks %.3f mm, shell %.3f mm\n", judged.law.c_str(),
                 judged.pressure_kpa, judged.value, inflation_mm);
     ++compared;

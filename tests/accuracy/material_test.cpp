@@ -85,10 +85,8 @@ TEST_P(MaterialOf, AnotherMeshComesOutWithinItsStandardDeviation) {
   EXPECT_LT(squares / kSeeds, 3);
 }
 
-// calculix/results.csv by pressure and, at 1 kPa, by z; radial growth of the inner wall or of the
-// mid-surface.
-std::vector<std::pair<double, double>> GrowthAlong(const std::string& law, const std::string& wall,
-                                                   double pressure_kpa) {
+// Radial growth of the inner wall in calculix/results.csv, at a pressure; at 1 kPa along z.
+std::vector<std::pair<double, double>> GrowthAlong(const std::string& law, double pressure_kpa) {
   std::ifstream file(std::string(TACLINK_TEST_DATA) + "/../accuracy/calculix/results.csv");
   std::vector<std::pair<double, double>> all;
   for (std::string line; std::getline(file, line);) {
@@ -96,8 +94,8 @@ std::vector<std::pair<double, double>> GrowthAlong(const std::string& law, const
     std::vector<std::string> cells;
     for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
     if (cells[0] != "tube-inflation" || cells[1] != law || std::stod(cells[4]) != pressure_kpa) continue;
-    const std::string along = wall + ":z=";
-    if (cells[6] == wall + ":middle") all.emplace_back(99, std::stod(cells[7]));
+    const std::string along = "radial_inner:z=";
+    if (cells[6] == "radial_inner:middle") all.emplace_back(99, std::stod(cells[7]));
     if (cells[6].rfind(along, 0) == 0)
       all.emplace_back(std::stod(cells[6].substr(along.size())), std::stod(cells[7]));
   }
@@ -113,42 +111,40 @@ double At(const std::vector<std::pair<double, double>>& points, double z) {
   return points.back().second;
 }
 
-// Three-dimensional bricks of 0.1 MPa. The shell's wall can't thin (docs/calculix.md), so it finds them
-// softer.
+// Three-dimensional bricks of 0.1 MPa and nu = 0.49, whose inner wall, where the markers are, grows by 1 %
+// more than an incompressible one's; the St. Venant-Kirchhoff solid is softened by compression through the
+// wall as well, which a plane-stress shell of that law does not know.
 TEST_P(MaterialOf, BricksOfCalculiX) {
   const std::string law = GetParam() == kRubber ? "neo-hookean" : "st-venant-kirchhoff";
-  for (const auto& [wall, least, most] :
-       {std::tuple("radial_middle", 0.92, 1.0), std::tuple("radial_inner", 0.86, 0.97)}) {
-    std::vector<InflationRecord> records;
-    for (const double kpa : {0.5, 1.0, 1.5}) {
-      const auto along = GrowthAlong(law, wall, kpa);
-      ASSERT_FALSE(along.empty()) << law << " " << wall << " " << kpa;
-      std::map<int, double> growth;
-      for (int ring = 0; ring < model_.markers.rings(); ++ring) {
-        const double z = model_.markers.rings_z_mm[static_cast<size_t>(ring)];
-        const double from_end = std::min(z, model_.length_mm - z);
-        if (along.size() > 1 || from_end > 80) growth[ring] = At(along, from_end);
-      }
-      records.push_back(Radial(kpa, growth));
+  std::vector<InflationRecord> records;
+  for (const double kpa : {0.5, 1.0, 1.5}) {
+    const auto along = GrowthAlong(law, kpa);
+    ASSERT_FALSE(along.empty()) << law << " " << kpa;
+    std::map<int, double> growth;
+    for (int ring = 0; ring < model_.markers.rings(); ++ring) {
+      const double z = model_.markers.rings_z_mm[static_cast<size_t>(ring)];
+      const double from_end = std::min(z, model_.length_mm - z);
+      if (along.size() > 1 || from_end > 80) growth[ring] = At(along, from_end);
     }
-    const auto fit = FitMaterial(model_, GetParam(), records, {});
-    ASSERT_TRUE(fit.ok()) << fit.error().message;
-    Print(wall, *fit);
-    EXPECT_GT(fit->material.youngs_modulus_mpa, least * 0.1) << wall;
-    EXPECT_LT(fit->material.youngs_modulus_mpa, most * 0.1) << wall;
-    EXPECT_LT(fit->misfit, 0.05);
+    records.push_back(Radial(kpa, growth));
   }
+  const auto fit = FitMaterial(model_, GetParam(), records, {});
+  ASSERT_TRUE(fit.ok()) << fit.error().message;
+  Print("bricks", *fit);
+  EXPECT_NEAR(fit->material.youngs_modulus_mpa, 0.1, GetParam() == kRubber ? 0.002 : 0.004);
+  EXPECT_LT(fit->misfit, 0.02);
 }
 
-// The real TacLINK: sixteen probe forces, published with the prototype, and 4.5 mm of growth in the middle at
-// 1.5 kPa (thesis, 5.9).
+// The real TacLINK: twelve probe forces under pressure, published with the prototype, and 4.5 mm of growth in
+// the middle at 1.5 kPa (thesis, 5.9). What the shipped cylinder's material comes from. (Its four forces
+// without pressure are three to five steps of the load cell and only blur this.)
 TEST_P(MaterialOf, TheRealSkin) {
-  constexpr double kForces[] = {0.0931, 0.3729, 0.6217, 0.9012, 0.1242, 0.5904, 1.0254, 1.3984,
-                                0.0933, 0.4038, 0.6831, 0.9626, 0.1560, 0.6528, 1.0564, 1.4599};
+  constexpr double kForces[] = {0.3729, 0.6217, 0.9012, 0.5904, 1.0254, 1.3984,
+                                0.4038, 0.6831, 0.9626, 0.6528, 1.0564, 1.4599};
   std::vector<ProbeRecord> probes;
   for (const int ring : {4, 7}) {
     for (const double depth_mm : {5, 10}) {
-      for (const double kpa : {0.0, 0.5, 1.0, 1.5}) {
+      for (const double kpa : {0.5, 1.0, 1.5}) {
         probes.push_back({.name = "row " + std::to_string(probes.size() + 1),
                           .ring = ring,
                           .depth_mm = depth_mm,
@@ -161,22 +157,29 @@ TEST_P(MaterialOf, TheRealSkin) {
   const auto fit = FitMaterial(model_, GetParam(), {&inflation, 1}, probes);
   ASSERT_TRUE(fit.ok()) << fit.error().message;
   Print("real skin", *fit);
-  for (const ProbeFit& one : fit->probes)
+  double error = 0;
+  for (const ProbeFit& one : fit->probes) {
     std::printf("  %s: measured %.3f N, model %.3f N\n", one.name.c_str(), one.measured_n, one.model_n);
-  std::printf("  tension %.1f\n", fit->tension);
-  // One modulus does both with this law, but not with rubber, which is stiffer in inflation than under
-  // forces.
+    error += std::abs(one.model_n / one.measured_n - 1) / static_cast<double>(fit->probes.size());
+  }
+  std::printf("  mean error %.2f %%, tension %.1f\n", 100 * error, fit->tension);
+  // Inflation wants a stiffer skin than the forces with both laws, but with this one by no more than a probe
+  // differs from day to day (10 to 27 %), and one modulus does both.
+  const double apart = fit->inflation->youngs_modulus_mpa / fit->probe->youngs_modulus_mpa - 1;
   if (GetParam() == kSvk) {
-    EXPECT_LT(std::abs(fit->tension), 2);
-    EXPECT_LT(fit->misfit, 0.06);
-    EXPECT_NEAR(fit->material.youngs_modulus_mpa, 0.095, 0.004);
+    EXPECT_LT(std::abs(apart), 0.13);
+    EXPECT_LT(fit->misfit, 0.055);
+    EXPECT_LT(error, 0.04);
+    EXPECT_NEAR(fit->material.youngs_modulus_mpa, model_.material.youngs_modulus_mpa, 3e-4);
+    EXPECT_NEAR(fit->sigma_mpa, model_.material_evidence->sigma_mpa, 3e-4);
   } else {
-    EXPECT_GT(fit->tension, 3);
-    EXPECT_GT(fit->sigma_mpa, 0.005);
+    EXPECT_GT(apart, 0.2);
+    EXPECT_GT(fit->misfit, 0.08);
+    EXPECT_GT(error, 0.05);
   }
   const KindFit& forces = *fit->probe;
   EXPECT_NEAR(forces.youngs_modulus_mpa, 0.1, 0.02);
-  EXPECT_LT(forces.sigma_mpa, 0.01);
+  EXPECT_LT(forces.sigma_mpa, 0.012);
   EXPECT_GT(forces.sigma_mpa, 0.001);
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "sensing/model/model_file.h"
 #include "tests/accuracy/probe.h"
@@ -32,10 +33,11 @@ TEST(ProbeForce, OfTheShippedSkinIsTheRealOnes) {
   double sum = 0;
   for (const auto& [ring, depth_mm, pressure_kpa, force_n] : kMeasured) {
     const double relative = Pushed(model, ring, depth_mm, pressure_kpa).force_n / force_n - 1;
-    EXPECT_LT(std::abs(relative), 0.12) << ring << " " << depth_mm << " mm " << pressure_kpa << " kPa";
+    EXPECT_LT(std::abs(relative), 0.08) << ring << " " << depth_mm << " mm " << pressure_kpa << " kPa";
     sum += std::abs(relative);
   }
-  EXPECT_LE(sum / kMeasured.size(), 0.05);
+  std::printf("mean error of the shipped skin: %.2f %%\n", 100 * sum / kMeasured.size());
+  EXPECT_LE(sum / kMeasured.size(), 0.04);
   // The real skin grew by about 4.5 mm at 1.5 kPa (thesis, 5.9).
   EXPECT_NEAR(Pushed(model, 5, -3, 1.5).inflation_mm, 4.5, 0.9);
 }

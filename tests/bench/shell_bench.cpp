@@ -16,7 +16,7 @@ struct Bench {
       : model(LoadLinkModel("cylinder").value()),
         shell(SkinSurface(MakeShellMesh(model, refinement)), model.material),
         state(shell.Rest()),
-        pressure(model.thickness_mm, 1e-3),
+        pressure(1e-3),
         hessian(shell.Pattern()),
         factor(hessian) {}
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "sensing/capture/decode.h"
+#include "sensing/pipeline/state_estimator.h"
 #include "taclink/v1/tactile.grpc.pb.h"
 #include "tests/integration/support.h"
 
@@ -30,11 +31,6 @@ LabelledMarkers TwoMarkers() {
   return labels;
 }
 
-class NoForces final : public ForceEstimator {
- public:
-  void Estimate(const SkinShape&, double, NodalForces&) override {}
-};
-
 /// Finds two markers; the source takes any setting but a gain of 99.
 class LinkCallsTest : public ::testing::Test {
  protected:
@@ -56,7 +52,7 @@ class LinkCallsTest : public ::testing::Test {
     CalibrationProgress PollCalibration() override { return {}; }
     void CancelCalibration() override {}
     const LabelledMarkers* labels() const override { return &labels_; }
-    Result<void> UseEstimator(std::unique_ptr<ForceEstimator> estimator) override {
+    Result<void> UseEstimator(std::shared_ptr<StateEstimator> estimator) override {
       EXPECT_NE(estimator, nullptr);
       ++log_->used;
       log_->used.notify_all();
@@ -95,10 +91,10 @@ class LinkCallsTest : public ::testing::Test {
         {.description = {.name = "upper", .model = *LoadLinkModel("cylinder")},
          .source = std::make_unique<Source>(script_, log_),
          .processor = std::make_unique<Processor>(log_),
-         .factories = {.estimator = [log = log_](ForceModel model) -> std::unique_ptr<ForceEstimator> {
+         .factories = {.estimator = [log = log_](ForceModel model) -> std::shared_ptr<StateEstimator> {
            const std::lock_guard lock(log->mutex);
            log->made.push_back(model);
-           return std::make_unique<NoForces>();
+           return MakeStateEstimator(*LoadLinkModel("cylinder"), {.model = model});
          }}});
     arm_ = std::make_unique<Arm>("test", std::move(links), MakeEncoder({"upper"}), clock_,
                                  ArmOptions{.worker = {.poll = std::chrono::milliseconds(5)}});

@@ -67,7 +67,9 @@ void Strip(Detail detail, v1::LinkFrame& frame) {
   frame.clear_marker_sources();
   frame.clear_force_residual();
   frame.clear_force_not_converged();
-  if (detail == Detail::kContacts) frame.clear_positions_m();
+  if (detail != Detail::kContacts) return;
+  frame.clear_positions_m();
+  for (v1::Contact& contact : *frame.mutable_contacts()) contact.clear_outline_m();
 }
 
 template <typename T>

@@ -49,8 +49,10 @@ from taclink.messages.frame import (
     Contact,
     Frame,
     FrameTimes,
+    PressureEstimate,
     PressureReport,
     StageTimes,
+    StatusReason,
     StreamCounts,
 )
 from taclink.messages.others import (
@@ -164,6 +166,7 @@ __all__ = [
     "Picture",
     "Pose",
     "PoseValidity",
+    "PressureEstimate",
     "PressureOrigin",
     "PressureReport",
     "PressureSummary",
@@ -183,6 +186,7 @@ __all__ = [
     "Source",
     "SourceKind",
     "StageTimes",
+    "StatusReason",
     "StreamCounts",
     "Supervision",
     "TaclinkError",

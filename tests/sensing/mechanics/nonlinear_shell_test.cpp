@@ -89,7 +89,7 @@ TEST_P(Derivatives, OfTheElement) {
 
 TEST_P(Derivatives, OfPressureAndContact) {
   const NonlinearShell shell(SmallSurface(), MaterialOf(GetParam()));
-  const FollowerPressure pressure(kThickness, 5e-3);
+  const FollowerPressure pressure(5e-3);
   RigidContact ball(shell, {.spacing_mm = 2, .stiffness_n_mm3 = 0.5, .sticks = true});
   ball.SetBody(RigidSphere{{47, 5, 10}, 8});
   ball.Hold(Disturbed(shell, 0.4, 3));

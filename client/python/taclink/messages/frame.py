@@ -41,9 +41,30 @@ class Contact:
     force_n: FloatArray  # (3,), what the world exerts on the skin
     force_covariance_n2: FloatArray | None  # (3, 3); None: not known
     center_covariance_m2: FloatArray | None  # (3, 3); likewise
-    normal_force_n: float  # pressing in is positive
+    normal_force_n: float  # integral of the inward load: of a hug, whose resultant is none, all it presses with
     area_m2: float
     markers: IntArray  # (k,), indices of the loaded markers
+    moment_nm: FloatArray  # (3,), of the load about the link frame's origin
+    peak_pressure_pa: float
+    major_axis_m: FloatArray  # (3,), as long as the load's standard deviation along it
+    minor_axis_m: FloatArray  # (3,)
+    outline_m: FloatArray  # (k, 3), polygon on the deformed skin; no rows below detail geometry
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StatusReason:
+    """Why a frame is worse than it could be."""
+
+    id: str  # stable
+    text: str  # for people, with what to do
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PressureEstimate:
+    """Gauge pressure that the skin's shape and the sensor tell together."""
+
+    pressure_pa: float
+    sigma_pa: float  # standard deviation
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -109,9 +130,11 @@ class Frame:
     times: FrameTimes
     status: LinkStatus
     status_reason: str  # empty when the status is OK
+    status_reasons: tuple[StatusReason, ...]  # all of them, the gravest first
     detail: Detail
     pressure_pa: float | None  # gauge; None: not measured
     pressure: PressureReport | None  # None: a frame without a picture
+    pressure_estimate: PressureEstimate | None  # None: nothing was estimated
     markers_seen: int
     markers_inferred: int
     contacts: tuple[Contact, ...]
@@ -170,6 +193,10 @@ def _contact_from(message: frame_pb2.Contact) -> Contact:
         force_covariance_n2=covariance(message.force_covariance_n2),
         center_covariance_m2=covariance(message.center_covariance_m2),
         markers=whole_numbers(message.markers),
+        moment_nm=vector(message.moment_nm),
+        major_axis_m=vector(message.major_axis_m),
+        minor_axis_m=vector(message.minor_axis_m),
+        outline_m=rows(message.outline_m, 3),
     )
 
 
@@ -192,6 +219,10 @@ def frame_from(message: frame_pb2.LinkFrame, client_utc_ns: int = 0, gap: int | 
         detail=name_of(Detail, message.detail),
         pressure_pa=optional(message, "pressure_pa"),
         pressure=_pressure_from(message.pressure) if message.HasField("pressure") else None,
+        status_reasons=tuple(alike(StatusReason, reason) for reason in message.status_reasons),
+        pressure_estimate=alike(PressureEstimate, message.pressure_estimate)
+        if message.HasField("pressure_estimate")
+        else None,
         contacts=tuple(map(_contact_from, message.contacts)),
         total_force_n=vector(message.total_force_n),
         force_model=name_of(ForceModel, message.force_model),

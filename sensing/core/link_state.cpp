@@ -1,0 +1,42 @@
+#include "sensing/core/link_state.h"
+
+namespace taclink {
+
+const char* Name(ReasonId id) {
+  switch (id) {
+    case ReasonId::kFewMarkers:
+      return "few_markers";
+    case ReasonId::kCamera:
+      return "camera";
+    case ReasonId::kNotConverged:
+      return "not_converged";
+    case ReasonId::kImpossible:
+      return "impossible";
+    case ReasonId::kNoEquilibrium:
+      return "no_equilibrium";
+    case ReasonId::kPressureUnknown:
+      return "pressure_unknown";
+    case ReasonId::kPressureMismatch:
+      return "pressure_mismatch";
+    case ReasonId::kResidual:
+      return "residual";
+    case ReasonId::kLabels:
+      return "labels";
+    case ReasonId::kTooDeep:
+      return "too_deep";
+    case ReasonId::kBeyondMarkers:
+      return "beyond_markers";
+    case ReasonId::kDrift:
+      return "drift";
+  }
+  return "unknown";
+}
+
+std::optional<ReasonId> ReasonNamed(std::string_view name) {
+  for (int i = 0; i < kReasonCount; ++i) {
+    if (name == Name(static_cast<ReasonId>(i))) return static_cast<ReasonId>(i);
+  }
+  return std::nullopt;
+}
+
+}  // namespace taclink

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "sensing/camera/projection.h"
+#include "sensing/core/link_model.h"
+#include "sensing/core/markers.h"
+#include "sensing/core/skin_shape.h"
+#include "sensing/estimation/assimilation.h"
+#include "sensing/estimation/dome_looks.h"
+
+namespace taclink {
+
+struct CameraEvidenceOptions {
+  /// Markers are half balls that show another side to a camera as the wall tilts; false: points.
+  bool domes = true;
+  /// Error of the calibrated cameras themselves, px; added to each detection's.
+  double camera_sigma_px = 0.1;
+  /// Error of the places at rest beyond the covariances that come with them, px.
+  double rest_sigma_px = 0;
+  /// How a marker's fixed residual (see SetBaseline) changes as it moves, px per px.
+  double residual_drift = 0.01;
+  /// Fixed residual where the rest pictures do not tell it, px; more than the second at rest is no marker.
+  double unknown_residual_px = 1;
+  double max_residual_px = 8;
+  /// The two rays of a marker that pass each other by more than so many sigmas are not of one marker.
+  double stereo_sigmas = 6;
+  /// An observation that is off the estimate by more sigmas, the model's own errors allowed for, is no
+  /// marker.
+  double outlier_sigmas = 6;
+};
+
+/// Both cameras' labeled markers as displacements. Where both cameras see a marker its place follows from its
+/// two rays alone, whatever a model expects; where one does, along its ray it is where the estimate has it.
+/// One thread; no allocation after construction. Displacements: from the model's rest, stacked, link frame,
+/// mm.
+class CameraEvidence {
+ public:
+  CameraEvidence(const LinkModel& model, const StereoRig& rig, const CameraEvidenceOptions& options);
+
+  /// Takes the markers at rest, where they are displaced by `u` from the model. What their pixels are off the
+  /// model's projection is systematic (the lens, a marker's place in the mould), and is subtracted from later
+  /// observations, whose variance its noise joins. `keep_unseen`: what `rest` does not show keeps its fixed
+  /// residual, and a large one is believed, as the labels are those of a skin that is followed.
+  void SetBaseline(const LabelledMarkers& rest, const Eigen::VectorXd& u, bool keep_unseen = false);
+
+  /// Takes the walls' tilts from displacements `u`: the last estimate. Returns the longest change of a seen
+  /// point against its marker's centre, mm; if it is large, the estimate is worth repeating.
+  double UpdateLooks(const Eigen::VectorXd& u);
+
+  /// A new frame's observations.
+  void Observe(const LabelledMarkers& markers);
+  /// What they say of the displacements, those of one camera linearized about `u`.
+  void Measure(const Eigen::VectorXd& u, MarkerObservations& observed);
+  /// Leaves out observations that contradict an estimate, and takes those of suspect pairs back that agree
+  /// with it. `covariances`: of the model's error, by marker. True: something changed; measure again.
+  bool Reconsider(const Eigen::VectorXd& u, std::span<const Mat3> covariances);
+
+  bool Uses(int marker, CameraId id) const { return At(marker, id).in_use(); }
+  bool IsDropped(int marker, CameraId id) const {
+    const Observation& o = At(marker, id);
+    return o.seen && o.dropped;
+  }
+
+ private:
+  struct Observation {
+    bool seen = false, dropped = false;
+    Vec2 pixel = Vec2::Zero();  // fixed residual subtracted
+    Mat2 covariance = Mat2::Zero(), weight = Mat2::Zero();
+    bool has_baseline = false;
+    Vec2 residual = Vec2::Zero();  // fixed one
+    Mat2 residual_covariance = Mat2::Zero();
+    Vec2 rest_px = Vec2::Zero();
+    bool linear = false;  // the rest is of the linearization
+    Vec3 at = Vec3::Zero();
+    Vec3 seen_offset = Vec3::Zero();  // from the centre to what is seen
+    Vec2 projected = Vec2::Zero();
+    Eigen::Matrix<double, 2, 3> jacobian = Eigen::Matrix<double, 2, 3>::Zero();
+
+    bool in_use() const { return seen && !dropped && linear; }
+  };
+
+  const Observation& At(int marker, CameraId id) const {
+    return observations_[static_cast<size_t>(marker) * kCameraCount + Index(id)];
+  }
+  void Linearise(Observation& o, size_t camera, int marker, const Vec3& u) const;
+  void FillUnknownResiduals();
+  double Triangulate(int marker, Vec3& place, Mat3& information);
+  double Misfit(size_t observation, const Vec3& u, const Mat3& covariance);
+
+  const CameraEvidenceOptions options_;
+  const int paths_, rings_;
+  const std::vector<Projector> projectors_;
+  std::vector<Vec3> rest_mm_;  // link frame
+  DomeLooks looks_;
+  std::vector<Observation> observations_;
+  std::vector<char> is_suspect_;  // by marker: its two rays do not meet
+};
+
+}  // namespace taclink

@@ -1,0 +1,179 @@
+#include "sensing/estimation/linearization.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "sensing/mechanics/element_load.h"
+
+namespace taclink {
+namespace {
+
+// Within this of a clamp, the normal of what presses is between the skin's and that at rest: the wall turns
+// there within less than a body's width.
+constexpr double kNearClampMm = 30, kOwnNormalShare = 0.35;
+
+}  // namespace
+
+Linearization::Linearization(const SkinMechanics& mechanics)
+    : mechanics_(mechanics),
+      hessian_(mechanics.shell().Pattern()),
+      factor_(hessian_),
+      jacobian_(mechanics.markers().MakeJacobian(mechanics.shell())),
+      frames_(static_cast<size_t>(mechanics.site_count())) {}
+
+// Directors smoothed over neighbours: a body is smoother than a mesh.
+void Linearization::SetFrames() {
+  const ShellMesh& mesh = mechanics_.mesh();
+  const auto at = [&](const std::vector<Vec3>& all, int column, int row) -> const Vec3& {
+    return all[static_cast<size_t>(mesh.Node(column, row))];
+  };
+  std::vector<Vec3> smooth = state_.directors, along = smooth;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int row = 0; row < mesh.rows; ++row) {
+      for (int c = 0; c < mesh.columns; ++c)
+        along[static_cast<size_t>(mesh.Node(c, row))] =
+            0.5 * at(smooth, c, row) + 0.25 * (at(smooth, c + 1, row) + at(smooth, c - 1, row));
+    }
+    smooth = along;
+    for (int row = 1; row + 1 < mesh.rows; ++row) {
+      for (int c = 0; c < mesh.columns; ++c)
+        smooth[static_cast<size_t>(mesh.Node(c, row))] =
+            0.5 * at(along, c, row) + 0.25 * (at(along, c, row + 1) + at(along, c, row - 1));
+    }
+  }
+  for (int site = 0; site < mechanics_.site_count(); ++site) {
+    const auto node = static_cast<size_t>(mechanics_.NodeOfSite(site));
+    Vec3 normal = smooth[node].normalized();
+    if (mechanics_.DistanceToClamp(site) < kNearClampMm * mechanics_.length_unit())
+      normal = (kOwnNormalShare * normal + (1 - kOwnNormalShare) * mesh.normals[node]).normalized();
+    const Vec3 radial = Vec3(mesh.mid_mm[node].x(), mesh.mid_mm[node].y(), 0).normalized();
+    Vec3 around(-radial.y(), radial.x(), 0);
+    around = (around - around.dot(normal) * normal).normalized();
+    Mat3& frame = frames_[static_cast<size_t>(site)];
+    frame.col(0) = -normal;
+    frame.col(1) = around;
+    frame.col(2) = normal.cross(around);
+  }
+}
+
+bool Linearization::Factorise() {
+  is_definite_ = factor_.Factorise(hessian_);
+  if (is_definite_) return true;
+  if (!analyzed_) indefinite_.analyzePattern(hessian_);
+  analyzed_ = true;
+  indefinite_.factorize(hessian_);
+  return indefinite_.info() == Eigen::Success;
+}
+
+void Linearization::Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd& x) {
+  if (is_definite_)
+    factor_.Solve(rhs, x);
+  else
+    x = indefinite_.solve(rhs);
+}
+
+// Rotations are about the tangent and about director x tangent.
+Vec2 Linearization::Turning(int node, const Vec3& couple) const {
+  const auto i = static_cast<size_t>(node);
+  const Vec3& d = tangent_state_.directors[i];
+  const Vec3& t = tangent_state_.tangents[i];
+  return {couple.dot(t), couple.dot(d.cross(t))};
+}
+
+Vec2 Linearization::Moment(int node, const Vec3& direction) const {
+  const Vec3& d = tangent_state_.directors[static_cast<size_t>(node)];
+  return Turning(node, mechanics_.model().thickness_mm / 2 * d.cross(direction));
+}
+
+Eigen::MatrixXd Linearization::CoupleColumns(const Eigen::VectorXd& shares) const {
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(adjoint_.cols(), 2);
+  for (int site = 0; site < mechanics_.site_count(); ++site) {
+    if (shares[site] == 0) continue;
+    const int node = mechanics_.NodeOfSite(site), dof = mechanics_.shell().Dof(node, 0);
+    for (int k = 0; k < 2; ++k) {
+      const Vec2 turning = Turning(node, frames_[static_cast<size_t>(site)].col(k + 1));
+      columns.col(k) += shares[site] * (adjoint_.middleRows<2>(dof + 3).transpose() * turning);
+    }
+  }
+  return columns;
+}
+
+bool Linearization::At(const ShellState& state, double pressure_mpa) {
+  const NonlinearShell& shell = mechanics_.shell();
+  is_made_ = false;
+  state_ = tangent_state_ = state;
+  pressure_mpa_ = pressure_mpa;
+  const FollowerPressure pressure(pressure_mpa), unit(1);
+  const ElementLoad* loads[] = {&pressure};
+  const ElementLoad* one[] = {&unit};
+  shell.Gradient(state_, one, pressure_force_);
+  shell.Gradient(state_, {}, without_);
+  pressure_force_ -= without_;
+  shell.Hessian(state_, loads, gradient_, hessian_);
+  if (!gradient_.allFinite() || !Factorise()) return false;
+  const MarkerMap& map = mechanics_.markers();
+  map.WriteJacobian(shell, state_, jacobian_);
+  Solve(Eigen::MatrixXd(jacobian_.transpose()), adjoint_);
+  if (!adjoint_.allFinite()) return false;
+  map.Displacements(state_, base_mm_);
+  base_mm_.noalias() -= adjoint_.transpose() * gradient_;
+  by_pressure_ = -(adjoint_.transpose() * pressure_force_);
+  SetFrames();
+  const int sites = mechanics_.site_count();
+  for (auto& matrix : columns_) matrix.resize(adjoint_.cols(), sites);
+  for (int site = 0; site < sites; ++site) {
+    const int node = mechanics_.NodeOfSite(site), dof = shell.Dof(node, 0);
+    const Mat3& frame = frames_[static_cast<size_t>(site)];
+    const auto rows = adjoint_.middleRows<5>(dof);
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Matrix<double, 5, 1> load;
+      load << frame.col(k), k == 0 ? Vec2::Zero() : Moment(node, frame.col(k));
+      columns_[static_cast<size_t>(k)].col(site).noalias() = rows.transpose() * load;
+    }
+  }
+  is_made_ = true;
+  return true;
+}
+
+bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {
+  const NonlinearShell& shell = mechanics_.shell();
+  state_ = state;
+  pressure_mpa_ = pressure_mpa;
+  const FollowerPressure pressure(pressure_mpa);
+  const ElementLoad* loads[] = {&pressure};
+  shell.Gradient(state_, loads, gradient_);
+  if (!gradient_.allFinite()) return false;
+  Eigen::MatrixXd motion;
+  Solve(gradient_, motion);
+  mechanics_.markers().Displacements(state_, base_mm_);
+  base_mm_.noalias() -= jacobian_ * motion.col(0);
+  return base_mm_.allFinite();
+}
+
+double Linearization::Step(const SiteLoads& loads, double pressure_error_mpa, double longest_mm,
+                           ShellState& state) {
+  const NonlinearShell& shell = mechanics_.shell();
+  Eigen::MatrixXd force = -gradient_ - pressure_error_mpa * pressure_force_, motion;
+  for (int site = 0; site < mechanics_.site_count(); ++site) {
+    const int node = mechanics_.NodeOfSite(site), dof = shell.Dof(node, 0);
+    const Mat3& frame = frames_[static_cast<size_t>(site)];
+    const Vec3 load = frame * Vec3(loads.forces_n[0][site], loads.forces_n[1][site], loads.forces_n[2][site]);
+    const Vec3 tangential = load - frame.col(0).dot(load) * frame.col(0);
+    const Vec3 couple = frame.rightCols<2>() * Vec2(loads.couples_nmm[0][site], loads.couples_nmm[1][site]);
+    force.block<3, 1>(dof, 0) += load;
+    force.block<2, 1>(dof + 3, 0) += Moment(node, tangential) + Turning(node, couple);
+  }
+  Solve(force, motion);
+  double longest = 0;
+  for (int node = 0; node < shell.node_count(); ++node) {
+    if (const int dof = shell.Dof(node, 0); dof >= 0)
+      longest = std::max(longest, motion.block<3, 1>(dof, 0).norm());
+  }
+  if (!std::isfinite(longest)) return longest;
+  state = state_;
+  shell.Step(std::min(1.0, longest_mm / std::max(longest, 1e-12)) * motion.col(0), state);
+  return longest;
+}
+
+}  // namespace taclink

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <array>
+#include <vector>
+
+#include "sensing/estimation/skin_mechanics.h"
+#include "sensing/mechanics/sparse_cholesky.h"
+
+namespace taclink {
+
+/// The skin's equilibrium to first order about a state: with loads f at the sites and a pressure error dp,
+///   m = base + sum_k columns[k] f_k + by_pressure dp.
+/// Directions k of a site: inward, around, along; the last two act on the outer wall, with their moment. A
+/// state may be one that no stable equilibrium is near: the stiffness may be indefinite. One thread.
+class Linearization {
+ public:
+  explicit Linearization(const SkinMechanics& mechanics);
+
+  /// Makes everything anew. False: the stiffness is singular there, or not finite.
+  bool At(const ShellState& state, double pressure_mpa);
+  /// Moves to a state nearby and keeps stiffness, columns and frames: only what the skin is out of balance by
+  /// is that of the new state, exactly. What steps lead to is then the same equilibrium, in more of them.
+  /// False: not finite.
+  bool Rebase(const ShellState& state, double pressure_mpa);
+  bool is_made() const { return is_made_; }
+
+  const ShellState& state() const { return state_; }
+  /// Where stiffness, columns and frames are from.
+  const ShellState& tangent_state() const { return tangent_state_; }
+  double pressure_mpa() const { return pressure_mpa_; }
+  const Eigen::VectorXd& base_mm() const { return base_mm_; }
+  /// mm/N, 3 markers x sites, of loads that act on a site's node alone.
+  const std::array<Eigen::MatrixXd, 3>& columns() const { return columns_; }
+  const Eigen::VectorXd& by_pressure() const { return by_pressure_; }
+  /// By site; columns inward, around, along; unit, perpendicular.
+  const std::vector<Mat3>& frames() const { return frames_; }
+
+  /// What couples of 1 N mm about the around and the along direction displace, that act on the sites in these
+  /// shares; mm, stacked.
+  Eigen::MatrixXd CoupleColumns(const Eigen::VectorXd& shares) const;
+
+  /// What acts on the skin, by site, in the site's frame: forces inward, around and along, couples about
+  /// around and along.
+  struct SiteLoads {
+    std::array<Eigen::VectorXd, 3> forces_n;
+    std::array<Eigen::VectorXd, 2> couples_nmm;
+  };
+  /// Where loads and a pressure error take the state, to first order. Returns
+  /// the longest motion of a node, mm.
+  double Step(const SiteLoads& loads, double pressure_error_mpa, double longest_mm, ShellState& state);
+
+ private:
+  void SetFrames();
+  bool Factorise();
+  void Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd& x);
+  /// The rotations' part of a couple about an axis; of a force on the outer wall, which has one about the
+  /// mid-surface.
+  Vec2 Turning(int node, const Vec3& couple) const;
+  Vec2 Moment(int node, const Vec3& direction) const;
+
+  const SkinMechanics& mechanics_;
+  Eigen::SparseMatrix<double> hessian_;
+  SparseCholesky factor_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> indefinite_;
+  bool analyzed_ = false, is_definite_ = true;
+  MarkerMap::Jacobian jacobian_;
+  ShellState state_, tangent_state_;
+  bool is_made_ = false;
+  double pressure_mpa_ = 0;
+  Eigen::VectorXd gradient_, pressure_force_, base_mm_, without_, by_pressure_;
+  Eigen::MatrixXd adjoint_;  // dofs x 3 markers: K^-1 J'
+  std::array<Eigen::MatrixXd, 3> columns_;
+  std::vector<Mat3> frames_;
+};
+
+}  // namespace taclink

@@ -1,0 +1,381 @@
+#include "sensing/estimation/load_estimator.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "sensing/mechanics/dense.h"
+
+namespace taclink {
+namespace {
+
+// Found on three-dimensional solids (docs/calculix.md); forces and lengths in SkinMechanics' units.
+constexpr double kSparsity = 1.5;  // of a load's norm: a load explains so many standard deviations
+constexpr int kReweightings = 2;
+constexpr double kHillN = 0.02, kHillMm = 10;  // the sparsity halves where so much acts nearby
+constexpr double kEndNorm = 0.5;               // of the median: beyond the markers loads hardly show
+constexpr double kLeastHillN = 0.01;
+constexpr size_t kMostHills = 24;  // no scene that was ever compared with the truth has a third of it
+constexpr double kLeastOfPeak = 0.03;
+constexpr double kHillGain = 20, kTangentialGain = 60;  // of chi^2
+constexpr double kRefitSparsity = 0.1, kRefitEndSparsity = 1.0;
+constexpr double kRidge = 1e-9;
+constexpr double kUnseenMm = 30;  // standard deviation of a direction that is not seen, in units of length
+constexpr double kSameNoise = 2;  // ratio of standard deviations
+
+// The cameras' covariance of a marker; what they do not see is as good as unknown.
+Mat3 NoiseOf(const Mat3& information, double unseen_mm) {
+  const double least = 1 / (unseen_mm * unseen_mm);
+  if (!information.allFinite()) return unseen_mm * unseen_mm * Mat3::Identity();
+  Eigen::SelfAdjointEigenSolver<Mat3> modes;
+  modes.computeDirect(information);
+  return modes.eigenvectors() * modes.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
+         modes.eigenvectors().transpose();
+}
+
+}  // namespace
+
+LoadEstimator::LoadEstimator(const SkinMechanics& mechanics)
+    : mechanics_(mechanics), covariance_(mechanics), hills_(mechanics) {
+  const int sites = mechanics.site_count();
+  const double width = kHillMm * mechanics.length_unit();
+  near_.resize(sites, sites);
+  for (int i = 0; i < sites; ++i) {
+    for (int j = 0; j < sites; ++j)
+      near_(i, j) =
+          std::exp(-(mechanics.RestSite(i) - mechanics.RestSite(j)).squaredNorm() / (2 * width * width));
+  }
+}
+
+bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& inflated,
+                            const MarkerObservations& observed, const PressurePrior& prior,
+                            const Eigen::VectorXd& local_n) {
+  const int markers = mechanics_.marker_count();
+  covariance_.Write(skin, inflated, local_n, covariance_mm2_);
+  pressure_sigma_ = prior.sigma_mpa;
+  by_pressure_ = prior.sigma_mpa * skin.by_pressure();
+  Eigen::MatrixXd common = Eigen::MatrixXd::Zero(by_pressure_.size(), 2);
+  common.col(0) = by_pressure_;
+  if (prior.baseline_mm_per_mpa.size() == common.rows())
+    common.col(1) = prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa;
+  dense::AddOuter(common, covariance_mm2_);
+  noise_mm2_.resize(static_cast<size_t>(markers));
+  model_covariance_.resize(noise_mm2_.size());
+  for (int m = 0; m < markers; ++m) {
+    const auto i = static_cast<size_t>(m);
+    auto block = covariance_mm2_.block<3, 3>(3 * m, 3 * m);
+    model_covariance_[i] = block.selfadjointView<Eigen::Lower>();
+    noise_mm2_[i] = NoiseOf(observed.information[i], kUnseenMm * mechanics_.length_unit());
+    block += noise_mm2_[i];
+  }
+  factor_ = covariance_mm2_;
+  if (!dense::Cholesky(factor_)) return false;
+  columns_.noalias() = skin.columns()[0] * mechanics_.spread();
+  dense::SolveLower(factor_, columns_);
+  dense::Gram(columns_, gram_);
+  gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
+  regions_.clear();
+  return columns_.allFinite();
+}
+
+bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const {
+  if (noise_mm2_.empty() || prior.sigma_mpa > kSameNoise * pressure_sigma_ ||
+      pressure_sigma_ > kSameNoise * prior.sigma_mpa)
+    return false;
+  const double unseen = kUnseenMm * mechanics_.length_unit(), unseen2 = unseen * unseen;
+  constexpr double kMost = kSameNoise * kSameNoise, kNewlySeenShare = 0.02;
+  int worse = 0;
+  for (size_t m = 0; m < noise_mm2_.size(); ++m) {
+    const double trace = observed.information[m].trace();
+    if (!(trace > 0)) continue;  // missing now
+    const double then = noise_mm2_[m].trace();
+    if (then > 0.3 * unseen2) {
+      ++worse;  // seen now and not then, in a direction at least
+      continue;
+    }
+    const double now = NoiseOf(observed.information[m], unseen).trace();
+    if (now < 0.3 * unseen2 && (now > kMost * then || then > kMost * now)) ++worse;
+  }
+  return worse <= kNewlySeenShare * static_cast<double>(noise_mm2_.size());
+}
+
+// What was seen when all was prepared and is not seen now is unknown: its unit vectors, whitened, are
+// projected out of data and columns, which is the same as leaving these rows out.
+void LoadEstimator::Hide(const MarkerObservations& observed) {
+  const double unseen = kUnseenMm * mechanics_.length_unit(), unseen2 = unseen * unseen;
+  std::vector<std::pair<int, Vec3>> missing;
+  is_shown_.assign(static_cast<size_t>(3 * mechanics_.marker_count()), 1);
+  for (int m = 0; m < mechanics_.marker_count(); ++m) {
+    const auto i = static_cast<size_t>(m);
+    Eigen::SelfAdjointEigenSolver<Mat3> modes;
+    const Mat3& information = observed.information[i];
+    if (!information.allFinite() || information.isZero())
+      modes.computeDirect(Mat3::Zero());
+    else
+      modes.computeDirect(information);
+    for (int a = 0; a < 3; ++a) {
+      if (modes.eigenvalues()[a] > 1 / (0.3 * unseen2)) continue;
+      const Vec3 direction = modes.eigenvectors().col(a);
+      for (int c = 0; c < 3; ++c) {
+        if (std::abs(direction[c]) > 0.3) is_shown_[static_cast<size_t>(3 * m + c)] = 0;
+      }
+      if (direction.dot(noise_mm2_[i] * direction) < 0.3 * unseen2) missing.emplace_back(3 * m, direction);
+    }
+  }
+  hidden_.setZero(factor_.rows(), static_cast<Eigen::Index>(missing.size()));
+  for (size_t k = 0; k < missing.size(); ++k)
+    hidden_.block<3, 1>(missing[k].first, static_cast<Eigen::Index>(k)) = missing[k].second;
+  dense::SolveLower(factor_, hidden_);
+  if (hidden_.cols() > 0) {
+    // Orthonormal by Cholesky of its Gram matrix, which is well conditioned.
+    Eigen::MatrixXd gram;
+    dense::Gram(hidden_, gram);
+    const Eigen::LLT<Eigen::MatrixXd> llt(gram.selfadjointView<Eigen::Lower>());
+    llt.matrixU().solveInPlace<Eigen::OnTheRight>(hidden_);
+  }
+}
+
+// Frees data and Gram matrix of what is hidden.
+void LoadEstimator::ProjectOut(const Eigen::MatrixXd& tangential) {
+  Eigen::VectorXd shrink = Eigen::VectorXd::Ones(hidden_.cols() + tangential.cols());
+  Eigen::MatrixXd basis(factor_.rows(), shrink.size());
+  basis.leftCols(hidden_.cols()) = hidden_;
+  if (tangential.cols() > 0) {
+    // A tangential force has a prior, so that its columns shrink and do not vanish.
+    Eigen::MatrixXd free = tangential;
+    if (hidden_.cols() > 0) free -= hidden_ * (hidden_.transpose() * free);
+    free *= TangentialPrior(tangential.cols()).cwiseSqrt().cwiseInverse().asDiagonal();
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(free, Eigen::ComputeThinU);
+    basis.rightCols(tangential.cols()) = svd.matrixU();
+    const auto scaled = svd.singularValues().array().square();
+    shrink.tail(tangential.cols()) = scaled / (1 + scaled);
+  }
+  frame_data_ = data_;
+  frame_gram_ = &gram_;
+  if (basis.cols() == 0) return;
+  frame_data_ -= basis * (shrink.asDiagonal() * (basis.transpose() * data_));
+  dense::TransposedProduct(basis, columns_, hidden_columns_);
+  Eigen::MatrixXd product;
+  const Eigen::MatrixXd scaled = shrink.asDiagonal() * hidden_columns_;
+  dense::TransposedProduct(hidden_columns_, scaled, product);
+  free_gram_ = gram_ - product;
+  frame_gram_ = &free_gram_;
+}
+
+// Loads of all sites under a penalty that fades where much acts, grouped.
+std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
+  const int sites = mechanics_.site_count();
+  const double unit = mechanics_.force_unit();
+  target_.noalias() = columns_.transpose() * frame_data_;
+  norms_ = frame_gram_->diagonal().cwiseMax(0).cwiseSqrt();
+  Eigen::VectorXd sorted = norms_;
+  std::nth_element(sorted.data(), sorted.data() + sites / 2, sorted.data() + sites);
+  usual_norm_ = sorted[sites / 2];
+  for (int site = 0; site < sites; ++site) {
+    if (mechanics_.IsBeyondMarkers(site)) norms_[site] = std::max(norms_[site], kEndNorm * usual_norm_);
+  }
+  std::vector<int> support;
+  weights_ = kSparsity * norms_;
+  loads_ = solver_.Solve(*frame_gram_, target_ - weights_, support);
+  for (int pass = 0; pass < kReweightings && !support.empty(); ++pass) {
+    Eigen::VectorXd near = Eigen::VectorXd::Zero(sites);
+    for (const int from : support) near += loads_[from] * near_.col(from);
+    weights_ = kSparsity * norms_.array() / (1 + near.array() / (kHillN * unit));
+    loads_ = solver_.Solve(*frame_gram_, target_ - weights_, support);
+  }
+  std::vector<HillFinder::Hill> hills = hills_.Find(skin, loads_, support);
+  std::erase_if(hills, [&](const HillFinder::Hill& hill) {
+    double sum = 0;
+    for (const int site : hill) sum += loads_[site];
+    return sum < kLeastHillN * unit;
+  });
+  for (HillFinder::Hill& hill : hills) {
+    double peak = 0;
+    for (const int site : hill) peak = std::max(peak, loads_[site]);
+    std::erase_if(hill, [&](int site) { return loads_[site] <= kLeastOfPeak * peak; });
+  }
+  return hills;
+}
+
+// chi^2 that is left with all hills but one, without penalty.
+double LoadEstimator::Unexplained(const std::vector<HillFinder::Hill>& hills, size_t without) {
+  std::vector<int> sites;
+  for (size_t i = 0; i < hills.size(); ++i) {
+    if (i != without) sites.insert(sites.end(), hills[i].begin(), hills[i].end());
+  }
+  const double all = frame_data_.dot(data_);
+  if (sites.empty()) return all;
+  const Eigen::MatrixXd exact = (*frame_gram_)(sites, sites);
+  Eigen::MatrixXd h = exact;
+  h.diagonal().array() += kRidge * h.trace() / static_cast<double>(sites.size());
+  const Eigen::VectorXd b = target_(sites);
+  std::vector<int> support;
+  const Eigen::VectorXd& x = solver_.Solve(h, b, support);
+  return all - 2 * b.dot(x) + x.dot(exact * x);
+}
+
+void LoadEstimator::Eliminate(std::vector<HillFinder::Hill>& hills) {
+  double now = Unexplained(hills, hills.size());
+  while (!hills.empty()) {
+    double least = 0;
+    size_t weakest = hills.size();
+    for (size_t i = 0; i < hills.size(); ++i) {
+      const double gain = Unexplained(hills, i) - now;
+      if (weakest < hills.size() && gain >= least) continue;
+      least = gain;
+      weakest = i;
+    }
+    if (least > kHillGain) return;
+    hills.erase(hills.begin() + static_cast<std::ptrdiff_t>(weakest));
+    now += least;
+  }
+}
+
+// Of a force of 1 N that the hill's sites share as they share the load, around and along, and of couples.
+Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, const HillFinder::Hill& hill) {
+  double sum = 0;
+  for (const int site : hill) sum += loads_[site];
+  Eigen::VectorXd shares = Eigen::VectorXd::Zero(mechanics_.site_count());
+  for (const int site : hill) shares[site] = loads_[site] / sum;
+  const Eigen::VectorXd spread = mechanics_.spread() * shares;
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(factor_.rows(), kTangential);
+  columns.rightCols<2>() = skin.CoupleColumns(spread);
+  for (int k = 0; k < 2; ++k) {
+    for (Eigen::Index site = 0; site < spread.size(); ++site) {
+      if (spread[site] != 0)
+        columns.col(k) += spread[site] * skin.columns()[static_cast<size_t>(k + 1)].col(site);
+    }
+  }
+  dense::SolveLower(factor_, columns);
+  if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
+  return columns;
+}
+
+// Information that is there before the data, by column.
+Eigen::VectorXd LoadEstimator::TangentialPrior(Eigen::Index columns) const {
+  const double force = kTangentialN * mechanics_.force_unit(),
+               couple = kCoupleNmm * mechanics_.force_unit() * mechanics_.length_unit();
+  Eigen::VectorXd prior(columns);
+  for (Eigen::Index k = 0; k < columns; ++k)
+    prior[k] = k % kTangential < 2 ? 1 / (force * force) : 1 / (couple * couple);
+  return prior;
+}
+
+// Loads of the chosen sites almost without penalty, for that makes all of them too small; tangential forces
+// are eliminated from the problem.
+LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
+                                             const Eigen::MatrixXd& tangential) {
+  const auto n = static_cast<Eigen::Index>(sites.size());
+  Eigen::MatrixXd normal = columns_(Eigen::all, sites);
+  Eigen::VectorXd data = data_;
+  if (hidden_.cols() > 0) {
+    normal -= hidden_ * (hidden_.transpose() * normal);
+    data -= hidden_ * (hidden_.transpose() * data);
+  }
+  const Eigen::VectorXd prior = TangentialPrior(tangential.cols());
+  Eigen::MatrixXd h = normal.transpose() * normal;
+  Eigen::VectorXd b = normal.transpose() * data;
+  Eigen::LLT<Eigen::MatrixXd> inner;
+  if (tangential.cols() > 0) {
+    Eigen::MatrixXd g = tangential.transpose() * tangential;
+    g.diagonal() += prior;
+    inner.compute(g);
+    const Eigen::MatrixXd cross = tangential.transpose() * normal, solved = inner.solve(cross);
+    h -= cross.transpose() * solved;
+    b -= solved.transpose() * (tangential.transpose() * data);
+  }
+  const double unit = mechanics_.force_unit();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const int site = sites[static_cast<size_t>(i)];
+    double near_n = 0;
+    for (const int from : sites) near_n += loads_[from] * near_(site, from);
+    const double norm = std::sqrt(std::max(h(i, i), 0.0));
+    b[i] -= kRefitSparsity * norm / (1 + near_n / (kHillN * unit));
+    if (mechanics_.IsBeyondMarkers(site))
+      b[i] -= kRefitEndSparsity * std::max(kEndNorm * usual_norm_ - norm, 0.0);
+  }
+  h.diagonal().array() += kRidge * h.trace() / static_cast<double>(n);
+  Solution solution;
+  std::vector<int> support;
+  solution.loads = solver_.Solve(h, b, support);
+  solution.residual = data - normal * solution.loads;
+  if (tangential.cols() > 0) {
+    solution.tangential = inner.solve(tangential.transpose() * solution.residual);
+    solution.residual -= tangential * solution.tangential;
+  }
+  solution.chi2 = solution.residual.squaredNorm() + prior.dot(solution.tangential.cwiseAbs2());
+  return solution;
+}
+
+// One after the other, the hill first whose tangential force explains most; none that explains little: what a
+// shell gets wrong of a solid looks like a tangential force of the normal one's size.
+void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
+                            std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution) {
+  std::vector<int> sites;
+  for (const auto& hill : hills) sites.insert(sites.end(), hill.begin(), hill.end());
+  slipping.clear();
+  tangential.resize(data_.size(), 0);
+  solution = Refit(sites, tangential);
+  std::vector<Eigen::MatrixXd> columns;
+  for (const auto& hill : hills) columns.push_back(TangentialColumns(skin, hill));
+  while (slipping.size() < hills.size()) {
+    double most = kTangentialGain;
+    int best = -1;
+    Eigen::MatrixXd with;
+    for (size_t i = 0; i < hills.size(); ++i) {
+      if (std::find(slipping.begin(), slipping.end(), static_cast<int>(i)) != slipping.end()) continue;
+      Eigen::MatrixXd more(data_.size(), tangential.cols() + kTangential);
+      more << tangential, columns[i];
+      const double gain = solution.chi2 - Refit(sites, more).chi2;
+      if (gain <= most) continue;
+      most = gain;
+      best = static_cast<int>(i);
+      with = std::move(more);
+    }
+    if (best < 0) return;
+    slipping.push_back(best);
+    tangential = std::move(with);
+    solution = Refit(sites, tangential);
+  }
+}
+
+void LoadEstimator::Fit(const Linearization& skin, const MarkerObservations& observed,
+                        LoadEstimate& estimate) {
+  estimate = {};
+  Eigen::MatrixXd data(factor_.rows(), 1);
+  for (int m = 0; m < mechanics_.marker_count(); ++m) {
+    const auto i = static_cast<size_t>(m);
+    const bool seen = observed.information[i].trace() > 0 && observed.displacement_mm[i].allFinite();
+    data.block<3, 1>(3 * m, 0).setZero();
+    if (seen) data.block<3, 1>(3 * m, 0) = observed.displacement_mm[i] - skin.base_mm().segment<3>(3 * m);
+  }
+  dense::SolveLower(factor_, data);
+  data_ = data.col(0);
+  Hide(observed);
+  std::vector<HillFinder::Hill> hills;
+  std::vector<int> slipping;  // hills with a tangential force, in the order of their columns
+  Eigen::MatrixXd tangential(data_.size(), 0);
+  Solution solution;
+  // With tangential forces in, the selection is made once more with these taken as unknown.
+  for (int stage = 0; stage < 2; ++stage) {
+    ProjectOut(tangential);
+    hills = Select(skin);
+    estimate.converged = solver_.converged() && hills.size() <= kMostHills;
+    if (!estimate.converged) return;
+    Eliminate(hills);
+    if (hills.empty()) {
+      solution = {.loads = {}, .tangential = {}, .residual = data_, .chi2 = 0};
+      if (hidden_.cols() > 0) solution.residual -= hidden_ * (hidden_.transpose() * data_);
+      solution.chi2 = solution.residual.squaredNorm();
+      break;
+    }
+    LetSlip(skin, hills, slipping, tangential, solution);
+    if (slipping.empty()) break;
+  }
+  if (hills.empty()) slipping.clear();
+  Finish(skin, hills, slipping, solution, estimate);
+}
+
+}  // namespace taclink

@@ -1,0 +1,131 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "sensing/estimation/assimilation.h"
+#include "sensing/estimation/hills.h"
+#include "sensing/estimation/linearization.h"
+#include "sensing/estimation/marker_covariance.h"
+#include "sensing/estimation/nonnegative.h"
+
+namespace taclink {
+
+/// One contact's load.
+struct EstimatedLoad {
+  std::vector<int> sites;
+  std::vector<double> inward_n;  ///< by `sites`; spreads over the neighbors of each
+  std::vector<double> shares;    ///< by `sites`, of the tangential force; sum to 1
+  bool has_tangential = false;
+  Vec2 tangential_n = Vec2::Zero();  ///< around and along
+  Vec2 couple_nmm = Vec2::Zero();    ///< about around and along: a glued body may turn the skin
+  Vec3 force_n = Vec3::Zero();       ///< link frame
+  double normal_force_n = 0;         ///< sum of the inward loads
+  Vec2 center = Vec2::Zero();        ///< column (not wrapped) and row of the site grid: centroid of the load
+  Mat3 force_covariance_n2 = Mat3::Zero();
+  Mat2 center_covariance = Mat2::Zero();  ///< of `center`
+};
+
+struct LoadEstimate {
+  std::vector<EstimatedLoad> loads;
+  Linearization::SiteLoads at_sites;  ///< all of them and the stray forces
+  Eigen::VectorXd contact_sizes_n;    ///< by site, of the contacts alone
+  double pressure_error_mpa = 0;      ///< true less told
+  double pressure_sigma_mpa = 0;      ///< of the corrected pressure
+  double chi2_per_dof = 0;
+  double region_chi2_per_dof = 0;  ///< the largest of 3 x 3 markers
+  bool converged = true;
+};
+
+/// What is known of the pressure before the skin is looked at.
+struct PressurePrior {
+  double sigma_mpa = 0;
+  double baseline_sigma_mpa = 0;  ///< of the pressure under which the baseline was taken
+  Eigen::VectorXd baseline_mm_per_mpa =
+      {};  ///< what that pressure does to the baseline's markers; empty: nothing
+};
+
+/// The loads that explain the markers, given the linearized skin: non-negative inward loads at all sites with
+/// a sparsity term that fades inside a hill, grouped into hills, those hills that explain little left out,
+/// and a tangential force for each hill that needs one. See estimation.md. One thread.
+class LoadEstimator {
+ public:
+  explicit LoadEstimator(const SkinMechanics& mechanics);
+
+  /// What does not change from frame to frame while the linearization, the cameras' noise and the loads'
+  /// sizes stay as they are: covariance, whitened columns and their products. `local_n`: force in the
+  /// neighborhood of each site, for the model's errors. False: the covariance has no factor.
+  bool Prepare(const Linearization& skin, const InflatedSkin& inflated, const MarkerObservations& observed,
+               const PressurePrior& prior, const Eigen::VectorXd& local_n);
+  /// Whether these observations are nearly as good, everywhere, as those that were prepared for; what is
+  /// missing now does not matter.
+  bool IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const;
+
+  /// After Prepare. The linearization may have been rebased.
+  void Fit(const Linearization& skin, const MarkerObservations& observed, LoadEstimate& estimate);
+
+  const MarkerCovariance& covariance() const { return covariance_; }
+  /// Covariance of the model's error at a marker, after Prepare.
+  Mat3 ModelCovariance(int marker) const { return model_covariance_[static_cast<size_t>(marker)]; }
+
+ private:
+  /// Standard deviation of a tangential force that was let in, N in SkinMechanics' units.
+  static constexpr double kTangentialN = 1;
+  /// And of a couple, N mm: that force on an arm of a patch's size.
+  static constexpr double kCoupleNmm = 10;
+
+  void Hide(const MarkerObservations& observed);
+  std::vector<HillFinder::Hill> Select(const Linearization& skin);
+  void Eliminate(std::vector<HillFinder::Hill>& hills);
+  double Unexplained(const std::vector<HillFinder::Hill>& hills, size_t without);
+
+  struct Solution {
+    Eigen::VectorXd loads, tangential, residual;
+    double chi2 = 0;
+  };
+  /// Forces around and along, and couples about both.
+  static constexpr Eigen::Index kTangential = 4;
+  Eigen::MatrixXd TangentialColumns(const Linearization& skin, const HillFinder::Hill& hill);
+  Eigen::VectorXd TangentialPrior(Eigen::Index columns) const;
+  Solution Refit(const std::vector<int>& sites, const Eigen::MatrixXd& tangential);
+  void LetSlip(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
+               std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution);
+  void ProjectOut(const Eigen::MatrixXd& tangential);
+  void Finish(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
+              const std::vector<int>& slipping, const Solution& solution, LoadEstimate& estimate);
+  void WriteLoad(const Linearization& skin, const HillFinder::Hill& hill, EstimatedLoad& load) const;
+  void WriteCovariances(const Linearization& skin, LoadEstimate& estimate);
+  void WriteStray(const Linearization& skin, const Solution& solution, LoadEstimate& estimate);
+  double WorstRegion(const Eigen::VectorXd& residual);
+  Eigen::VectorXd Near(const std::vector<int>& from, double width_mm) const;
+
+  const SkinMechanics& mechanics_;
+  MarkerCovariance covariance_;
+  HillFinder hills_;
+  NonNegativeSolver solver_;
+  Eigen::MatrixXd near_;  // sites x sites: how much of a load counts as near
+
+  // Since Prepare. Whitened: in units of independent standard deviations.
+  std::vector<Mat3> noise_mm2_, model_covariance_;
+  Eigen::MatrixXd covariance_mm2_, factor_;
+  Eigen::VectorXd by_pressure_;  // stacked, of one standard deviation
+  double pressure_sigma_ = 0;
+  Eigen::MatrixXd columns_, gram_;
+  struct Region {
+    std::vector<int> rows;
+    Eigen::LLT<Eigen::MatrixXd> factor;
+  };
+  std::vector<Region> regions_;
+  double usual_norm_ = 0;
+
+  // Of the frame. Hidden: an orthonormal basis of what the frame does not show, whitened, and of the
+  // tangential forces that were let in; data and Gram matrix without it.
+  Eigen::MatrixXd hidden_, hidden_columns_, free_gram_;
+  const Eigen::MatrixXd* frame_gram_ = nullptr;  // gram_, where nothing is hidden
+  Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
+  std::vector<char> is_shown_;  // by row
+};
+
+}  // namespace taclink

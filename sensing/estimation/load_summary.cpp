@@ -1,0 +1,192 @@
+// What a fit of loads says: forces, centers, their covariances, and what is left unexplained.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "sensing/estimation/load_estimator.h"
+#include "sensing/mechanics/dense.h"
+
+namespace taclink {
+namespace {
+
+constexpr double kStillTangential =
+    0.15;                              // of a normal force: what a contact without a tangential one may have
+constexpr double kForceShare = 0.04;   // of a force: what the model gets wrong of it
+constexpr double kCenterShare = 0.25;  // of a site's spacing: what the grid of loads makes of a center
+
+}  // namespace
+
+void LoadEstimator::Finish(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
+                           const std::vector<int>& slipping, const Solution& solution,
+                           LoadEstimate& estimate) {
+  Eigen::Index at = 0;
+  for (size_t i = 0; i < hills.size(); ++i) {
+    EstimatedLoad load;
+    double sum = 0;
+    for (const int site : hills[i]) sum += loads_[site];
+    for (const int site : hills[i]) {
+      const double inward = solution.loads[at++];
+      load.sites.push_back(site);
+      load.inward_n.push_back(inward);
+      load.shares.push_back(loads_[site] / sum);
+      load.normal_force_n += inward;
+    }
+    const auto slips = std::find(slipping.begin(), slipping.end(), static_cast<int>(i));
+    load.has_tangential = slips != slipping.end();
+    if (load.has_tangential) {
+      const Eigen::Index first = kTangential * (slips - slipping.begin());
+      load.tangential_n = solution.tangential.segment<2>(first);
+      load.couple_nmm = solution.tangential.segment<2>(first + 2);
+    }
+    if (load.normal_force_n <= 0) continue;
+    WriteLoad(skin, hills[i], load);
+    estimate.loads.push_back(std::move(load));
+  }
+  WriteStray(skin, solution, estimate);
+  WriteCovariances(skin, estimate);
+  estimate.chi2_per_dof =
+      solution.residual.squaredNorm() /
+      std::max<double>(1, static_cast<double>(std::count(is_shown_.begin(), is_shown_.end(), 1)));
+  estimate.region_chi2_per_dof = WorstRegion(solution.residual);
+}
+
+void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill& hill,
+                              EstimatedLoad& load) const {
+  const int columns = mechanics_.columns();
+  const auto top = std::max_element(load.inward_n.begin(), load.inward_n.end()) - load.inward_n.begin();
+  const int origin = hill[static_cast<size_t>(top)] % columns;
+  Vec2 center = Vec2::Zero();
+  for (size_t k = 0; k < hill.size(); ++k) {
+    const int site = hill[k];
+    const int across = (site % columns - origin + columns + columns / 2) % columns - columns / 2;
+    center += load.inward_n[k] * Vec2(across, site / columns);
+    // A load spreads over neighbors whose normals differ.
+    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), site); it; ++it) {
+      const Mat3& frame = skin.frames()[static_cast<size_t>(it.row())];
+      load.force_n += it.value() * (load.inward_n[k] * frame.col(0) +
+                                    load.shares[k] * (frame.rightCols<2>() * load.tangential_n));
+    }
+  }
+  load.center = Vec2(origin, 0) + center / load.normal_force_n;
+}
+
+void LoadEstimator::WriteStray(const Linearization& skin, const Solution& solution, LoadEstimate& estimate) {
+  // Of the whitened residual, what it pulls at each marker.
+  Eigen::MatrixXd pulls = solution.residual;
+  dense::SolveLowerTransposed(factor_, pulls);
+  const Eigen::VectorXd stacked = pulls.col(0);
+  std::array<Eigen::VectorXd, 3> contacts;
+  std::array<Eigen::VectorXd, 2> couples;
+  for (auto& part : contacts) part.setZero(mechanics_.site_count());
+  for (auto& part : couples) part.setZero(mechanics_.site_count());
+  for (const EstimatedLoad& load : estimate.loads) {
+    for (size_t k = 0; k < load.sites.size(); ++k) {
+      contacts[0][load.sites[k]] += load.inward_n[k];
+      contacts[1][load.sites[k]] += load.shares[k] * load.tangential_n.x();
+      contacts[2][load.sites[k]] += load.shares[k] * load.tangential_n.y();
+      for (size_t i = 0; i < 2; ++i)
+        couples[i][load.sites[k]] += load.shares[k] * load.couple_nmm[static_cast<Eigen::Index>(i)];
+    }
+  }
+  estimate.contact_sizes_n =
+      (contacts[0].cwiseAbs2() + contacts[1].cwiseAbs2() + contacts[2].cwiseAbs2()).cwiseSqrt();
+  Linearization::SiteLoads& all = estimate.at_sites;
+  for (size_t i = 0; i < 2; ++i) all.couples_nmm[i] = mechanics_.spread() * couples[i];
+  for (size_t k = 0; k < 3; ++k) {
+    all.forces_n[k] = mechanics_.spread() * contacts[k];
+    all.forces_n[k].array() +=
+        covariance_.stray_sigmas_n()[k].array().square() * (skin.columns()[k].transpose() * stacked).array();
+  }
+  estimate.pressure_error_mpa = pressure_sigma_ * by_pressure_.dot(stacked);
+}
+
+// Of three columns a contact for its force, two for its place, and the pressure's: the posterior of those
+// beside what was fitted. The sites' own amplitudes are not free in it: their sum and place are.
+void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& estimate) {
+  const auto count = static_cast<Eigen::Index>(estimate.loads.size());
+  const int columns = mechanics_.columns(), rows = mechanics_.site_rows();
+  Eigen::MatrixXd design(data_.size(), 5 * count + 1);
+  Eigen::VectorXd prior = Eigen::VectorXd::Constant(5 * count + 1, 1e-9);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const EstimatedLoad& load = estimate.loads[static_cast<size_t>(i)];
+    auto normal = design.col(5 * i);
+    auto around = design.col(5 * i + 3), along = design.col(5 * i + 4);
+    normal.setZero();
+    around.setZero();
+    along.setZero();
+    for (size_t k = 0; k < load.sites.size(); ++k) {
+      const double share = load.inward_n[k] / load.normal_force_n;
+      const int site = load.sites[k], row = site / columns, column = site % columns;
+      const auto at = [&](int r, int c) {
+        return columns_.col(std::clamp(r, 0, rows - 1) * columns + (c + columns) % columns);
+      };
+      normal += share * columns_.col(site);
+      around += 0.5 * load.inward_n[k] * (at(row, column + 1) - at(row, column - 1));
+      along += 0.5 * load.inward_n[k] * (at(row + 1, column) - at(row - 1, column));
+    }
+    if (hidden_.cols() > 0) {
+      for (const Eigen::Index column : {5 * i, 5 * i + 3, 5 * i + 4})
+        design.col(column) -= hidden_ * (hidden_.transpose() * design.col(column));
+    }
+    design.middleCols<2>(5 * i + 1) = TangentialColumns(skin, load.sites).leftCols<2>();
+    const double sigma =
+        load.has_tangential ? kTangentialN * mechanics_.force_unit() : kStillTangential * load.normal_force_n;
+    prior.segment<2>(5 * i + 1).setConstant(1 / (sigma * sigma));
+    prior.segment<2>(5 * i + 3).setConstant(0.04);  // five sites
+  }
+  // The pressure is in the covariance already: its column is that of the prior, its information the data's.
+  Eigen::MatrixXd pressure = by_pressure_;
+  dense::SolveLower(factor_, pressure);
+  if (hidden_.cols() > 0) pressure -= hidden_ * (hidden_.transpose() * pressure);
+  const double told = pressure.squaredNorm();
+  estimate.pressure_sigma_mpa = pressure_sigma_ * std::sqrt(std::max(0.0, 1 - told));
+  if (count == 0) return;
+  Eigen::MatrixXd information = design.leftCols(5 * count).transpose() * design.leftCols(5 * count);
+  information.diagonal() += prior.head(5 * count);
+  const Eigen::MatrixXd covariance = information.llt().solve(Eigen::MatrixXd::Identity(5 * count, 5 * count));
+  for (Eigen::Index i = 0; i < count; ++i) {
+    EstimatedLoad& load = estimate.loads[static_cast<size_t>(i)];
+    const int site = load.sites[static_cast<size_t>(
+        std::max_element(load.inward_n.begin(), load.inward_n.end()) - load.inward_n.begin())];
+    const Mat3& frame = skin.frames()[static_cast<size_t>(site)];
+    load.force_covariance_n2 = frame * covariance.block<3, 3>(5 * i, 5 * i) * frame.transpose();
+    load.force_covariance_n2 += kForceShare * kForceShare / 3 * load.force_n.squaredNorm() * Mat3::Identity();
+    load.center_covariance = covariance.block<2, 2>(5 * i + 3, 5 * i + 3);
+    load.center_covariance.diagonal().array() += kCenterShare * kCenterShare;
+  }
+}
+
+// Mahalanobis' distance of the residual over 3 x 3 markers, per number, the largest; of regions that are
+// mostly seen.
+double LoadEstimator::WorstRegion(const Eigen::VectorXd& residual) {
+  const LinkModel& model = mechanics_.model();
+  const int paths = model.markers.paths, rings = model.markers.rings();
+  if (regions_.empty()) {
+    covariance_mm2_.triangularView<Eigen::StrictlyUpper>() = covariance_mm2_.transpose();
+    for (int marker = 0; marker < model.markers.count(); ++marker) {
+      const int path = model.PathOf(marker), ring = model.RingOf(marker);
+      if (path % 2 != 0) continue;
+      Region region;
+      for (int r = std::max(0, ring - 1); r <= std::min(rings - 1, ring + 1); ++r) {
+        for (int p = path - 1; p <= path + 1; ++p) {
+          const int neighbor = model.MarkerIndex((p + paths) % paths, r);
+          for (int c = 0; c < 3; ++c) region.rows.push_back(3 * neighbor + c);
+        }
+      }
+      region.factor.compute(covariance_mm2_(region.rows, region.rows));
+      regions_.push_back(std::move(region));
+    }
+  }
+  const Eigen::VectorXd left_mm = factor_.triangularView<Eigen::Lower>() * residual;
+  double worst = 0;
+  for (const Region& region : regions_) {
+    int shown = 0;
+    for (const int row : region.rows) shown += is_shown_[static_cast<size_t>(row)];
+    if (shown < static_cast<int>(region.rows.size()) / 3) continue;
+    const Eigen::VectorXd part = region.factor.matrixL().solve(left_mm(region.rows));
+    worst = std::max(worst, part.squaredNorm() / shown);
+  }
+  return worst;
+}
+
+}  // namespace taclink

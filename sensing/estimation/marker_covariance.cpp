@@ -1,0 +1,82 @@
+#include "sensing/estimation/marker_covariance.h"
+
+#include <cmath>
+
+#include "sensing/mechanics/dense.h"
+
+namespace taclink {
+namespace {
+
+// Found on three-dimensional solids (docs/calculix.md); lengths and forces in SkinMechanics' units.
+constexpr double kFloorMm = 0.02;
+constexpr double kByMotion = 0.01, kMotionLengthMm = 20, kCommonShare = 0.8;
+constexpr double kSpreadMm = 12, kSpreadShare = 0.5;  // of the error near a large motion
+constexpr double kByInflation = 0.015, kInflationLengthMm = 15, kLeastInflation = 0.3, kAxialShare = 0.5;
+constexpr double kStrayN = 1e-3, kNormalShare = 0.01, kTangentialShare = 0.003, kLocalMm = 15;
+
+double Bell(double distance, double width) {
+  return std::exp(-distance * distance / (2 * width * width));
+}
+
+}  // namespace
+
+MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics) : mechanics_(mechanics) {
+  const int markers = mechanics.marker_count(), sites = mechanics.site_count();
+  const double unit = mechanics.length_unit();
+  near_.resize(markers, markers);
+  alike_.resize(markers, markers);
+  along_.resize(markers, markers);
+  for (int i = 0; i < markers; ++i) {
+    for (int j = 0; j < markers; ++j) {
+      const Vec3 off = mechanics.RestMarker(i) - mechanics.RestMarker(j);
+      near_(i, j) = Bell(off.norm(), kSpreadMm * unit);
+      alike_(i, j) =
+          kCommonShare * Bell(off.norm(), kMotionLengthMm * unit) + (i == j ? 1 - kCommonShare : 0);
+      along_(i, j) = Bell(off.z(), kInflationLengthMm * unit);
+    }
+  }
+  by_sites_.resize(sites, sites);
+  by_markers_.resize(sites, markers);
+  for (int i = 0; i < sites; ++i) {
+    const Vec3& at = mechanics.RestSite(i);
+    for (int j = 0; j < sites; ++j)
+      by_sites_(i, j) = Bell((at - mechanics.RestSite(j)).norm(), kLocalMm * unit);
+    for (int j = 0; j < markers; ++j)
+      by_markers_(i, j) = Bell((at - mechanics.RestMarker(j)).norm(), kLocalMm * unit);
+  }
+}
+
+void MarkerCovariance::Write(const Linearization& skin, const InflatedSkin& inflated,
+                             const Eigen::VectorXd& local_n, Eigen::MatrixXd& covariance_mm2) {
+  const int markers = mechanics_.marker_count();
+  Eigen::VectorXd moved(markers), grown(markers);
+  for (int m = 0; m < markers; ++m) {
+    const auto node = static_cast<size_t>(mechanics_.markers().node(m));
+    moved[m] = kByMotion * (skin.state().mids_mm[node] - inflated.state.mids_mm[node]).norm();
+    grown[m] = inflated.markers_mm.segment<3>(3 * m).norm();
+  }
+  moved = moved.cwiseMax(kSpreadShare * (near_ * moved.asDiagonal()).rowwise().maxCoeff());
+  grown = kByInflation * grown.cwiseMax(kLeastInflation * grown.maxCoeff());
+  covariance_mm2.setZero(3 * markers, 3 * markers);
+  for (int j = 0; j < markers; ++j) {
+    const Vec3 out_j = Vec3(mechanics_.RestMarker(j).x(), mechanics_.RestMarker(j).y(), 0).normalized();
+    for (int i = j; i < markers; ++i) {
+      const Vec3 out_i = Vec3(mechanics_.RestMarker(i).x(), mechanics_.RestMarker(i).y(), 0).normalized();
+      const double growth = grown[i] * grown[j] * along_(i, j);
+      Mat3 block = moved[i] * moved[j] * alike_(i, j) * Mat3::Identity();
+      block.topLeftCorner<2, 2>() += growth * out_i.head<2>() * out_j.head<2>().transpose();
+      block(2, 2) += kAxialShare * kAxialShare * growth;
+      if (i == j) block.diagonal().array() += kFloorMm * kFloorMm;
+      covariance_mm2.block<3, 3>(3 * i, 3 * j) = block;
+    }
+  }
+  const double unit = mechanics_.force_unit();
+  for (size_t k = 0; k < 3; ++k) {
+    const double share = k == 0 ? kNormalShare : kTangentialShare;
+    stray_n_[k] = ((share * local_n).cwiseAbs2().array() + kStrayN * kStrayN * unit * unit).sqrt();
+    scaled_.noalias() = skin.columns()[k] * stray_n_[k].asDiagonal();
+    dense::AddOuter(scaled_, covariance_mm2);
+  }
+}
+
+}  // namespace taclink

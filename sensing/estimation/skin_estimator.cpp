@@ -1,0 +1,357 @@
+#include "sensing/estimation/skin_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace taclink {
+namespace {
+
+// In units of length (SkinMechanics) where mm.
+constexpr double kSettledMm = 0.03;       // of a step: a third of the markers' noise
+constexpr double kNearlySettledMm = 0.3;  // of the last step, when they run out
+constexpr double kLongestStepMm = 5;
+constexpr double kStillReachMm = 0.4;    // from the inflated skin: its tangent is good enough
+constexpr double kTouchedReachMm = 1.0;  // likewise from where the touched one was made
+constexpr double kAssimilateMm = 1.0;    // farther off, a marker is pulled to its place first
+constexpr double kSameLocal = 0.3;       // of the local forces: the model's errors are still the same
+constexpr double kLittleLocalN = 0.05;
+constexpr double kModelPressureShare = 0.01;  // of the pressure: what the model's inflation is wrong by
+constexpr double kNoiseDeviations = 2;        // of a spring's pull, that noise alone makes
+constexpr double kStillMarkerChi2 = 12, kStillSumChi2 = 9;  // below what any load has to explain
+constexpr double kLeastPressureSigma =
+    1e-3;  // of the steps in which the skin is inflated: a prior is no certainty
+constexpr int kMostSteps = 8, kMostTangents = 3;
+constexpr double kShrinks = 0.5;  // steps by less: the tangent is too old
+
+double LongestOff(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  if (a.size() != b.size()) return 1e9;
+  double longest2 = 0;
+  for (size_t i = 0; i < a.size(); ++i) longest2 = std::max(longest2, (a[i] - b[i]).squaredNorm());
+  return std::sqrt(longest2);
+}
+
+}  // namespace
+
+struct SkinEstimator::Tangent {
+  explicit Tangent(const SkinMechanics& mechanics) : skin(mechanics), loads(mechanics) {}
+  Linearization skin;
+  LoadEstimator loads;
+  bool is_prepared = false;
+  Eigen::VectorXd local_n;
+
+  bool HasLocal(const Eigen::VectorXd& now, double unit) const {
+    return (now - local_n).cwiseAbs().maxCoeff() <
+           kSameLocal * std::max(now.maxCoeff(), local_n.maxCoeff()) + kLittleLocalN * unit;
+  }
+};
+
+// Of one frame.
+struct SkinEstimator::Problem {
+  MarkerObservations observed = {};  // from the slack skin
+  InflatedSkin inflated = {};
+  double pressure_mpa = 0;
+  PressurePrior prior = {};
+};
+
+SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions& options)
+    : mechanics_(model, options.refinement),
+      options_(options),
+      assimilation_(mechanics_),
+      still_(std::make_unique<Tangent>(mechanics_)),
+      touched_(std::make_unique<Tangent>(mechanics_)),
+      used_(still_.get()),
+      radial_pull_(mechanics_.marker_count()),
+      radial_weight_(mechanics_.marker_count()) {}
+SkinEstimator::~SkinEstimator() = default;
+
+void SkinEstimator::Restart() {
+  has_last_ = false;
+  for (Tangent* tangent : {still_.get(), touched_.get()}) {
+    tangent->is_prepared = false;
+    tangent->local_n.resize(0);
+  }
+}
+const Linearization& SkinEstimator::linearization() const {
+  return used_->skin;
+}
+const LoadEstimator& SkinEstimator::loads() const {
+  return used_->loads;
+}
+
+bool SkinEstimator::IsPossible(const SkinEstimate& estimate) const {
+  if (!estimate.displacements_mm.allFinite()) return false;
+  const LinkModel& model = mechanics_.model();
+  for (int m = 0; m < mechanics_.marker_count(); ++m) {
+    const Vec3 rest = model.RestMarker(m), at = rest + estimate.displacements_mm.segment<3>(3 * m);
+    if (at.head<2>().norm() > 2 * rest.head<2>().norm()) return false;
+  }
+  return true;
+}
+
+// The farthest that a seen marker is from its place in a state, mm.
+double SkinEstimator::FurthestOff(const ShellState& state, const MarkerObservations& observed) {
+  mechanics_.markers().Displacements(state, markers_mm_);
+  double furthest = 0;
+  for (size_t m = 0; m < observed.information.size(); ++m) {
+    // One camera tells two directions.
+    const Mat3& information = observed.information[m];
+    const double most = information.trace();
+    if (!(most > 0)) continue;
+    const Vec3 off = markers_mm_.segment<3>(3 * static_cast<Eigen::Index>(m)) - observed.displacement_mm[m];
+    furthest = std::max(furthest, std::sqrt(off.dot(information * off) * 3 / most));
+  }
+  return furthest;
+}
+
+// A state near the markers: the inflated skin, the last frame's, or where springs pull either.
+bool SkinEstimator::Start(const Problem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n) {
+  const double unit = mechanics_.length_unit();
+  estimate.state = problem.inflated.state;
+  double off_mm = FurthestOff(estimate.state, problem.observed);
+  if (has_last_ && off_mm > kStillReachMm * unit) {
+    if (const double last_mm = FurthestOff(last_, problem.observed); last_mm < off_mm) {
+      off_mm = last_mm;
+      estimate.state = last_;
+    }
+  }
+  local_n.resize(0);
+  if (off_mm < kAssimilateMm * unit) return true;
+  Eigen::VectorXd pulls;
+  AssimilationSummary done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
+  if (!done.converged && has_last_) {
+    estimate.state = problem.inflated.state;
+    done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
+  }
+  estimate.assimilation_steps = done.iterations;
+  const int markers = mechanics_.marker_count();
+  Eigen::VectorXd sizes(markers);
+  for (int m = 0; m < markers; ++m) {
+    const double trace = problem.observed.information[static_cast<size_t>(m)].trace();
+    const double noise = trace > 0 ? 3 * kNoiseDeviations / std::sqrt(trace / 3) : 0;
+    sizes[m] = std::max(0.0, pulls.segment<3>(3 * m).norm() - noise);
+  }
+  local_n = touched_->loads.covariance().LocalOfMarkers(sizes);
+  start_ = estimate.state;
+  // What springs could not settle may still be near enough for the steps to come.
+  return FurthestOff(estimate.state, problem.observed) < kLongestStepMm * unit;
+}
+
+bool SkinEstimator::Remake(Tangent& tangent, const Problem& problem, const ShellState& state,
+                           const Eigen::VectorXd& local_n, SkinEstimate& estimate) {
+  ++estimate.tangents;
+  tangent.local_n = local_n;
+  tangent.is_prepared =
+      tangent.skin.At(state, problem.pressure_mpa) &&
+      tangent.loads.Prepare(tangent.skin, problem.inflated, problem.observed, problem.prior, local_n);
+  return tangent.is_prepared;
+}
+
+bool SkinEstimator::StepOnce(Tangent& tangent, const Problem& problem, SkinEstimate& estimate,
+                             double& step_mm) {
+  used_ = &tangent;
+  ++estimate.steps;
+  if (!tangent.skin.Rebase(estimate.state, problem.pressure_mpa)) return false;
+  tangent.loads.Fit(tangent.skin, problem.observed, estimate.loads);
+  if (!estimate.loads.converged) return false;
+  step_mm = tangent.skin.Step(estimate.loads.at_sites, estimate.loads.pressure_error_mpa,
+                              kLongestStepMm * mechanics_.length_unit(), estimate.state);
+  return std::isfinite(step_mm);
+}
+
+// About the skin without loads. True: that is all there is to do.
+bool SkinEstimator::SolveSmall(Tangent& tangent, const Problem& problem, SkinEstimate& estimate) {
+  const bool linear = options_.model == ForceModel::kLinear;
+  const ShellState about = linear ? mechanics_.shell().Rest() : problem.inflated.state;
+  const double unit = mechanics_.length_unit();
+  const bool is_near = tangent.is_prepared && (linear || LongestOff(tangent.skin.tangent_state().mids_mm,
+                                                                    about.mids_mm) < kStillReachMm * unit);
+  if (!is_near || !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
+    Problem mine = problem;
+    if (linear) mine.pressure_mpa = 0;
+    if (!Remake(tangent, mine, about, none, estimate)) return false;
+  }
+  estimate.state = about;
+  double step_mm = 0;
+  if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
+  estimate.model = linear ? ForceModel::kLinear : ForceModel::kPressurised;
+  if (linear || options_.model == ForceModel::kPressurised) return true;
+  if (estimate.loads.loads.empty()) return true;
+  return options_.model != ForceModel::kNonlinear && step_mm < kStillReachMm * unit;
+}
+
+bool SkinEstimator::SolveLarge(const Problem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n) {
+  Tangent& tangent = *touched_;
+  estimate.model = ForceModel::kNonlinear;
+  const double unit = mechanics_.length_unit();
+  const bool is_near = tangent.is_prepared && LongestOff(tangent.skin.tangent_state().mids_mm,
+                                                         estimate.state.mids_mm) < kTouchedReachMm * unit;
+  // A first guess: what the loads turn out to be decides whether all is made again.
+  if (local_n.size() == 0) {
+    if (estimate.loads.contact_sizes_n.size() > 0)
+      local_n = tangent.loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
+    else if (tangent.local_n.size() > 0)
+      local_n = tangent.local_n;
+    else
+      local_n = Eigen::VectorXd::Zero(mechanics_.site_count());
+  }
+  if (!is_near || !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
+    if (!Remake(tangent, problem, estimate.state, local_n, estimate)) return false;
+  }
+  double before_mm = 1e9;
+  for (int step = 0; step < kMostSteps; ++step) {
+    double step_mm = 0;
+    if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
+    local_n = tangent.loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
+    const bool is_far =
+        LongestOff(tangent.skin.tangent_state().mids_mm, estimate.state.mids_mm) > kTouchedReachMm * unit;
+    const bool has_local = tangent.HasLocal(local_n, mechanics_.force_unit());
+    const bool is_slow = step > 0 && step_mm > kShrinks * before_mm;
+    if (step_mm < kSettledMm * unit && !is_far && has_local) return true;
+    before_mm = step_mm;
+    if ((is_far || !has_local || is_slow) && estimate.tangents < kMostTangents) {
+      if (!Remake(tangent, problem, estimate.state, local_n, estimate)) return false;
+      before_mm = 1e9;
+    } else if (step_mm < kSettledMm * unit) {
+      return true;
+    }
+  }
+  return before_mm < kNearlySettledMm * unit;
+}
+
+// The markers are where the skin without loads has them, but for the cameras' noise: each by itself, over
+// each 3 x 3 of them, and over each ring, radially. A load that explains less than that would not be let in
+// (kHillGain of LoadEstimator), so nothing has to be solved. True: the estimate is complete. Allocates
+// nothing.
+bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSkin& inflated,
+                            const PressurePrior& prior, SkinEstimate& estimate) {
+  Tangent& tangent = *still_;
+  if (options_.model == ForceModel::kLinear || !tangent.is_prepared ||
+      LongestOff(tangent.skin.tangent_state().mids_mm, inflated.state.mids_mm) >
+          kStillReachMm * mechanics_.length_unit() ||
+      !tangent.loads.IsPreparedFor(observation.markers, prior))
+    return false;
+  double told = 1 / (prior.sigma_mpa * prior.sigma_mpa), off = 0;
+  for (int m = 0; m < mechanics_.marker_count(); ++m) {
+    const Mat3& information = observation.markers.information[static_cast<size_t>(m)];
+    const Vec3 error = observation.markers.displacement_mm[static_cast<size_t>(m)] +
+                       estimate.baseline_mm.segment<3>(3 * m) - inflated.markers_mm.segment<3>(3 * m);
+    if (!(error.dot(information * error) <= kStillMarkerChi2)) return false;
+    const auto node = static_cast<size_t>(mechanics_.markers().node(m));
+    const Vec3 weighed = information * mechanics_.mesh().normals[node];
+    radial_pull_[m] = weighed.dot(error);
+    radial_weight_[m] = weighed.dot(mechanics_.mesh().normals[node]);
+    const Vec3 by = information * inflated.markers_mm_per_mpa.segment<3>(3 * m);
+    told += by.dot(inflated.markers_mm_per_mpa.segment<3>(3 * m));
+    off += by.dot(error);
+  }
+  if (!AreNeighborsStill()) return false;
+  used_ = &tangent;
+  has_last_ = false;
+  estimate.loads.loads.clear();
+  estimate.loads.chi2_per_dof = estimate.loads.region_chi2_per_dof = 0;
+  estimate.loads.converged = true;
+  estimate.loads.pressure_error_mpa = off / told;
+  estimate.loads.pressure_sigma_mpa = prior.sigma_mpa;
+  estimate.state = inflated.state;
+  estimate.displacements_mm = inflated.markers_mm + off / told * inflated.markers_mm_per_mpa;
+  estimate.pressure_mpa = inflated.pressure_mpa + off / told;
+  estimate.model = ForceModel::kPressurised;
+  estimate.failure = EstimateFailure::kNone;
+  return true;
+}
+
+bool SkinEstimator::AreNeighborsStill() const {
+  const LinkModel& model = mechanics_.model();
+  const int paths = model.markers.paths, rings = model.markers.rings();
+  for (int ring = 0; ring < rings; ++ring) {
+    double ring_pull = 0, ring_weight = 0;
+    for (int path = 0; path < paths; ++path) {
+      double pull = 0, weight = 0;
+      for (int r = std::max(0, ring - 1); r <= std::min(rings - 1, ring + 1); ++r) {
+        for (int p = path - 1; p <= path + 1; ++p) {
+          const int m = model.MarkerIndex((p + paths) % paths, r);
+          pull += radial_pull_[m];
+          weight += radial_weight_[m];
+        }
+      }
+      if (pull * pull > kStillSumChi2 * weight) return false;
+      ring_pull += radial_pull_[model.MarkerIndex(path, ring)];
+      ring_weight += radial_weight_[model.MarkerIndex(path, ring)];
+    }
+    if (ring_pull * ring_pull > kStillSumChi2 * ring_weight) return false;
+  }
+  return true;
+}
+
+void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& estimate) {
+  estimate.failure = EstimateFailure::kNoEquilibrium;
+  estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
+  estimate.has_shape = false;
+  PressurePrior prior;
+  const InflatedSkin* baseline = mechanics_.Inflated(observation.baseline_pressure.mpa);
+  if (baseline == nullptr) return;
+  estimate.baseline_mm = baseline->markers_mm;
+  const bool baseline_matters =
+      observation.baseline_pressure.mpa != 0 && observation.baseline_pressure.sigma_mpa > 0;
+  if (baseline_matters) {
+    prior.baseline_sigma_mpa = observation.baseline_pressure.sigma_mpa;
+    prior.baseline_mm_per_mpa = baseline->markers_mm_per_mpa;
+  }
+  const double pressure_mpa = observation.pressure.mpa;
+  const InflatedSkin* inflated = mechanics_.Inflated(pressure_mpa);
+  if (inflated == nullptr) return;
+  estimate.inflated_mm = inflated->markers_mm;
+  prior.sigma_mpa =
+      std::max(observation.pressure.sigma_mpa, kLeastPressureSigma * mechanics_.pressure_step()) +
+      kModelPressureShare * std::abs(pressure_mpa);
+  if (IsStill(observation, *inflated, prior, estimate)) return;
+
+  estimate.loads = {};
+  estimate.failure = EstimateFailure::kNotConverged;
+  const Problem problem = MakeProblem(observation, *inflated, std::move(prior), estimate.baseline_mm);
+  start_ = problem.inflated.state;
+  if (!Solve(problem, estimate)) {
+    has_last_ = false;
+    estimate.state = start_;
+    mechanics_.markers().Displacements(start_, estimate.displacements_mm);
+    estimate.has_shape = IsPossible(estimate);
+    return;
+  }
+  mechanics_.markers().Displacements(estimate.state, estimate.displacements_mm);
+  estimate.pressure_mpa = pressure_mpa + estimate.loads.pressure_error_mpa;
+  estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
+                     : estimate.loads.converged ? EstimateFailure::kNone
+                                                : EstimateFailure::kNotConverged;
+  has_last_ = !estimate.loads.loads.empty() && estimate.failure == EstimateFailure::kNone;
+  if (has_last_) last_ = estimate.state;
+}
+
+SkinEstimator::Problem SkinEstimator::MakeProblem(const SkinObservation& observation,
+                                                  const InflatedSkin& inflated, PressurePrior prior,
+                                                  const Eigen::VectorXd& baseline_mm) const {
+  Problem problem{.observed = observation.markers,
+                  .inflated = inflated,
+                  .pressure_mpa = observation.pressure.mpa,
+                  .prior = std::move(prior)};
+  for (int m = 0; m < mechanics_.marker_count(); ++m)
+    problem.observed.displacement_mm[static_cast<size_t>(m)] += baseline_mm.segment<3>(3 * m);
+  return problem;
+}
+
+bool SkinEstimator::Solve(const Problem& problem, SkinEstimate& estimate) {
+  const bool is_simple = options_.model == ForceModel::kLinear || options_.model == ForceModel::kPressurised;
+  const bool is_small = is_simple || FurthestOff(problem.inflated.state, problem.observed) <
+                                         2 * kStillReachMm * mechanics_.length_unit();
+  if (is_small && SolveSmall(*still_, problem, estimate)) return true;
+  if (is_simple) return false;
+  const SkinEstimate small = estimate;
+  Eigen::VectorXd local_n;
+  if (!Start(problem, estimate, local_n)) return false;
+  // A small dent is nearer to where its first step has led.
+  if (is_small && local_n.size() == 0 && !small.loads.loads.empty()) estimate.state = small.state;
+  start_ = estimate.state;
+  return SolveLarge(problem, estimate, local_n);
+}
+
+}  // namespace taclink

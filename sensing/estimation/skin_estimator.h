@@ -1,0 +1,103 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "sensing/core/contact.h"
+#include "sensing/estimation/assimilation.h"
+#include "sensing/estimation/load_estimator.h"
+#include "sensing/estimation/skin_mechanics.h"
+
+namespace taclink {
+
+/// Gauge pressure and how well it is known.
+struct PressureReading {
+  double mpa = 0;
+  double sigma_mpa = 0;
+};
+
+struct SkinObservation {
+  /// Displacements count from the baseline.
+  MarkerObservations markers;
+  PressureReading pressure, baseline_pressure;
+};
+
+/// Why an estimate is no answer.
+enum class EstimateFailure : uint8_t {
+  kNone,
+  kNoEquilibrium,  ///< no stable skin under that pressure
+  kNotConverged,   ///< no equilibrium that fits the markers was reached
+  kImpossible,     ///< a marker beyond twice the radius, or a number that is none
+};
+
+/// Loads, pressure and shape of one moment: the shape is the equilibrium of these loads at this pressure.
+struct SkinEstimate {
+  EstimateFailure failure = EstimateFailure::kNone;
+  /// There is no answer, but a shape: where springs pull the skin's markers to what is seen. Without loads.
+  bool has_shape = false;
+  ForceModel model = ForceModel::kNonlinear;  ///< the approximation that was good enough
+  ShellState state;
+  Eigen::VectorXd displacements_mm;  ///< of the markers from the slack skin, stacked
+  Eigen::VectorXd baseline_mm;       ///< of the model's markers in the baseline, likewise
+  Eigen::VectorXd inflated_mm;       ///< of the model's markers under this pressure without loads
+  LoadEstimate loads;
+  double pressure_mpa = 0;  ///< with the estimated error taken off
+  int assimilation_steps = 0, tangents = 0, steps = 0;
+};
+
+struct SkinEstimatorOptions {
+  /// None: the cheapest whose error is small enough, frame by frame. kLiteral is no model of this estimator.
+  std::optional<ForceModel> model;
+  int refinement = 0;  ///< elements per interval of the marker grid; 0: as many as the skin's dents ask for
+};
+
+/// From labeled markers and a pressure to loads, pressure and the nonlinear equilibrium shape together; see
+/// estimation.md. The answer follows from the observation alone: the frames before only make it faster, as a
+/// place to start from and as a tangent that is still good. `linear` and `pressurised` are the same problem
+/// with the tangent at the slack or the inflated skin and one step. One thread.
+class SkinEstimator {
+ public:
+  explicit SkinEstimator(const LinkModel& model, const SkinEstimatorOptions& options = {});
+  ~SkinEstimator();
+
+  void Estimate(const SkinObservation& observation, SkinEstimate& estimate);
+  /// Forgets the frames before.
+  void Restart();
+
+  SkinMechanics& mechanics() { return mechanics_; }
+  /// What the last estimate was made with.
+  const Linearization& linearization() const;
+  const LoadEstimator& loads() const;
+
+ private:
+  struct Tangent;
+  struct Problem;
+
+  bool IsStill(const SkinObservation& observation, const InflatedSkin& inflated, const PressurePrior& prior,
+               SkinEstimate& estimate);
+  bool AreNeighborsStill() const;
+  double FurthestOff(const ShellState& state, const MarkerObservations& observed);
+  bool Start(const Problem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n);
+  bool Remake(Tangent& tangent, const Problem& problem, const ShellState& state,
+              const Eigen::VectorXd& local_n, SkinEstimate& estimate);
+  bool StepOnce(Tangent& tangent, const Problem& problem, SkinEstimate& estimate, double& step_mm);
+  bool SolveSmall(Tangent& tangent, const Problem& problem, SkinEstimate& estimate);
+  bool SolveLarge(const Problem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
+  Problem MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated, PressurePrior prior,
+                      const Eigen::VectorXd& baseline_mm) const;
+  bool Solve(const Problem& problem, SkinEstimate& estimate);
+  bool IsPossible(const SkinEstimate& estimate) const;
+
+  SkinMechanics mechanics_;
+  const SkinEstimatorOptions options_;
+  Assimilation assimilation_;
+  std::unique_ptr<Tangent> still_, touched_;  // of the skin without loads, and of the touched one
+  Tangent* used_ = nullptr;
+  ShellState last_, start_;  // of the frame before; that this one's loads were sought from
+  bool has_last_ = false;
+  Eigen::VectorXd markers_mm_;
+  Eigen::VectorXd radial_pull_, radial_weight_;  // of the frame in work
+};
+
+}  // namespace taclink

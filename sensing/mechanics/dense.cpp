@@ -1,0 +1,80 @@
+#include "sensing/mechanics/dense.h"
+
+#include <cassert>
+
+#include "sensing/mechanics/one_thread.h"
+
+// BLAS and LAPACK as Fortran has them; OpenBLAS' headers are in no runtime package.
+extern "C" {
+void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
+            const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
+void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha,
+            const double* a, const int* lda, const double* beta, double* c, const int* ldc);
+void dgemm_(const char* trans_a, const char* trans_b, const int* m, const int* n, const int* k,
+            const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
+            const double* beta, double* c, const int* ldc);
+}
+
+namespace taclink::dense {
+namespace {
+
+int Int(Eigen::Index n) {
+  return static_cast<int>(n);
+}
+
+void Solve(const char* transposed, const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b) {
+  assert(l.rows() == b.rows());
+  const OneThread one_thread;
+  const int m = Int(b.rows()), n = Int(b.cols()), lda = Int(l.outerStride()), ldb = Int(b.outerStride());
+  const double one = 1;
+  if (m > 0 && n > 0) dtrsm_("L", "L", transposed, "N", &m, &n, &one, l.data(), &lda, b.data(), &ldb);
+}
+
+void Symmetric(const char* transposed, const Eigen::MatrixXd& a, double beta, Eigen::MatrixXd& c) {
+  const OneThread one_thread;
+  const bool is_gram = *transposed == 'T';
+  const int n = Int(is_gram ? a.cols() : a.rows()), k = Int(is_gram ? a.rows() : a.cols());
+  const int lda = Int(a.outerStride()), ldc = Int(c.outerStride());
+  const double one = 1;
+  if (n > 0) dsyrk_("L", transposed, &n, &k, &one, a.data(), &lda, &beta, c.data(), &ldc);
+}
+
+}  // namespace
+
+bool Cholesky(Eigen::MatrixXd& a) {
+  const OneThread one_thread;
+  const int n = Int(a.rows()), lda = Int(a.outerStride());
+  int info = 0;
+  if (n > 0) dpotrf_("L", &n, a.data(), &lda, &info);
+  return info == 0;
+}
+
+void SolveLower(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b) {
+  Solve("N", l, b);
+}
+void SolveLowerTransposed(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b) {
+  Solve("T", l, b);
+}
+
+void AddOuter(const Eigen::MatrixXd& a, Eigen::MatrixXd& c) {
+  assert(c.rows() == a.rows());
+  Symmetric("N", a, 1, c);
+}
+
+void Gram(const Eigen::MatrixXd& a, Eigen::MatrixXd& c) {
+  c.resize(a.cols(), a.cols());
+  Symmetric("T", a, 0, c);
+}
+
+void TransposedProduct(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, Eigen::MatrixXd& c) {
+  const OneThread one_thread;
+  c.resize(a.cols(), b.cols());
+  const int m = Int(a.cols()), n = Int(b.cols()), k = Int(a.rows()), lda = Int(a.outerStride()),
+            ldb = Int(b.outerStride()), ldc = Int(c.outerStride());
+  const double one = 1, zero = 0;
+  if (m > 0 && n > 0)
+    dgemm_("T", "N", &m, &n, &k, &one, a.data(), &lda, b.data(), &ldb, &zero, c.data(), &ldc);
+}
+
+}  // namespace taclink::dense

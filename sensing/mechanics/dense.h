@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace taclink::dense {
+
+/// Products and factors of large dense matrices by the BLAS that CHOLMOD uses, in the calling thread alone:
+/// it knows the processor's vector instructions, which code compiled for every processor does not (a tenth of
+/// the time at 700 rows). Small matrices are Eigen's.
+
+/// The lower Cholesky factor in place; what is above the diagonal is not touched. False: not positive
+/// definite.
+bool Cholesky(Eigen::MatrixXd& a);
+/// b := L^-1 b, or L^-T b.
+void SolveLower(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b);
+void SolveLowerTransposed(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b);
+/// Lower half of c := c + a a^T.
+void AddOuter(const Eigen::MatrixXd& a, Eigen::MatrixXd& c);
+/// c := a^T b.
+void TransposedProduct(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, Eigen::MatrixXd& c);
+/// Lower half of c := a^T a.
+void Gram(const Eigen::MatrixXd& a, Eigen::MatrixXd& c);
+
+}  // namespace taclink::dense

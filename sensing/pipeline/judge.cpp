@@ -1,0 +1,176 @@
+#include "sensing/pipeline/judge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+namespace taclink {
+namespace {
+
+// Below these fractions of seen markers a link is called degraded, or lost.
+constexpr double kDegradedFraction = 0.7, kLostFraction = 0.4;
+// Forces were compared with the truth down to dents of 15 mm on a link of sqrt(R t) = 11.6 mm.
+constexpr double kDeepestDentMm = 16;
+constexpr double kPressureDeviations = 3;
+// chi^2 per number of a region of 3 x 3 markers: right answers stay below 3, wrong ones are above 7.
+constexpr double kMostRegionResidual = 5;
+// And RMS over all markers, in standard deviations: right answers stay below 1, a squeeze that the mesh is
+// too coarse for is at 1.4.
+constexpr double kMostResidual = 1.2;
+constexpr int kLeftOutTogether = 3;  // of a marker and its neighbors
+
+std::string Text(const char* format, ...) {
+  char text[240];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  return text;
+}
+
+// Toward the axis from the inflated skin, of the marker that went furthest.
+double DeepestDent(const Evidence& evidence) {
+  double deepest_mm = 0;
+  const SkinEstimate& estimate = evidence.estimate;
+  if (estimate.displacements_mm.size() != estimate.inflated_mm.size()) return 0;
+  for (int m = 0; m < evidence.model.markers.count(); ++m) {
+    const Vec3 rest = evidence.model.RestMarker(m);
+    const Vec3 moved = (estimate.displacements_mm - estimate.inflated_mm).segment<3>(3 * m);
+    deepest_mm = std::max(deepest_mm, -rest.head<2>().dot(moved.head<2>()) / rest.head<2>().norm());
+  }
+  return deepest_mm;
+}
+
+// The most labels that were left out among a marker and its eight neighbors.
+int MostLeftOut(const LinkModel& model, const SkinShape& shape) {
+  if (shape.rejected.empty()) return 0;
+  const int paths = model.markers.paths, rings = model.markers.rings();
+  std::vector<char> out(static_cast<size_t>(model.markers.count()), 0);
+  for (const RejectedMarker& rejected : shape.rejected) out[static_cast<size_t>(rejected.marker)] = 1;
+  int most = 0;
+  for (const RejectedMarker& rejected : shape.rejected) {
+    int count = 0;
+    for (int r = -1; r <= 1; ++r) {
+      const int ring = model.RingOf(rejected.marker) + r;
+      if (ring < 0 || ring >= rings) continue;
+      for (int p = -1; p <= 1; ++p)
+        count += out[static_cast<size_t>(
+            model.MarkerIndex((model.PathOf(rejected.marker) + p + paths) % paths, ring))];
+    }
+    most = std::max(most, count);
+  }
+  return most;
+}
+
+bool IsBeyondMarkers(const LinkModel& model, const std::vector<Contact>& contacts) {
+  const auto& rings = model.markers.rings_z_mm;
+  const double margin = 0.1 * (rings[1] - rings[0]);
+  return std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
+    return contact.center_mm.z() < rings.front() - margin || contact.center_mm.z() > rings.back() + margin;
+  });
+}
+
+std::optional<Reason> FailureReason(EstimateFailure failure) {
+  switch (failure) {
+    case EstimateFailure::kNone:
+      return std::nullopt;
+    case EstimateFailure::kNoEquilibrium:
+      return Reason{
+          ReasonId::kNoEquilibrium,
+          "no skin of this model is stable under the pressure that is told; check the pressure and the "
+          "model's material"};
+    case EstimateFailure::kImpossible:
+      return Reason{ReasonId::kImpossible,
+                    "what was found is not physically possible; check that the calibration is this link's"};
+    case EstimateFailure::kNotConverged:
+      break;
+  }
+  return Reason{
+      ReasonId::kNotConverged,
+      "no loads and pressure were found that explain the markers; check the cameras' calibration, or "
+      "press less"};
+}
+
+void AddPressureReasons(const Evidence& evidence, LinkState& state) {
+  if (state.pressure.stale)
+    state.reasons.push_back(
+        {ReasonId::kPressureUnknown, "the pressure is not known: " + state.pressure.trouble});
+  if (!state.pressure_estimate) return;
+  const double off = state.pressure_estimate->mpa - evidence.told.mpa;
+  const double sigma = evidence.told.sigma_mpa;
+  if (std::abs(off) <= kPressureDeviations * sigma || state.pressure.stale) return;
+  state.reasons.push_back(
+      {ReasonId::kPressureMismatch, Text("the skin's shape says %.3f kPa, the sensor %.3f kPa; check the "
+                                         "sensor, its hose and the baseline's "
+                                         "pressure",
+                                         1e3 * state.pressure_estimate->mpa, 1e3 * evidence.told.mpa)});
+}
+
+void AddShapeReasons(const Evidence& evidence, LinkState& state) {
+  if (state.forces.region_residual > kMostRegionResidual)
+    state.reasons.push_back(
+        {ReasonId::kResidual,
+         Text("a region of markers is off the estimated shape (%.1f of its variance); the loads "
+              "there may be others",
+              state.forces.region_residual)});
+  else if (state.forces.residual > kMostResidual)
+    state.reasons.push_back(
+        {ReasonId::kResidual,
+         Text("the markers are off the estimated shape by %.1f times what is expected; the loads "
+              "may be others",
+              state.forces.residual)});
+  if (IsBeyondMarkers(evidence.model, state.contacts))
+    state.reasons.push_back(
+        {ReasonId::kBeyondMarkers,
+         "a contact lies between a clamped end and the first ring of markers: how strong it is "
+         "and where, the markers hardly show"});
+  if (MostLeftOut(evidence.model, state.shape) >= kLeftOutTogether)
+    state.reasons.push_back(
+        {ReasonId::kLabels,
+         "neighboring markers were left out because they contradict the others; clean the "
+         "cameras' view, or calibrate again"});
+  const double radius = evidence.model.PointAtDepth(0, evidence.model.length_mm / 2, 0).head<2>().norm();
+  const double unit = std::sqrt(radius * evidence.model.thickness_mm) / 11.8;
+  if (const double dent_mm = DeepestDent(evidence); dent_mm > kDeepestDentMm * unit)
+    state.reasons.push_back(
+        {ReasonId::kTooDeep,
+         Text("pressed in by %.0f mm: beyond %.0f mm forces were not compared with the truth", dent_mm,
+              kDeepestDentMm * unit)});
+}
+
+bool IsGrave(ReasonId id) {
+  return id == ReasonId::kNotConverged || id == ReasonId::kImpossible || id == ReasonId::kNoEquilibrium;
+}
+
+}  // namespace
+
+void Judge(const Evidence& evidence, LinkState& state) {
+  const int seen = state.shape.seen(), all = evidence.model.markers.count();
+  state.reasons.clear();
+  const bool lost = seen < kLostFraction * all;
+  std::string few = seen < kDegradedFraction * all ? Text("%d of %d markers seen", seen, all) : "";
+  if (lost && !evidence.camera_trouble.empty()) few += "; " + evidence.camera_trouble;
+  if (lost) state.reasons.push_back({ReasonId::kFewMarkers, few});
+  if (!lost && !evidence.camera_trouble.empty())
+    state.reasons.push_back({ReasonId::kCamera, evidence.camera_trouble});
+  if (!lost && seen < kDegradedFraction * all) state.reasons.push_back({ReasonId::kFewMarkers, few});
+  if (auto failure = FailureReason(evidence.estimate.failure)) state.reasons.push_back(*std::move(failure));
+  if (!lost) AddPressureReasons(evidence, state);
+  if (!lost && !evidence.drift_advice.empty())
+    state.reasons.push_back({ReasonId::kDrift, evidence.drift_advice});
+  if (!lost && state.forces.converged) AddShapeReasons(evidence, state);
+  const bool grave = std::any_of(state.reasons.begin(), state.reasons.end(),
+                                 [](const Reason& reason) { return IsGrave(reason.id); });
+  state.status = lost ? LinkStatus::kLost : state.reasons.empty() ? LinkStatus::kOk : LinkStatus::kDegraded;
+  state.status_reason = state.reasons.empty() ? "" : state.reasons.front().text;
+  if (lost) {
+    state.ClearMeasurement();
+  } else if (grave) {
+    // Forces that can't be trusted are not shown; the measured shape is.
+    state.contacts.clear();
+    state.total_force_n.setZero();
+  }
+}
+
+}  // namespace taclink

@@ -1,0 +1,104 @@
+#include "sensing/pipeline/skin_stage.h"
+
+namespace taclink {
+namespace {
+
+constexpr int kMostPasses = 4;
+constexpr double kSameLookMm = 0.1;    // of the points that cameras see of the markers
+constexpr double kSamePlaceMm = 0.25;  // of a marker that one camera sees, from where its ray was linearized
+// Of a pressure that the shape tells: what the model's inflation is wrong by, and the rest.
+constexpr double kFromShapeShare = 0.05, kFromShapeMpa = 1e-4;
+
+MarkerSource SourceOf(bool top, bool bottom) {
+  if (top) return bottom ? MarkerSource::kBoth : MarkerSource::kTop;
+  return bottom ? MarkerSource::kBottom : MarkerSource::kInferred;
+}
+
+}  // namespace
+
+SkinStage::SkinStage(const LinkModel& model, const CalibrationSummary& calibration,
+                     const CameraEvidenceOptions& options)
+    : model_(model),
+      evidence_(model, calibration.rig, options),
+      doubt_(model, calibration.rig, calibration.covariance),
+      baseline_mm_(Eigen::VectorXd::Zero(3 * model.markers.count())),
+      about_mm_(baseline_mm_) {}
+
+void SkinStage::SetBaseline(const LabelledMarkers& rest, const PressureReading& pressure,
+                            const Eigen::VectorXd& inflation_mm) {
+  baseline_pressure_ = pressure;
+  baseline_mm_ = about_mm_ = inflation_mm;
+  evidence_.SetBaseline(rest, inflation_mm);
+}
+
+void SkinStage::Tare(const LabelledMarkers& now, const PressureReading& pressure,
+                     const Eigen::VectorXd& inflation_mm) {
+  baseline_pressure_ = pressure;
+  baseline_mm_ = about_mm_ = inflation_mm;
+  evidence_.SetBaseline(now, inflation_mm, true);
+}
+
+void SkinStage::Measure(const Eigen::VectorXd& about_mm, std::span<const Vec3> drift_mm, SkinShape& shape) {
+  evidence_.Measure(about_mm, observed_);
+  const auto count = static_cast<size_t>(model_.markers.count());
+  shape.measured.resize(count);
+  shape.sources.resize(count);
+  for (size_t m = 0; m < count; ++m) {
+    const auto marker = static_cast<int>(m);
+    Vec3& moved = observed_.displacement_mm[m];
+    moved -= baseline_mm_.segment<3>(3 * static_cast<Eigen::Index>(m));
+    if (!drift_mm.empty()) moved -= drift_mm[m];
+    shape.measured[m] = {moved, observed_.information[m]};
+    shape.sources[m] =
+        SourceOf(evidence_.Uses(marker, CameraId::kTop), evidence_.Uses(marker, CameraId::kBottom));
+  }
+}
+
+void SkinStage::Run(const LabelledMarkers& markers, const std::optional<PressureReading>& pressure,
+                    std::span<const Vec3> drift_mm, StateEstimator& estimator, ContactFinder& finder,
+                    LinkState& state, PressureReading& told) {
+  SkinShape& shape = state.shape;
+  evidence_.Observe(markers);
+  const auto count = static_cast<size_t>(model_.markers.count());
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    Measure(about_mm_, drift_mm, shape);
+    if (pressure) {
+      told = *pressure;
+    } else if (pass == 0) {
+      told = baseline_pressure_;
+      told.mpa = estimator.PressureFromShape(observed_, {told, baseline_pressure_});
+      told.sigma_mpa = kFromShapeMpa + kFromShapeShare * std::abs(told.mpa);
+    }
+    estimator.Estimate({told, baseline_pressure_}, finder, shape, state.forces, state.contacts);
+    const SkinEstimate& estimate = estimator.estimate();
+    if (estimate.failure != EstimateFailure::kNone) {
+      about_mm_ = estimate.has_shape ? estimate.displacements_mm : baseline_mm_;
+      break;
+    }
+    Eigen::VectorXd& now = now_mm_;
+    now = estimate.displacements_mm;
+    for (size_t m = 0; m < drift_mm.size(); ++m)
+      now.segment<3>(3 * static_cast<Eigen::Index>(m)) += drift_mm[m];
+    model_covariances_.resize(count);
+    double moved_mm = 0;
+    for (size_t m = 0; m < count; ++m) {
+      const auto at = 3 * static_cast<Eigen::Index>(m);
+      model_covariances_[m] = estimator.skin().loads().ModelCovariance(static_cast<int>(m));
+      if (shape.sources[m] == MarkerSource::kTop || shape.sources[m] == MarkerSource::kBottom)
+        moved_mm = std::max(moved_mm, (now - about_mm_).segment<3>(at).norm());
+    }
+    about_mm_ = now;
+    const bool reconsidered = evidence_.Reconsider(now, model_covariances_);
+    const bool looks_otherwise = evidence_.UpdateLooks(now) > kSameLookMm;
+    if (!reconsidered && !looks_otherwise && moved_mm < kSamePlaceMm) break;
+  }
+  shape.rejected.clear();
+  for (size_t m = 0; m < count; ++m) {
+    shape.covariances_mm2[m] += doubt_.Of(m, shape.displacements_mm[m]);
+    for (const CameraId id : kBothCameras) {
+      if (evidence_.IsDropped(static_cast<int>(m), id)) shape.rejected.push_back({id, static_cast<int>(m)});
+    }
+  }
+}
+
+}  // namespace taclink

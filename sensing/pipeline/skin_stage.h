@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "sensing/camera/calibration.h"
+#include "sensing/core/markers.h"
+#include "sensing/estimation/calibration_doubt.h"
+#include "sensing/estimation/camera_evidence.h"
+#include "sensing/pipeline/state_estimator.h"
+
+namespace taclink {
+
+/// Labeled markers of one link to what a state tells of its skin: the cameras' rays are made displacements,
+/// the estimator explains them, and what contradicts its answer is looked at again until both agree. Made
+/// when the cameras are known. One thread.
+class SkinStage {
+ public:
+  SkinStage(const LinkModel& model, const CalibrationSummary& calibration,
+            const CameraEvidenceOptions& options);
+
+  /// Takes the markers of the untouched skin (means over frames, with the means' covariances), under a gauge
+  /// pressure; `inflation_mm`: what that pressure does, stacked.
+  void SetBaseline(const LabelledMarkers& rest, const PressureReading& pressure,
+                   const Eigen::VectorXd& inflation_mm);
+  /// Takes what is seen now as the untouched skin; markers that `now` does not show keep their baseline.
+  void Tare(const LabelledMarkers& now, const PressureReading& pressure, const Eigen::VectorXd& inflation_mm);
+  const PressureReading& baseline_pressure() const { return baseline_pressure_; }
+
+  /// `drift_mm`: how far the untouched skin has gone since the baseline, by marker; empty: not. `pressure`:
+  /// none: nobody tells it, and the shape does. Sets shape, forces and contacts; `told` is the pressure that
+  /// was taken as told.
+  void Run(const LabelledMarkers& markers, const std::optional<PressureReading>& pressure,
+           std::span<const Vec3> drift_mm, StateEstimator& estimator, ContactFinder& finder, LinkState& state,
+           PressureReading& told);
+
+ private:
+  void Measure(const Eigen::VectorXd& about_mm, std::span<const Vec3> drift_mm, SkinShape& shape);
+
+  const LinkModel model_;
+  CameraEvidence evidence_;
+  const CalibrationDoubt doubt_;
+  PressureReading baseline_pressure_;
+  Eigen::VectorXd baseline_mm_, about_mm_, now_mm_;
+  MarkerObservations observed_;
+  std::vector<Mat3> model_covariances_;
+};
+
+}  // namespace taclink

@@ -1,0 +1,147 @@
+#include "sensing/pipeline/state_estimator.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "sensing/contact/contact_writer.h"
+#include "sensing/core/median.h"
+
+namespace taclink {
+namespace {
+
+// What nothing is known of is uncertain by that, in SkinMechanics' units.
+constexpr double kUnknownMm = 5, kSpringsMm = 1;  // ... and where springs pull the skin to what is seen
+constexpr double kWeakInformation = 1e-9;
+
+SkinEstimatorOptions SkinOptions(const ForceOptions& options) {
+  // The thesis' forces need the displacements of all markers, too.
+  SkinEstimatorOptions skin;
+  if (options.model != ForceModel::kLiteral) skin.model = options.model;
+  skin.refinement = options.refinement;
+  return skin;
+}
+
+}  // namespace
+
+StateEstimator::StateEstimator(const LinkModel& model, const ForceOptions& options)
+    : model_(model), rest_mm_(model.RestMarkers()), options_(options), skin_(model, SkinOptions(options)) {
+  if (options.model == ForceModel::kLiteral)
+    thesis_ = std::make_unique<ThesisForce>(model, std::max(1, options.refinement));
+}
+
+std::optional<Eigen::VectorXd> StateEstimator::InflationAt(double pressure_mpa) {
+  const InflatedSkin* skin = skin_.mechanics().Inflated(pressure_mpa);
+  if (skin == nullptr) return std::nullopt;
+  return skin->markers_mm;
+}
+
+double StateEstimator::PressureFromShape(const MarkerObservations& observed, const PressurePair& pressure) {
+  constexpr int kSteps = 6;
+  const auto baseline = InflationAt(pressure.baseline.mpa);
+  double mpa = pressure.now.mpa;
+  if (!baseline) return mpa;
+  std::vector<double> asked;
+  for (int step = 0; step < kSteps; ++step) {
+    const InflatedSkin* skin = skin_.mechanics().Inflated(mpa);
+    if (skin == nullptr) return pressure.now.mpa;
+    asked.clear();
+    for (size_t m = 0; m < observed.information.size(); ++m) {
+      const auto at = 3 * static_cast<Eigen::Index>(m);
+      const Vec3 by = skin->markers_mm_per_mpa.segment<3>(at);
+      const double information = by.dot(observed.information[m] * by);
+      if (!(information > kWeakInformation)) continue;
+      const Vec3 off =
+          observed.displacement_mm[m] + baseline->segment<3>(at) - skin->markers_mm.segment<3>(at);
+      asked.push_back(by.dot(observed.information[m] * off) / information);
+    }
+    if (asked.empty()) return pressure.now.mpa;
+    const double by = Median(asked);
+    mpa += by;
+    if (std::abs(by) < 1e-6) break;
+  }
+  return mpa;
+}
+
+void StateEstimator::WriteShape(SkinShape& shape) const {
+  const bool is_answer = estimate_.failure == EstimateFailure::kNone;
+  const bool has_baseline = estimate_.baseline_mm.size() > 0;
+  for (size_t m = 0; m < rest_mm_.size(); ++m) {
+    const auto at = 3 * static_cast<Eigen::Index>(m);
+    const MeasuredDisplacement& measured = shape.measured[m];
+    const Vec3 baseline = has_baseline ? Vec3(estimate_.baseline_mm.segment<3>(at)) : Vec3::Zero();
+    if (is_answer) {
+      const Mat3 model = skin_.loads().ModelCovariance(static_cast<int>(m));
+      shape.displacements_mm[m] = estimate_.displacements_mm.segment<3>(at) - baseline;
+      // Of the model's error and the marker's own observation; both are of the same marker.
+      shape.covariances_mm2[m] = (model.inverse() + measured.information_per_mm2).inverse();
+    } else {
+      const double unknown_mm = estimate_.has_shape ? kSpringsMm : kUnknownMm;
+      const Mat3 information =
+          measured.information_per_mm2 + 1 / (unknown_mm * unknown_mm) * Mat3::Identity();
+      shape.covariances_mm2[m] = information.inverse();
+      if (estimate_.has_shape)
+        shape.displacements_mm[m] = estimate_.displacements_mm.segment<3>(at) - baseline;
+      else
+        shape.displacements_mm[m] =
+            measured.information_per_mm2.isZero() ? Vec3::Zero() : measured.displacement_mm;
+    }
+    shape.positions_mm[m] = rest_mm_[m] + baseline + shape.displacements_mm[m];
+  }
+}
+
+void StateEstimator::WriteForces(NodalForces& forces) {
+  forces.model = estimate_.model;
+  forces.converged = estimate_.failure == EstimateFailure::kNone;
+  forces.residual = forces.region_residual = 0;
+  forces.forces_n.assign(rest_mm_.size(), Vec3::Zero());
+  forces.sigmas_n.assign(rest_mm_.size(), 0);
+  forces.loaded.clear();
+  if (!forces.converged) return;
+  forces.residual = std::sqrt(estimate_.loads.chi2_per_dof);
+  forces.region_residual = estimate_.loads.region_chi2_per_dof;
+  ContactWriter writer(skin_, estimate_);
+  for (const EstimatedLoad& load : estimate_.loads.loads) writer.Lump(load, forces);
+  for (size_t m = 0; m < rest_mm_.size(); ++m) {
+    if (!forces.forces_n[m].isZero()) forces.loaded.push_back(static_cast<int>(m));
+  }
+}
+
+void StateEstimator::Estimate(const PressurePair& pressure, ContactFinder& finder, SkinShape& shape,
+                              NodalForces& forces, std::vector<Contact>& contacts) {
+  const size_t markers = rest_mm_.size();
+  observation_.markers.displacement_mm.resize(markers);
+  observation_.markers.information.resize(markers);
+  for (size_t m = 0; m < markers; ++m) {
+    const MeasuredDisplacement& measured = shape.measured[m];
+    const bool good = measured.displacement_mm.allFinite() && measured.information_per_mm2.allFinite();
+    observation_.markers.displacement_mm[m] = good ? measured.displacement_mm : Vec3::Zero();
+    observation_.markers.information[m] = good ? measured.information_per_mm2 : Mat3::Zero();
+  }
+  observation_.pressure = pressure.now;
+  observation_.baseline_pressure = pressure.baseline;
+  skin_.Estimate(observation_, estimate_);
+  shape.positions_mm.resize(markers);
+  shape.displacements_mm.resize(markers);
+  shape.covariances_mm2.resize(markers);
+  WriteShape(shape);
+  if (thesis_) {
+    Eigen::VectorXd moved(3 * static_cast<Eigen::Index>(markers));
+    for (size_t m = 0; m < markers; ++m)
+      moved.segment<3>(3 * static_cast<Eigen::Index>(m)) = shape.displacements_mm[m];
+    thesis_->Estimate(moved, pressure.now.mpa - pressure.baseline.mpa, forces);
+    finder.FindIslands(shape.positions_mm, forces, contacts);
+    return;
+  }
+  WriteForces(forces);
+  if (forces.converged)
+    finder.Find(skin_, estimate_, contacts);
+  else
+    contacts.clear();
+}
+
+std::unique_ptr<StateEstimator> MakeStateEstimator(const LinkModel& model, const ForceOptions& options) {
+  return std::make_unique<StateEstimator>(model, options);
+}
+
+}  // namespace taclink

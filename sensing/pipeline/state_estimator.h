@@ -1,0 +1,67 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "sensing/contact/contact_finder.h"
+#include "sensing/core/contact.h"
+#include "sensing/core/link_state.h"
+#include "sensing/estimation/skin_estimator.h"
+#include "sensing/estimation/thesis_force.h"
+
+namespace taclink {
+
+struct ForceOptions {
+  /// None: the cheapest whose estimated error is small enough, frame by frame.
+  std::optional<ForceModel> model;
+  /// Elements per interval of the marker grid; 0: as many as the skin's dents ask for.
+  int refinement = 0;
+};
+
+/// Gauge pressures: of the moment, and under which the baseline was taken.
+struct PressurePair {
+  PressureReading now, baseline;
+};
+
+/// From measured markers and the pressure to all that a state tells of the skin: shape, pressure, forces,
+/// contacts. Holds scratch memory: one thread.
+class StateEstimator {
+ public:
+  StateEstimator(const LinkModel& model, const ForceOptions& options);
+
+  /// Uses `shape`'s measured displacements, from the baseline, and its sources; sets the rest of it, where it
+  /// can. Where it can't, the forces are not converged, and the shape is what is measured: what was not stays
+  /// at the inflated skin's, with a covariance that says so. `finder` gives contacts their ids.
+  void Estimate(const PressurePair& pressure, ContactFinder& finder, SkinShape& shape, NodalForces& forces,
+                std::vector<Contact>& contacts);
+  /// Forgets the frames before.
+  void Restart() { skin_.Restart(); }
+
+  /// Of the last call.
+  const SkinEstimate& estimate() const { return estimate_; }
+  SkinEstimator& skin() { return skin_; }
+  /// What a pressure alone does to the markers, from the slack skin; none: there is no such skin.
+  std::optional<Eigen::VectorXd> InflationAt(double pressure_mpa);
+  /// The pressure that explains most markers, where nobody tells it: of each marker the one that its
+  /// displacement along the inflation asks for, the median of them. Displacements from the baseline.
+  double PressureFromShape(const MarkerObservations& observed, const PressurePair& pressure);
+
+ private:
+  void WriteShape(SkinShape& shape) const;
+  void WriteForces(NodalForces& forces);
+
+  const LinkModel model_;
+  const std::vector<Vec3> rest_mm_;
+  const ForceOptions options_;
+  SkinEstimator skin_;
+  std::unique_ptr<ThesisForce> thesis_;
+  SkinObservation observation_;
+  SkinEstimate estimate_;
+};
+
+/// Takes a moment: inflates the skin and factorises its stiffness.
+std::unique_ptr<StateEstimator> MakeStateEstimator(const LinkModel& model, const ForceOptions& options);
+
+}  // namespace taclink

@@ -1,0 +1,255 @@
+// The estimator against three-dimensional solids that another program solved. TACLINK_SOLIDS=NAME prints the
+// scenes whose name begins so, one by one, with what is wrong of each.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <random>
+
+#include "sensing/contact/contact_finder.h"
+#include "sensing/estimation/skin_estimator.h"
+#include "tests/accuracy/solid_scenes.h"
+
+namespace taclink {
+namespace {
+
+constexpr double kShare = 0.1, kLeastN = 0.03, kCenterMm = 4, kNearMm = 25;
+constexpr double kPressureSigmaMpa = 5e-5;
+
+struct How {
+  const char* name;
+  double noise_mm = 0, missing = 0, pressure_off_pa = 0;
+};
+
+unsigned SeedOf(const SolidScene& scene, const How& how) {
+  unsigned seed = 2166136261u;  // FNV-1a: the same everywhere, unlike std::hash
+  for (const char c : scene.name + how.name) seed = (seed ^ static_cast<unsigned char>(c)) * 16777619u;
+  return seed;
+}
+
+SkinObservation Observe(const SolidScene& scene, const How& how) {
+  std::mt19937 random(SeedOf(scene, how));
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> lot(0, 1);
+  const double sigma_mm = std::max(how.noise_mm, 0.02);
+  SkinObservation observation;
+  for (size_t m = 0; m < scene.markers_mm.size(); ++m) {
+    Vec3 at = scene.markers_mm[m] - scene.baseline_mm[m];
+    for (int c = 0; c < 3; ++c) at[c] += how.noise_mm * normal(random);
+    const bool seen = lot(random) >= how.missing;
+    observation.markers.displacement_mm.push_back(seen ? at : Vec3::Zero());
+    observation.markers.information.push_back(seen ? Mat3(Mat3::Identity() / (sigma_mm * sigma_mm))
+                                                   : Mat3::Zero());
+  }
+  observation.pressure = {scene.pressure_kpa * 1e-3 + how.pressure_off_pa * 1e-6, kPressureSigmaMpa};
+  observation.baseline_pressure = {scene.baseline_kpa * 1e-3, scene.baseline_kpa > 0 ? kPressureSigmaMpa : 0};
+  return observation;
+}
+
+std::string Text(const char* format, double a, double b) {
+  char text[160];
+  std::snprintf(text, sizeof text, format, a, b);
+  return text;
+}
+
+// What is wrong with the sum of all loads; empty: nothing.
+std::string FaultOfSum(const SolidScene& scene, const std::vector<Contact>& found) {
+  Vec3 truth = Vec3::Zero(), sum = Vec3::Zero();
+  double total = 0, normal = 0;
+  for (const SolidContact& c : scene.contacts) {
+    truth += c.force_n;
+    total += c.normal_force_n;
+  }
+  for (const Contact& f : found) {
+    sum += f.force_n;
+    normal += f.normal_force_n;
+  }
+  const double allowed = std::max(kShare * total, kLeastN);
+  if (std::abs(normal - total) > allowed) return Text("total %.3f instead of %.3f N", normal, total);
+  if ((sum - truth).norm() > allowed)
+    return Text("vector off by %.3f of %.3f N", (sum - truth).norm(), total);
+  return {};
+}
+
+struct Matched {
+  Vec3 force = Vec3::Zero(), center = Vec3::Zero();
+  double weight = 0;
+};
+
+// Which true contact a found one is of, and how far from its edge.
+std::pair<size_t, double> Nearest(const SolidScene& scene, const Contact& found) {
+  size_t nearest = 0;
+  double best = 1e9;
+  for (size_t i = 0; i < scene.contacts.size(); ++i) {
+    const SolidContact& c = scene.contacts[i];
+    const double off = (found.center_mm - c.center_mm).norm() - c.extent_mm.norm();
+    if (off < best) {
+      best = off;
+      nearest = i;
+    }
+  }
+  return {nearest, best};
+}
+
+std::string Fault(const SolidScene& scene, const std::vector<Contact>& found) {
+  const bool wide = scene.IsDistributed();
+  std::vector<Matched> matched(scene.contacts.size());
+  for (const Contact& f : found) {
+    const auto [nearest, off] = Nearest(scene, f);
+    const double strongest = std::max(f.force_n.norm(), f.normal_force_n);
+    if (off > (wide ? 60 : kNearMm) && strongest > kLeastN)
+      return Text("phantom of %.3f N, %.0f mm", strongest, off);
+    if (scene.contacts.empty()) continue;
+    matched[nearest].force += f.force_n;
+    matched[nearest].center += f.normal_force_n * f.center_mm;
+    matched[nearest].weight += f.normal_force_n;
+  }
+  if (wide) return FaultOfSum(scene, found);
+  for (size_t i = 0; i < matched.size(); ++i) {
+    const SolidContact& c = scene.contacts[i];
+    const double off = (matched[i].force - c.force_n).norm(), size = c.force_n.norm();
+    if (off > std::max(kShare * size, kLeastN)) return Text("force off by %.3f of %.3f N", off, size);
+    if (size < kLeastN) continue;
+    const double away = (matched[i].center / std::max(matched[i].weight, 1e-9) - c.center_mm).norm();
+    if (away > kCenterMm) return Text("center %.1f mm off (%.3f N)", away, size);
+  }
+  return {};
+}
+
+struct Score {
+  int held = 0, all = 0, said = 0;  // said: does not hold, and the residual is large
+  int forces = 0, within_2_sigma = 0;
+  double rms_mm = 0, worst_mm = 0;
+  double Share() const { return static_cast<double>(held) / std::max(all, 1); }
+};
+using Scores = std::map<std::string, Score>;
+
+void AddShape(const SolidScene& scene, const SkinEstimate& estimate, Score& score) {
+  double sum = 0;
+  for (size_t m = 0; m < scene.markers_mm.size(); ++m) {
+    const double off =
+        (estimate.displacements_mm.segment<3>(3 * static_cast<Eigen::Index>(m)) - scene.markers_mm[m]).norm();
+    sum += off * off;
+    score.worst_mm = std::max(score.worst_mm, off);
+  }
+  score.rms_mm = std::max(score.rms_mm, std::sqrt(sum / static_cast<double>(scene.markers_mm.size())));
+}
+
+// Contacts that are one for one.
+void AddSigmas(const SolidScene& scene, const std::vector<Contact>& found, Score& score) {
+  for (const SolidContact& c : scene.contacts) {
+    for (const Contact& f : found) {
+      if ((f.center_mm - c.center_mm).norm() > 10 || !f.force_covariance_n2) continue;
+      ++score.forces;
+      const Vec3 off = f.force_n - c.force_n;
+      score.within_2_sigma += off.norm() < 2 * std::sqrt(f.force_covariance_n2->trace());
+    }
+  }
+}
+
+Scores ScoreAll(const How& how) {
+  SkinEstimator estimator(SolidSkin());
+  ContactFinder finder(estimator.mechanics().model());
+  const char* only = std::getenv("TACLINK_SOLIDS");
+  Scores scores;
+  for (const SolidScene& scene : ReadSolidScenes()) {
+    if (only != nullptr && !scene.name.starts_with(only)) continue;
+    SkinEstimate estimate;
+    std::vector<Contact> found;
+    std::string fault = "no answer";
+    estimator.Estimate(Observe(scene, how), estimate);
+    const bool answered = estimate.failure == EstimateFailure::kNone;
+    if (answered) {
+      finder.Find(estimator, estimate, found);
+      fault = Fault(scene, found);
+    }
+    // As Judge has it.
+    const bool said =
+        !answered || estimate.loads.region_chi2_per_dof > 5 || estimate.loads.chi2_per_dof > 1.44 ||
+        std::any_of(found.begin(), found.end(),
+                    [](const Contact& c) { return c.center_mm.z() < 16 || c.center_mm.z() > 182; });
+    for (const std::string& key :
+         {std::string("all"), scene.family, std::string(scene.held_out ? "held out" : "not held out")}) {
+      Score& score = scores[key];
+      ++score.all;
+      score.held += fault.empty();
+      score.said += !fault.empty() && said;
+      if (answered && !said) AddShape(scene, estimate, score);
+      AddSigmas(scene, found, score);
+    }
+    if (!fault.empty() || only != nullptr)
+      std::printf("  %s%s %s: %s; chi2 %.2f, region %.1f, %.0f Pa off\n", scene.name.c_str(),
+                  scene.held_out ? " (held out)" : "", how.name, fault.empty() ? "holds" : fault.c_str(),
+                  estimate.loads.chi2_per_dof, estimate.loads.region_chi2_per_dof,
+                  1e6 * estimate.loads.pressure_error_mpa);
+  }
+  for (const auto& [name, s] : scores)
+    std::printf(
+        "%-12s %-13s %3d of %3d hold, %d more say that they don't; RMSE to %.3f mm, worst %.2f mm; 2 sigma: "
+        "%.0f %% "
+        "of %d\n",
+        how.name, name.c_str(), s.held, s.all, s.said, s.rms_mm, s.worst_mm,
+        100.0 * s.within_2_sigma / std::max(s.forces, 1), s.forces);
+  return scores;
+}
+
+struct Expected {
+  How how;
+  double share;  // of the scenes, at least
+};
+class Solids : public ::testing::TestWithParam<Expected> {};
+
+TEST_P(Solids, ForcesHold) {
+  const Scores scores = ScoreAll(GetParam().how);
+  ASSERT_GE(scores.at("all").all, 40) << "tests/accuracy/calculix has no scenes";
+  EXPECT_GE(scores.at("all").Share(), GetParam().share);
+  EXPECT_GE(scores.at("held out").Share(), GetParam().share);
+}
+
+INSTANTIATE_TEST_SUITE_P(Markers, Solids,
+                         ::testing::Values(Expected{{"exact"}, 0.9}, Expected{{"noise", 0.1}, 0.88},
+                                           Expected{{"missing", 0, 0.2}, 0.88},
+                                           Expected{{"both", 0.1, 0.2}, 0.85},
+                                           Expected{{"100 Pa", 0.1, 0, 100}, 0.85}),
+                         [](const auto& at) { return "Case" + std::to_string(at.index); });
+
+// Whatever was shown before, the same markers give the same forces: scenes in random order, every third with
+// most of its markers gone, against an estimator that knows nothing.
+TEST(SolidsTest, ColdIsWarm) {
+  const std::vector<SolidScene> scenes = ReadSolidScenes();
+  ASSERT_FALSE(scenes.empty());
+  std::mt19937 random(7);
+  SkinEstimator warm(SolidSkin()), cold(SolidSkin());
+  int compared = 0, alike = 0;
+  for (int frame = 0; frame < 60; ++frame) {
+    const SolidScene& scene = scenes[random() % scenes.size()];
+    const bool blind = frame % 3 == 1;
+    const SkinObservation observation = Observe(scene, {"walk", 0.1, blind ? 0.7 : 0.0});
+    SkinEstimate with, without;
+    warm.Estimate(observation, with);
+    if (blind) continue;
+    cold.Restart();
+    cold.Estimate(observation, without);
+    if (without.failure != EstimateFailure::kNone) continue;
+    ++compared;
+    bool same = with.failure == without.failure && with.loads.loads.size() == without.loads.loads.size();
+    for (size_t i = 0; same && i < with.loads.loads.size(); ++i) {
+      double nearest = 1e9;
+      const EstimatedLoad& a = with.loads.loads[i];
+      for (const EstimatedLoad& b : without.loads.loads)
+        nearest = std::min(nearest, (a.force_n - b.force_n).norm());
+      same = nearest < 0.2 * std::sqrt(a.force_covariance_n2.trace());
+    }
+    alike += same;
+    if (!same) std::printf("  %s differs from what was before\n", scene.name.c_str());
+  }
+  std::printf("%d of %d alike\n", alike, compared);
+  EXPECT_GE(compared, 30);
+  EXPECT_GE(alike, 0.9 * compared);
+}
+
+}  // namespace
+}  // namespace taclink

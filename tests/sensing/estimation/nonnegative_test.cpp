@@ -1,0 +1,70 @@
+#include "sensing/estimation/nonnegative.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace taclink {
+namespace {
+
+// Minimum: the gradient vanishes where x is above zero and points outward where it is zero (Karush, Kuhn and
+// Tucker).
+void ExpectMinimum(const Eigen::MatrixXd& h, const Eigen::VectorXd& b, const Eigen::VectorXd& x) {
+  const Eigen::VectorXd gradient = h * x - b;
+  const double scale = b.cwiseAbs().maxCoeff();
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    EXPECT_GE(x[i], 0) << i;
+    if (x[i] > 0)
+      EXPECT_NEAR(gradient[i] / scale, 0, 1e-6) << i;
+    else
+      EXPECT_GE(gradient[i] / scale, -1e-6) << i;
+  }
+}
+
+struct Problem {
+  Eigen::MatrixXd h;
+  Eigen::VectorXd b;
+};
+
+// Neighboring columns nearly alike, as those of loads on a skin.
+Problem Smooth(unsigned seed, int variables) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd columns(2 * variables, variables);
+  for (int j = 0; j < variables; ++j) {
+    for (int i = 0; i < columns.rows(); ++i) columns(i, j) = std::exp(-0.005 * (i - 2 * j) * (i - 2 * j));
+  }
+  Eigen::VectorXd data(columns.rows());
+  for (Eigen::Index i = 0; i < data.size(); ++i) data[i] = normal(random) + (i > 20 && i < 60 ? 5 : 0);
+  return {columns.transpose() * columns, columns.transpose() * data};
+}
+
+TEST(NonNegativeSolver, FindsTheMinimum) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const auto [h, b] = Smooth(seed, 60);
+    NonNegativeSolver solver;
+    std::vector<int> support;
+    ExpectMinimum(h, b, solver.Solve(h, b, support));
+    EXPECT_TRUE(solver.converged());
+  }
+}
+
+TEST(NonNegativeSolver, DoesNotDependOnWhereItStarts) {
+  const auto [h, b] = Smooth(3, 60);
+  NonNegativeSolver solver;
+  std::vector<int> cold, warm = {1, 7, 20, 33, 58};
+  const Eigen::VectorXd from_nothing = solver.Solve(h, b, cold);
+  const Eigen::VectorXd from_others = solver.Solve(h, b, warm);
+  EXPECT_LT((h * (from_nothing - from_others)).norm(), 1e-6 * b.norm());
+}
+
+TEST(NonNegativeSolver, NothingPushesNothingIsThere) {
+  const Eigen::MatrixXd h = Eigen::MatrixXd::Identity(3, 3);
+  NonNegativeSolver solver;
+  std::vector<int> support;
+  EXPECT_TRUE(solver.Solve(h, Eigen::Vector3d(-1, 0, -2), support).isZero());
+  EXPECT_TRUE(support.empty());
+}
+
+}  // namespace
+}  // namespace taclink

@@ -1,0 +1,162 @@
+#include "sensing/estimation/skin_estimator.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sensing/contact/contact_finder.h"
+#include "sensing/mechanics/element_load.h"
+#include "sensing/mechanics/equilibrium.h"
+#include "sensing/model/model_file.h"
+
+namespace taclink {
+namespace {
+
+// A dead load on the outer wall's nodes around a place, on a finer mesh than the estimator's.
+struct Pushed {
+  Eigen::VectorXd markers_mm;
+  bool ok = false;
+};
+Pushed Push(const LinkModel& model, double kpa, double angle, double z, double force_n, double width_mm) {
+  const ShellMesh mesh = MakeShellMesh(model, 2);
+  const NonlinearShell shell(SkinSurface(mesh), model.material);
+  EquilibriumSolver solver(shell, {.tolerance_n = 1e-7});
+  ShellState state = shell.Rest();
+  Pushed pushed;
+  for (int step = 1; step <= 8; ++step) {
+    const FollowerPressure pressure(kpa * 1e-3 * step / 8);
+    const ElementLoad* loads[] = {&pressure};
+    if (!solver.Solve(loads, {}, state).ok()) return pushed;
+  }
+  const FollowerPressure pressure(kpa * 1e-3);
+  const ElementLoad* loads[] = {&pressure};
+  const Vec3 center = model.PointAtDepth(angle, z, model.thickness_mm / 2);
+  const Vec3 inward = -model.OutwardNormal(angle, z);
+  Eigen::VectorXd share = Eigen::VectorXd::Zero(mesh.node_count());
+  for (int node = mesh.columns; node < mesh.node_count() - mesh.columns; ++node) {
+    const auto i = static_cast<size_t>(node);
+    share[node] =
+        mesh.areas_mm2[i] * std::exp(-(mesh.mid_mm[i] - center).squaredNorm() / (2 * width_mm * width_mm));
+  }
+  share /= share.sum();
+  for (int step = 1; step <= 8; ++step) {
+    Eigen::VectorXd dead = Eigen::VectorXd::Zero(shell.dof_count());
+    for (int node = 0; node < mesh.node_count(); ++node) {
+      if (const int dof = shell.Dof(node, 0); dof >= 0)
+        dead.segment<3>(dof) = force_n * step / 8 * share[node] * inward;
+    }
+    if (!solver.Solve(loads, dead, state).ok()) return pushed;
+  }
+  MarkerMap(model, mesh).Displacements(state, pushed.markers_mm);
+  pushed.ok = true;
+  return pushed;
+}
+
+SkinObservation Observe(const Eigen::VectorXd& markers_mm, double kpa, double sigma_mm) {
+  SkinObservation observation;
+  for (Eigen::Index m = 0; m < markers_mm.size() / 3; ++m) {
+    observation.markers.displacement_mm.push_back(markers_mm.segment<3>(3 * m));
+    observation.markers.information.push_back(Mat3::Identity() / (sigma_mm * sigma_mm));
+  }
+  observation.pressure = {kpa * 1e-3, 3e-5};
+  return observation;
+}
+
+class SkinEstimatorTest : public ::testing::Test {
+ protected:
+  static LinkModel Rubber() {
+    LinkModel model = LoadLinkModel("cylinder").value();
+    model.material = {.youngs_modulus_mpa = 0.1, .poisson_ratio = 0.5, .law = MaterialLaw::kNeoHookean};
+    return model;
+  }
+  const LinkModel model_ = Rubber();
+  SkinEstimator estimator_{model_};
+  SkinEstimate estimate_;
+};
+
+TEST_F(SkinEstimatorTest, FindsAForceItsPlaceAndTheShape) {
+  for (const double kpa : {0.0, 1.0}) {
+    const double force_n = kpa > 0 ? 0.6 : 0.1;
+    const Pushed pushed = Push(model_, kpa, 1.3, 95, force_n, 4);
+    ASSERT_TRUE(pushed.ok);
+    estimator_.Estimate(Observe(pushed.markers_mm, kpa, 0.02), estimate_);
+    ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+    ASSERT_EQ(estimate_.loads.loads.size(), 1u);
+    const Vec3 truth = -force_n * model_.OutwardNormal(1.3, 95);
+    EXPECT_LT((estimate_.loads.loads[0].force_n - truth).norm(), 0.05 * force_n) << kpa;
+    EXPECT_LT((estimate_.displacements_mm - pushed.markers_mm).norm() / std::sqrt(240), 0.05) << kpa;
+    ContactFinder finder(model_);
+    std::vector<Contact> contacts;
+    finder.Find(estimator_, estimate_, contacts);
+    ASSERT_EQ(contacts.size(), 1u);
+    const Vec3 at = model_.PointAtDepth(1.3, 95, 0);
+    EXPECT_NEAR(std::atan2(contacts[0].center_mm.y(), contacts[0].center_mm.x()), 1.3, 0.03);
+    EXPECT_NEAR(contacts[0].center_mm.z(), at.z(), 1);
+    // Of a load on a small patch the moment is the center's arm times the force.
+    const Vec3 moment = contacts[0].center_mm.cross(contacts[0].force_n);
+    EXPECT_LT((contacts[0].moment_nmm - moment).norm(), 0.05 * moment.norm());
+    EXPECT_GT(contacts[0].peak_pressure_mpa * contacts[0].area_mm2, 0.8 * force_n);
+    ASSERT_GE(contacts[0].outline_mm.size(), 4u);
+    for (const Vec3& corner : contacts[0].outline_mm) EXPECT_LT((corner - contacts[0].center_mm).norm(), 25);
+  }
+}
+
+TEST_F(SkinEstimatorTest, PressureThatIsToldWrongIsNoForce) {
+  const Pushed inflated = Push(model_, 1.0, 1.3, 95, 0, 4);
+  ASSERT_TRUE(inflated.ok);
+  SkinObservation observation = Observe(inflated.markers_mm, 1.1, 0.02);
+  observation.pressure.sigma_mpa = 5e-5;
+  estimator_.Estimate(observation, estimate_);
+  ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+  EXPECT_TRUE(estimate_.loads.loads.empty());
+  EXPECT_NEAR(estimate_.pressure_mpa, 1e-3, 2e-5);
+}
+
+TEST_F(SkinEstimatorTest, ABaselineUnderPressureIsNoForce) {
+  const Pushed before = Push(model_, 1.0, 1.3, 95, 0, 4), now = Push(model_, 0.8, 1.3, 95, 0.4, 4);
+  ASSERT_TRUE(before.ok && now.ok);
+  SkinObservation observation = Observe(now.markers_mm - before.markers_mm, 0.8, 0.02);
+  observation.baseline_pressure = {1e-3, 3e-5};
+  estimator_.Estimate(observation, estimate_);
+  ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+  ASSERT_EQ(estimate_.loads.loads.size(), 1u);
+  EXPECT_NEAR(estimate_.loads.loads[0].force_n.norm(), 0.4, 0.03);
+}
+
+TEST_F(SkinEstimatorTest, WhatIsNotSeenFollowsFromTheLoads) {
+  const Pushed pushed = Push(model_, 0.5, 1.3, 95, 0.3, 4);
+  ASSERT_TRUE(pushed.ok);
+  SkinObservation observation = Observe(pushed.markers_mm, 0.5, 0.02);
+  for (size_t m = 0; m < 240; m += 3) observation.markers.information[m].setZero();
+  for (size_t m = 0; m < 240; m += 3) observation.markers.displacement_mm[m].setConstant(1e6);
+  estimator_.Estimate(observation, estimate_);
+  ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+  EXPECT_LT((estimate_.displacements_mm - pushed.markers_mm).cwiseAbs().maxCoeff(), 0.3);
+  ASSERT_EQ(estimate_.loads.loads.size(), 1u);
+  EXPECT_NEAR(estimate_.loads.loads[0].force_n.norm(), 0.3, 0.03);
+}
+
+TEST_F(SkinEstimatorTest, NonsenseIsRefusedAndForgotten) {
+  const Pushed pushed = Push(model_, 0.5, 1.3, 95, 0.3, 4);
+  ASSERT_TRUE(pushed.ok);
+  const SkinObservation good = Observe(pushed.markers_mm, 0.5, 0.02);
+  SkinObservation nonsense = good;
+  for (Vec3& u : nonsense.markers.displacement_mm) u = -3 * u + Vec3(30, 0, 0);
+  SkinObservation unstable = good;
+  unstable.pressure.mpa = 1;
+  estimator_.Estimate(unstable, estimate_);
+  EXPECT_EQ(estimate_.failure, EstimateFailure::kNoEquilibrium);
+  estimator_.Estimate(nonsense, estimate_);
+  estimator_.Estimate(good, estimate_);
+  ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+  ASSERT_EQ(estimate_.loads.loads.size(), 1u);
+  const Vec3 warm = estimate_.loads.loads[0].force_n;
+  const double sigma = std::sqrt(estimate_.loads.loads[0].force_covariance_n2.trace());
+  SkinEstimator fresh(model_);
+  fresh.Estimate(good, estimate_);
+  ASSERT_EQ(estimate_.loads.loads.size(), 1u);
+  EXPECT_LT((estimate_.loads.loads[0].force_n - warm).norm(), 0.2 * sigma);
+}
+
+}  // namespace
+}  // namespace taclink

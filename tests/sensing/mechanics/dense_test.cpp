@@ -1,0 +1,135 @@
+#include "sensing/mechanics/dense.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <cstdlib>
+
+namespace taclink {
+namespace {
+
+constexpr Eigen::Index kRows = 60;
+
+class Dense : public testing::Test {
+ protected:
+  static Eigen::MatrixXd PositiveDefinite() {
+    const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 2 * kRows);
+    return a * a.transpose();
+  }
+  static Eigen::MatrixXd LowerOf(const Eigen::MatrixXd& a) { return a.triangularView<Eigen::Lower>(); }
+  static Eigen::MatrixXd AboveOf(const Eigen::MatrixXd& a) {
+    return a.triangularView<Eigen::StrictlyUpper>();
+  }
+  static void ExpectClose(const Eigen::MatrixXd& found, const Eigen::MatrixXd& expected) {
+    ASSERT_EQ(found.rows(), expected.rows());
+    ASSERT_EQ(found.cols(), expected.cols());
+    EXPECT_LT((found - expected).norm(), 1e-12 * expected.norm());
+  }
+
+  void SetUp() override { std::srand(5); }  // Eigen's Random draws from it.
+};
+
+TEST_F(Dense, CholeskyIsEigens) {
+  const Eigen::MatrixXd a = PositiveDefinite();
+  Eigen::MatrixXd l = a;
+  ASSERT_TRUE(dense::Cholesky(l));
+  ExpectClose(LowerOf(l), a.llt().matrixL());
+  EXPECT_EQ(AboveOf(l), AboveOf(a));  // as promised, not touched
+}
+
+TEST_F(Dense, CholeskyReadsTheLowerHalfAlone) {
+  const Eigen::MatrixXd a = PositiveDefinite();
+  Eigen::MatrixXd l = LowerOf(a);
+  ASSERT_TRUE(dense::Cholesky(l));
+  ExpectClose(l, a.llt().matrixL());
+}
+
+TEST_F(Dense, CholeskySaysWhatIsNotPositiveDefinite) {
+  Eigen::MatrixXd a = PositiveDefinite();
+  a(40, 40) = -1;
+  EXPECT_FALSE(dense::Cholesky(a));
+}
+
+TEST_F(Dense, TriangularSolutionsAreEigens) {
+  const Eigen::MatrixXd l = PositiveDefinite().llt().matrixL();
+  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(kRows, 7);
+  Eigen::MatrixXd forward = b, backward = b;
+  dense::SolveLower(l, forward);
+  dense::SolveLowerTransposed(l, backward);
+  ExpectClose(forward, l.triangularView<Eigen::Lower>().solve(b));
+  ExpectClose(backward, l.transpose().triangularView<Eigen::Upper>().solve(b));
+}
+
+// A block of a larger matrix, whose columns are further apart than they are long; nothing else may change.
+TEST_F(Dense, TriangularSolutionsOfABlock) {
+  const Eigen::MatrixXd l = PositiveDefinite().llt().matrixL();
+  const Eigen::MatrixXd before = Eigen::MatrixXd::Random(kRows + 11, 9);
+  Eigen::MatrixXd forward = before, backward = before;
+  dense::SolveLower(l, forward.block(4, 2, kRows, 3));
+  dense::SolveLowerTransposed(l, backward.block(4, 2, kRows, 3));
+  Eigen::MatrixXd expected = before;
+  expected.block(4, 2, kRows, 3) = l.triangularView<Eigen::Lower>().solve(before.block(4, 2, kRows, 3));
+  ExpectClose(forward, expected);
+  EXPECT_EQ(forward.topRows(4), before.topRows(4));
+  expected = before;
+  expected.block(4, 2, kRows, 3) =
+      l.transpose().triangularView<Eigen::Upper>().solve(before.block(4, 2, kRows, 3));
+  ExpectClose(backward, expected);
+}
+
+// What is above a factor's diagonal is left over from before the factorization and must not count.
+TEST_F(Dense, TriangularSolutionsIgnoreTheUpperHalf) {
+  const Eigen::MatrixXd a = PositiveDefinite();
+  const Eigen::VectorXd b = Eigen::VectorXd::Random(kRows);
+  Eigen::MatrixXd l = a;
+  ASSERT_TRUE(dense::Cholesky(l));
+  Eigen::MatrixXd x = b;
+  dense::SolveLower(l, x);
+  dense::SolveLowerTransposed(l, x);
+  ExpectClose(x, a.llt().solve(b));
+}
+
+TEST_F(Dense, AddOuterAddsToTheLowerHalf) {
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 13), c = Eigen::MatrixXd::Random(kRows, kRows);
+  Eigen::MatrixXd sum = c;
+  dense::AddOuter(a, sum);
+  ExpectClose(LowerOf(sum), LowerOf(c + a * a.transpose()));
+  EXPECT_EQ(AboveOf(sum), AboveOf(c));
+}
+
+TEST_F(Dense, GramIsTheLowerHalfOfTheProduct) {
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 13);
+  Eigen::MatrixXd c;
+  dense::Gram(a, c);
+  ExpectClose(LowerOf(c), LowerOf(a.transpose() * a));
+  // What a matrix of the right size held before does not count, not even if it is no number.
+  c.setConstant(std::nan(""));
+  dense::Gram(a, c);
+  ExpectClose(LowerOf(c), LowerOf(a.transpose() * a));
+}
+
+TEST_F(Dense, TransposedProductIsEigens) {
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 13), b = Eigen::MatrixXd::Random(kRows, 5);
+  Eigen::MatrixXd c;
+  dense::TransposedProduct(a, b, c);
+  ExpectClose(c, a.transpose() * b);
+  c.setConstant(std::nan(""));
+  dense::TransposedProduct(a, b, c);
+  ExpectClose(c, a.transpose() * b);
+}
+
+TEST_F(Dense, EmptyMatricesAreNoError) {
+  Eigen::MatrixXd empty(0, 0), no_columns(kRows, 0), c;
+  EXPECT_TRUE(dense::Cholesky(empty));
+  dense::Gram(no_columns, c);
+  EXPECT_EQ(c.size(), 0);
+  const Eigen::MatrixXd l = PositiveDefinite().llt().matrixL();
+  dense::SolveLower(l, no_columns);
+  Eigen::MatrixXd same = l;
+  dense::AddOuter(no_columns, same);
+  EXPECT_EQ(same, l);
+}
+
+}  // namespace
+}  // namespace taclink
