@@ -18,9 +18,19 @@ constexpr double kNearClampMm = 30, kOwnNormalShare = 0.35;
 Linearization::Linearization(const SkinMechanics& mechanics)
     : mechanics_(mechanics),
       hessian_(mechanics.shell().Pattern()),
-      factor_(hessian_),
+      factor_(hessian_.rows() / mechanics.site_rows(), mechanics.site_rows()),
       jacobian_(mechanics.markers().MakeJacobian(mechanics.shell())),
-      frames_(static_cast<size_t>(mechanics.site_count())) {}
+      dense_jacobian_(Eigen::MatrixXf::Zero(jacobian_.rows(), jacobian_.cols())),
+      frames_(static_cast<size_t>(mechanics.site_count())) {
+  const Eigen::Index row_dofs = hessian_.rows() / mechanics.site_rows();
+  filled_.assign(static_cast<size_t>(mechanics.site_rows()), 0);
+  for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
+    for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it) {
+      for (auto i = static_cast<size_t>(it.col() / row_dofs); i < filled_.size(); ++i)
+        filled_[i] = std::max(filled_[i], row + 1);
+    }
+  }
+}
 
 // Directors smoothed over neighbours: a body is smoother than a mesh.
 void Linearization::SetFrames() {
@@ -57,22 +67,6 @@ void Linearization::SetFrames() {
   }
 }
 
-bool Linearization::Factorise() {
-  is_definite_ = factor_.Factorise(hessian_);
-  if (is_definite_) return true;
-  if (!analyzed_) indefinite_.analyzePattern(hessian_);
-  analyzed_ = true;
-  indefinite_.factorize(hessian_);
-  return indefinite_.info() == Eigen::Success;
-}
-
-void Linearization::Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd& x) {
-  if (is_definite_)
-    factor_.Solve(rhs, x);
-  else
-    x = indefinite_.solve(rhs);
-}
-
 // Rotations are about the tangent and about director x tangent.
 Vec2 Linearization::Turning(int node, const Vec3& couple) const {
   const auto i = static_cast<size_t>(node);
@@ -87,13 +81,13 @@ Vec2 Linearization::Moment(int node, const Vec3& direction) const {
 }
 
 Eigen::MatrixXd Linearization::CoupleColumns(const Eigen::VectorXd& shares) const {
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(adjoint_.cols(), 2);
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(adjoint_.rows(), 2);
   for (int site = 0; site < mechanics_.site_count(); ++site) {
     if (shares[site] == 0) continue;
     const int node = mechanics_.NodeOfSite(site), dof = mechanics_.shell().Dof(node, 0);
     for (int k = 0; k < 2; ++k) {
       const Vec2 turning = Turning(node, frames_[static_cast<size_t>(site)].col(k + 1));
-      columns.col(k) += shares[site] * (adjoint_.middleRows<2>(dof + 3).transpose() * turning);
+      columns.col(k) += shares[site] * (adjoint_.middleCols<2>(dof + 3).cast<double>() * turning);
     }
   }
   return columns;
@@ -111,29 +105,41 @@ bool Linearization::At(const ShellState& state, double pressure_mpa) {
   shell.Gradient(state_, {}, without_);
   pressure_force_ -= without_;
   shell.Hessian(state_, loads, gradient_, hessian_);
-  if (!gradient_.allFinite() || !Factorise()) return false;
+  if (!gradient_.allFinite() || !factor_.Factorise(hessian_)) return false;
   const MarkerMap& map = mechanics_.markers();
   map.WriteJacobian(shell, state_, jacobian_);
-  Solve(Eigen::MatrixXd(jacobian_.transpose()), adjoint_);
+  for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
+    for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it)
+      dense_jacobian_(row, it.col()) = static_cast<float>(it.value());
+  }
+  factor_.SolveRows(dense_jacobian_, filled_, adjoint_);
   if (!adjoint_.allFinite()) return false;
   map.Displacements(state_, base_mm_);
-  base_mm_.noalias() -= adjoint_.transpose() * gradient_;
-  by_pressure_ = -(adjoint_.transpose() * pressure_force_);
+  factor_.Solve(gradient_, motion_);
+  base_mm_.noalias() -= jacobian_ * motion_;
+  factor_.Solve(pressure_force_, motion_);
+  by_pressure_.noalias() = -(jacobian_ * motion_);
   SetFrames();
-  const int sites = mechanics_.site_count();
-  for (auto& matrix : columns_) matrix.resize(adjoint_.cols(), sites);
-  for (int site = 0; site < sites; ++site) {
-    const int node = mechanics_.NodeOfSite(site), dof = shell.Dof(node, 0);
-    const Mat3& frame = frames_[static_cast<size_t>(site)];
-    const auto rows = adjoint_.middleRows<5>(dof);
-    for (int k = 0; k < 3; ++k) {
-      Eigen::Matrix<double, 5, 1> load;
-      load << frame.col(k), k == 0 ? Vec2::Zero() : Moment(node, frame.col(k));
-      columns_[static_cast<size_t>(k)].col(site).noalias() = rows.transpose() * load;
-    }
-  }
+  SetColumns();
   is_made_ = true;
   return true;
+}
+
+void Linearization::SetColumns() {
+  const int sites = mechanics_.site_count();
+  for (auto& matrix : columns_) matrix.resize(adjoint_.rows(), sites);
+  for (int site = 0; site < sites; ++site) {
+    const int node = mechanics_.NodeOfSite(site), dof = mechanics_.shell().Dof(node, 0);
+    const Mat3& frame = frames_[static_cast<size_t>(site)];
+    Eigen::Matrix<float, 5, 3> loads;
+    for (int k = 0; k < 3; ++k) {
+      const Vec2 moment = k == 0 ? Vec2::Zero() : Moment(node, frame.col(k));
+      loads.col(k) << frame.col(k).cast<float>(), moment.cast<float>();
+    }
+    const auto by_node = adjoint_.middleCols<5>(dof);
+    for (int k = 0; k < 3; ++k)
+      columns_[static_cast<size_t>(k)].col(site).noalias() = by_node.lazyProduct(loads.col(k));
+  }
 }
 
 bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {
@@ -144,35 +150,34 @@ bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {
   const ElementLoad* loads[] = {&pressure};
   shell.Gradient(state_, loads, gradient_);
   if (!gradient_.allFinite()) return false;
-  Eigen::MatrixXd motion;
-  Solve(gradient_, motion);
+  factor_.Solve(gradient_, motion_);
   mechanics_.markers().Displacements(state_, base_mm_);
-  base_mm_.noalias() -= jacobian_ * motion.col(0);
+  base_mm_.noalias() -= jacobian_ * motion_;
   return base_mm_.allFinite();
 }
 
 double Linearization::Step(const SiteLoads& loads, double pressure_error_mpa, double longest_mm,
                            ShellState& state) {
   const NonlinearShell& shell = mechanics_.shell();
-  Eigen::MatrixXd force = -gradient_ - pressure_error_mpa * pressure_force_, motion;
+  Eigen::VectorXd force = -gradient_ - pressure_error_mpa * pressure_force_;
   for (int site = 0; site < mechanics_.site_count(); ++site) {
     const int node = mechanics_.NodeOfSite(site), dof = shell.Dof(node, 0);
     const Mat3& frame = frames_[static_cast<size_t>(site)];
     const Vec3 load = frame * Vec3(loads.forces_n[0][site], loads.forces_n[1][site], loads.forces_n[2][site]);
     const Vec3 tangential = load - frame.col(0).dot(load) * frame.col(0);
     const Vec3 couple = frame.rightCols<2>() * Vec2(loads.couples_nmm[0][site], loads.couples_nmm[1][site]);
-    force.block<3, 1>(dof, 0) += load;
-    force.block<2, 1>(dof + 3, 0) += Moment(node, tangential) + Turning(node, couple);
+    force.segment<3>(dof) += load;
+    force.segment<2>(dof + 3) += Moment(node, tangential) + Turning(node, couple);
   }
-  Solve(force, motion);
+  factor_.Solve(force, motion_);
   double longest = 0;
   for (int node = 0; node < shell.node_count(); ++node) {
     if (const int dof = shell.Dof(node, 0); dof >= 0)
-      longest = std::max(longest, motion.block<3, 1>(dof, 0).norm());
+      longest = std::max(longest, motion_.segment<3>(dof).norm());
   }
   if (!std::isfinite(longest)) return longest;
   state = state_;
-  shell.Step(std::min(1.0, longest_mm / std::max(longest, 1e-12)) * motion.col(0), state);
+  shell.Step(std::min(1.0, longest_mm / std::max(longest, 1e-12)) * motion_, state);
   return longest;
 }
 

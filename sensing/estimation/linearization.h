@@ -1,13 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <array>
 #include <vector>
 
 #include "sensing/estimation/skin_mechanics.h"
-#include "sensing/mechanics/sparse_cholesky.h"
+#include "sensing/mechanics/block_tridiagonal.h"
 
 namespace taclink {
 
@@ -33,7 +32,7 @@ class Linearization {
   double pressure_mpa() const { return pressure_mpa_; }
   const Eigen::VectorXd& base_mm() const { return base_mm_; }
   /// mm/N, 3 markers x sites, of loads that act on a site's node alone.
-  const std::array<Eigen::MatrixXd, 3>& columns() const { return columns_; }
+  const std::array<Eigen::MatrixXf, 3>& columns() const { return columns_; }
   const Eigen::VectorXd& by_pressure() const { return by_pressure_; }
   /// By site; columns inward, around, along; unit, perpendicular.
   const std::vector<Mat3>& frames() const { return frames_; }
@@ -54,8 +53,7 @@ class Linearization {
 
  private:
   void SetFrames();
-  bool Factorise();
-  void Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd& x);
+  void SetColumns();
   /// The rotations' part of a couple about an axis; of a force on the outer wall, which has one about the
   /// mid-surface.
   Vec2 Turning(int node, const Vec3& couple) const;
@@ -63,16 +61,15 @@ class Linearization {
 
   const SkinMechanics& mechanics_;
   Eigen::SparseMatrix<double> hessian_;
-  SparseCholesky factor_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> indefinite_;
-  bool analyzed_ = false, is_definite_ = true;
+  BlockTridiagonal factor_;
   MarkerMap::Jacobian jacobian_;
   ShellState state_, tangent_state_;
   bool is_made_ = false;
   double pressure_mpa_ = 0;
-  Eigen::VectorXd gradient_, pressure_force_, base_mm_, without_, by_pressure_;
-  Eigen::MatrixXd adjoint_;  // dofs x 3 markers: K^-1 J'
-  std::array<Eigen::MatrixXd, 3> columns_;
+  Eigen::VectorXd gradient_, pressure_force_, base_mm_, without_, by_pressure_, motion_;
+  Eigen::MatrixXf dense_jacobian_, adjoint_;  // J and J K^-1: 3 markers x dofs
+  std::vector<Eigen::Index> filled_;          // rows of J that reach that row of nodes or one before
+  std::array<Eigen::MatrixXf, 3> columns_;
   std::vector<Mat3> frames_;
 };
 

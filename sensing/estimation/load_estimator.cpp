@@ -72,12 +72,23 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   }
   factor_ = covariance_mm2_;
   if (!dense::Cholesky(factor_)) return false;
-  columns_.noalias() = skin.columns()[0] * mechanics_.spread();
+  SpreadColumns(skin.columns()[0]);
   dense::SolveLower(factor_, columns_);
   dense::Gram(columns_, gram_);
   gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
   regions_.clear();
   return columns_.allFinite();
+}
+
+void LoadEstimator::SpreadColumns(const Eigen::MatrixXf& at_nodes) {
+  columns_.resize(at_nodes.rows(), at_nodes.cols());
+  Eigen::VectorXf sum(at_nodes.rows());
+  for (Eigen::Index site = 0; site < at_nodes.cols(); ++site) {
+    sum.setZero();
+    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), site); it; ++it)
+      sum += static_cast<float>(it.value()) * at_nodes.col(it.row());
+    columns_.col(site) = sum.cast<double>();
+  }
 }
 
 bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const {
@@ -245,7 +256,7 @@ Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, cons
   for (int k = 0; k < 2; ++k) {
     for (Eigen::Index site = 0; site < spread.size(); ++site) {
       if (spread[site] != 0)
-        columns.col(k) += spread[site] * skin.columns()[static_cast<size_t>(k + 1)].col(site);
+        columns.col(k) += spread[site] * skin.columns()[static_cast<size_t>(k + 1)].col(site).cast<double>();
     }
   }
   dense::SolveLower(factor_, columns);
@@ -357,7 +368,6 @@ void LoadEstimator::Fit(const Linearization& skin, const MarkerObservations& obs
   std::vector<HillFinder::Hill> hills;
   std::vector<int> slipping;  // hills with a tangential force, in the order of their columns
   Eigen::MatrixXd tangential(data_.size(), 0);
-  Solution solution;
   // With tangential forces in, the selection is made once more with these taken as unknown.
   for (int stage = 0; stage < 2; ++stage) {
     ProjectOut(tangential);
@@ -366,16 +376,16 @@ void LoadEstimator::Fit(const Linearization& skin, const MarkerObservations& obs
     if (!estimate.converged) return;
     Eliminate(hills);
     if (hills.empty()) {
-      solution = {.loads = {}, .tangential = {}, .residual = data_, .chi2 = 0};
-      if (hidden_.cols() > 0) solution.residual -= hidden_ * (hidden_.transpose() * data_);
-      solution.chi2 = solution.residual.squaredNorm();
+      solution_ = {.loads = {}, .tangential = {}, .residual = data_, .chi2 = 0};
+      if (hidden_.cols() > 0) solution_.residual -= hidden_ * (hidden_.transpose() * data_);
+      solution_.chi2 = solution_.residual.squaredNorm();
       break;
     }
-    LetSlip(skin, hills, slipping, tangential, solution);
+    LetSlip(skin, hills, slipping, tangential, solution_);
     if (slipping.empty()) break;
   }
   if (hills.empty()) slipping.clear();
-  Finish(skin, hills, slipping, solution, estimate);
+  Finish(skin, hills, slipping, estimate);
 }
 
 }  // namespace taclink

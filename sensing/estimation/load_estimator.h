@@ -63,8 +63,11 @@ class LoadEstimator {
   /// missing now does not matter.
   bool IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const;
 
-  /// After Prepare. The linearization may have been rebased.
+  /// After Prepare. The linearization may have been rebased. Covariances and what is left unexplained are not
+  /// written.
   void Fit(const Linearization& skin, const MarkerObservations& observed, LoadEstimate& estimate);
+  /// Writes these for what was fitted last.
+  void Conclude(const Linearization& skin, LoadEstimate& estimate);
 
   const MarkerCovariance& covariance() const { return covariance_; }
   /// Covariance of the model's error at a marker, after Prepare.
@@ -76,6 +79,7 @@ class LoadEstimator {
   /// And of a couple, N mm: that force on an arm of a patch's size.
   static constexpr double kCoupleNmm = 10;
 
+  void SpreadColumns(const Eigen::MatrixXf& at_nodes);
   void Hide(const MarkerObservations& observed);
   std::vector<HillFinder::Hill> Select(const Linearization& skin);
   void Eliminate(std::vector<HillFinder::Hill>& hills);
@@ -94,10 +98,10 @@ class LoadEstimator {
                std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution);
   void ProjectOut(const Eigen::MatrixXd& tangential);
   void Finish(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
-              const std::vector<int>& slipping, const Solution& solution, LoadEstimate& estimate);
+              const std::vector<int>& slipping, LoadEstimate& estimate);
   void WriteLoad(const Linearization& skin, const HillFinder::Hill& hill, EstimatedLoad& load) const;
   void WriteCovariances(const Linearization& skin, LoadEstimate& estimate);
-  void WriteStray(const Linearization& skin, const Solution& solution, LoadEstimate& estimate);
+  void WriteStray(const Linearization& skin, LoadEstimate& estimate);
   double WorstRegion(const Eigen::VectorXd& residual);
   Eigen::VectorXd Near(const std::vector<int>& from, double width_mm) const;
 
@@ -126,6 +130,7 @@ class LoadEstimator {
   const Eigen::MatrixXd* frame_gram_ = nullptr;  // gram_, where nothing is hidden
   Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
   std::vector<char> is_shown_;  // by row
+  Solution solution_;
 };
 
 }  // namespace taclink

@@ -17,15 +17,14 @@ constexpr double kCenterShare = 0.25;  // of a site's spacing: what the grid of 
 }  // namespace
 
 void LoadEstimator::Finish(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
-                           const std::vector<int>& slipping, const Solution& solution,
-                           LoadEstimate& estimate) {
+                           const std::vector<int>& slipping, LoadEstimate& estimate) {
   Eigen::Index at = 0;
   for (size_t i = 0; i < hills.size(); ++i) {
     EstimatedLoad load;
     double sum = 0;
     for (const int site : hills[i]) sum += loads_[site];
     for (const int site : hills[i]) {
-      const double inward = solution.loads[at++];
+      const double inward = solution_.loads[at++];
       load.sites.push_back(site);
       load.inward_n.push_back(inward);
       load.shares.push_back(loads_[site] / sum);
@@ -35,19 +34,22 @@ void LoadEstimator::Finish(const Linearization& skin, const std::vector<HillFind
     load.has_tangential = slips != slipping.end();
     if (load.has_tangential) {
       const Eigen::Index first = kTangential * (slips - slipping.begin());
-      load.tangential_n = solution.tangential.segment<2>(first);
-      load.couple_nmm = solution.tangential.segment<2>(first + 2);
+      load.tangential_n = solution_.tangential.segment<2>(first);
+      load.couple_nmm = solution_.tangential.segment<2>(first + 2);
     }
     if (load.normal_force_n <= 0) continue;
     WriteLoad(skin, hills[i], load);
     estimate.loads.push_back(std::move(load));
   }
-  WriteStray(skin, solution, estimate);
+  WriteStray(skin, estimate);
+}
+
+void LoadEstimator::Conclude(const Linearization& skin, LoadEstimate& estimate) {
   WriteCovariances(skin, estimate);
   estimate.chi2_per_dof =
-      solution.residual.squaredNorm() /
+      solution_.residual.squaredNorm() /
       std::max<double>(1, static_cast<double>(std::count(is_shown_.begin(), is_shown_.end(), 1)));
-  estimate.region_chi2_per_dof = WorstRegion(solution.residual);
+  estimate.region_chi2_per_dof = WorstRegion(solution_.residual);
 }
 
 void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill& hill,
@@ -70,9 +72,9 @@ void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill&
   load.center = Vec2(origin, 0) + center / load.normal_force_n;
 }
 
-void LoadEstimator::WriteStray(const Linearization& skin, const Solution& solution, LoadEstimate& estimate) {
+void LoadEstimator::WriteStray(const Linearization& skin, LoadEstimate& estimate) {
   // Of the whitened residual, what it pulls at each marker.
-  Eigen::MatrixXd pulls = solution.residual;
+  Eigen::MatrixXd pulls = solution_.residual;
   dense::SolveLowerTransposed(factor_, pulls);
   const Eigen::VectorXd stacked = pulls.col(0);
   std::array<Eigen::VectorXd, 3> contacts;
@@ -95,7 +97,8 @@ void LoadEstimator::WriteStray(const Linearization& skin, const Solution& soluti
   for (size_t k = 0; k < 3; ++k) {
     all.forces_n[k] = mechanics_.spread() * contacts[k];
     all.forces_n[k].array() +=
-        covariance_.stray_sigmas_n()[k].array().square() * (skin.columns()[k].transpose() * stacked).array();
+        covariance_.stray_sigmas_n()[k].array().square() *
+        (skin.columns()[k].transpose() * stacked.cast<float>()).cast<double>().array();
   }
   estimate.pressure_error_mpa = pressure_sigma_ * by_pressure_.dot(stacked);
 }

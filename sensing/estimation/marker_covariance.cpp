@@ -71,12 +71,17 @@ void MarkerCovariance::Write(const Linearization& skin, const InflatedSkin& infl
     }
   }
   const double unit = mechanics_.force_unit();
+  const int sites = mechanics_.site_count();
+  scaled_.resize(3 * markers, 3 * sites);
   for (size_t k = 0; k < 3; ++k) {
     const double share = k == 0 ? kNormalShare : kTangentialShare;
     stray_n_[k] = ((share * local_n).cwiseAbs2().array() + kStrayN * kStrayN * unit * unit).sqrt();
-    scaled_.noalias() = skin.columns()[k] * stray_n_[k].asDiagonal();
-    dense::AddOuter(scaled_, covariance_mm2);
+    scaled_.middleCols(static_cast<Eigen::Index>(k) * sites, sites).noalias() =
+        skin.columns()[k] * stray_n_[k].cast<float>().asDiagonal();
   }
+  stray_mm2_.setZero(3 * markers, 3 * markers);
+  dense::AddOuter(scaled_, stray_mm2_);
+  covariance_mm2.triangularView<Eigen::Lower>() += stray_mm2_.cast<double>();
 }
 
 }  // namespace taclink

@@ -33,7 +33,7 @@ class MarkerCovariance {
   Eigen::MatrixXd near_, alike_, along_;   // markers x markers
   Eigen::MatrixXd by_sites_, by_markers_;  // sites x sites, sites x markers
   std::array<Eigen::VectorXd, 3> stray_n_;
-  Eigen::MatrixXd scaled_;
+  Eigen::MatrixXf scaled_, stray_mm2_;
 };
 
 }  // namespace taclink

@@ -7,13 +7,14 @@ namespace taclink {
 namespace {
 
 // In units of length (SkinMechanics) where mm.
-constexpr double kSettledMm = 0.03;       // of a step: a third of the markers' noise
+constexpr double kSettledMm = 0.02;         // of the next step
+constexpr double kTangentErrorPerMm = 0.2;  // share of a step that a tangent gets wrong, by how far it is from
 constexpr double kNearlySettledMm = 0.3;  // of the last step, when they run out
 constexpr double kLongestStepMm = 5;
 constexpr double kStillReachMm = 0.4;    // from the inflated skin: its tangent is good enough
-constexpr double kTouchedReachMm = 1.0;  // likewise from where the touched one was made
-constexpr double kAssimilateMm = 1.0;    // farther off, a marker is pulled to its place first
-constexpr double kSameLocal = 0.3;       // of the local forces: the model's errors are still the same
+constexpr double kTouchedReachMm = 2.5;  // likewise from where the touched one was made
+constexpr double kAssimilateMm = 2.5;    // farther off, a marker is pulled to its place first
+constexpr double kSameLocal = 0.5;       // of the local forces: the model's errors are still the same
 constexpr double kLittleLocalN = 0.05;
 constexpr double kModelPressureShare = 0.01;  // of the pressure: what the model's inflation is wrong by
 constexpr double kNoiseDeviations = 2;        // of a spring's pull, that noise alone makes
@@ -33,12 +34,18 @@ double LongestOff(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 }  // namespace
 
 struct SkinEstimator::Tangent {
-  explicit Tangent(const SkinMechanics& mechanics) : skin(mechanics), loads(mechanics) {}
+  Tangent(const SkinMechanics& mechanics, double reach)
+      : reach_mm(reach * mechanics.length_unit()), skin(mechanics), loads(mechanics) {}
+  double reach_mm;  // from where it was made: it is good enough
   Linearization skin;
   LoadEstimator loads;
   bool is_prepared = false;
   Eigen::VectorXd local_n;
 
+  double DistanceMm(const ShellState& state) const {
+    return LongestOff(skin.tangent_state().mids_mm, state.mids_mm);
+  }
+  bool IsNear(const ShellState& state) const { return skin.is_made() && DistanceMm(state) < reach_mm; }
   bool HasLocal(const Eigen::VectorXd& now, double unit) const {
     return (now - local_n).cwiseAbs().maxCoeff() <
            kSameLocal * std::max(now.maxCoeff(), local_n.maxCoeff()) + kLittleLocalN * unit;
@@ -57,8 +64,8 @@ SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions&
     : mechanics_(model, options.refinement),
       options_(options),
       assimilation_(mechanics_),
-      still_(std::make_unique<Tangent>(mechanics_)),
-      touched_(std::make_unique<Tangent>(mechanics_)),
+      still_(std::make_unique<Tangent>(mechanics_, kStillReachMm)),
+      touched_(std::make_unique<Tangent>(mechanics_, kTouchedReachMm)),
       used_(still_.get()),
       radial_pull_(mechanics_.marker_count()),
       radial_weight_(mechanics_.marker_count()) {}
@@ -139,9 +146,11 @@ bool SkinEstimator::Start(const Problem& problem, SkinEstimate& estimate, Eigen:
 bool SkinEstimator::Remake(Tangent& tangent, const Problem& problem, const ShellState& state,
                            const Eigen::VectorXd& local_n, SkinEstimate& estimate) {
   ++estimate.tangents;
+  // What is near keeps its columns: only what the loads are weighed with is made again.
+  const bool is_kept = tangent.is_prepared && tangent.IsNear(state);
   tangent.local_n = local_n;
   tangent.is_prepared =
-      tangent.skin.At(state, problem.pressure_mpa) &&
+      (is_kept || tangent.skin.At(state, problem.pressure_mpa)) &&
       tangent.loads.Prepare(tangent.skin, problem.inflated, problem.observed, problem.prior, local_n);
   return tangent.is_prepared;
 }
@@ -163,9 +172,7 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const Problem& problem, SkinEst
   const bool linear = options_.model == ForceModel::kLinear;
   const ShellState about = linear ? mechanics_.shell().Rest() : problem.inflated.state;
   const double unit = mechanics_.length_unit();
-  const bool is_near = tangent.is_prepared && (linear || LongestOff(tangent.skin.tangent_state().mids_mm,
-                                                                    about.mids_mm) < kStillReachMm * unit);
-  if (!is_near || !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
+  if (!tangent.is_prepared || !tangent.IsNear(about) || !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
     Problem mine = problem;
     if (linear) mine.pressure_mpa = 0;
@@ -176,7 +183,11 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const Problem& problem, SkinEst
   if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
   estimate.model = linear ? ForceModel::kLinear : ForceModel::kPressurised;
   if (linear || options_.model == ForceModel::kPressurised) return true;
-  if (estimate.loads.loads.empty()) return true;
+  if (estimate.loads.loads.empty()) {
+    // The nonlinear skin without loads is where the tangent is.
+    estimate.model = options_.model.value_or(estimate.model);
+    return true;
+  }
   return options_.model != ForceModel::kNonlinear && step_mm < kStillReachMm * unit;
 }
 
@@ -184,8 +195,6 @@ bool SkinEstimator::SolveLarge(const Problem& problem, SkinEstimate& estimate, E
   Tangent& tangent = *touched_;
   estimate.model = ForceModel::kNonlinear;
   const double unit = mechanics_.length_unit();
-  const bool is_near = tangent.is_prepared && LongestOff(tangent.skin.tangent_state().mids_mm,
-                                                         estimate.state.mids_mm) < kTouchedReachMm * unit;
   // A first guess: what the loads turn out to be decides whether all is made again.
   if (local_n.size() == 0) {
     if (estimate.loads.contact_sizes_n.size() > 0)
@@ -195,7 +204,8 @@ bool SkinEstimator::SolveLarge(const Problem& problem, SkinEstimate& estimate, E
     else
       local_n = Eigen::VectorXd::Zero(mechanics_.site_count());
   }
-  if (!is_near || !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
+  if (!tangent.is_prepared || !tangent.IsNear(estimate.state) ||
+      !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
     if (!Remake(tangent, problem, estimate.state, local_n, estimate)) return false;
   }
   double before_mm = 1e9;
@@ -203,16 +213,19 @@ bool SkinEstimator::SolveLarge(const Problem& problem, SkinEstimate& estimate, E
     double step_mm = 0;
     if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
     local_n = tangent.loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
-    const bool is_far =
-        LongestOff(tangent.skin.tangent_state().mids_mm, estimate.state.mids_mm) > kTouchedReachMm * unit;
+    const double distance_mm = tangent.DistanceMm(estimate.state);
+    const bool is_far = distance_mm > tangent.reach_mm;
     const bool has_local = tangent.HasLocal(local_n, mechanics_.force_unit());
     const bool is_slow = step > 0 && step_mm > kShrinks * before_mm;
-    if (step_mm < kSettledMm * unit && !is_far && has_local) return true;
+    const bool is_settled =
+        step_mm * std::min(1.0, kTangentErrorPerMm * distance_mm / unit) < kSettledMm * unit;
+    if (is_settled && !is_far && has_local) return true;
     before_mm = step_mm;
     if ((is_far || !has_local || is_slow) && estimate.tangents < kMostTangents) {
+      if (is_slow) tangent.is_prepared = false;
       if (!Remake(tangent, problem, estimate.state, local_n, estimate)) return false;
       before_mm = 1e9;
-    } else if (step_mm < kSettledMm * unit) {
+    } else if (is_settled) {
       return true;
     }
   }
@@ -226,9 +239,7 @@ bool SkinEstimator::SolveLarge(const Problem& problem, SkinEstimate& estimate, E
 bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSkin& inflated,
                             const PressurePrior& prior, SkinEstimate& estimate) {
   Tangent& tangent = *still_;
-  if (options_.model == ForceModel::kLinear || !tangent.is_prepared ||
-      LongestOff(tangent.skin.tangent_state().mids_mm, inflated.state.mids_mm) >
-          kStillReachMm * mechanics_.length_unit() ||
+  if (options_.model == ForceModel::kLinear || !tangent.is_prepared || !tangent.IsNear(inflated.state) ||
       !tangent.loads.IsPreparedFor(observation.markers, prior))
     return false;
   double told = 1 / (prior.sigma_mpa * prior.sigma_mpa), off = 0;
@@ -256,7 +267,7 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSk
   estimate.state = inflated.state;
   estimate.displacements_mm = inflated.markers_mm + off / told * inflated.markers_mm_per_mpa;
   estimate.pressure_mpa = inflated.pressure_mpa + off / told;
-  estimate.model = ForceModel::kPressurised;
+  estimate.model = options_.model.value_or(ForceModel::kPressurised);
   estimate.failure = EstimateFailure::kNone;
   return true;
 }
@@ -318,6 +329,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
     estimate.has_shape = IsPossible(estimate);
     return;
   }
+  used_->loads.Conclude(used_->skin, estimate.loads);
   mechanics_.markers().Displacements(estimate.state, estimate.displacements_mm);
   estimate.pressure_mpa = pressure_mpa + estimate.loads.pressure_error_mpa;
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible

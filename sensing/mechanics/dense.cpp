@@ -14,6 +14,15 @@ void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, con
 void dgemm_(const char* trans_a, const char* trans_b, const int* m, const int* n, const int* k,
             const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
             const double* beta, double* c, const int* ldc);
+void sgemm_(const char* trans_a, const char* trans_b, const int* m, const int* n, const int* k,
+            const float* alpha, const float* a, const int* lda, const float* b, const int* ldb,
+            const float* beta, float* c, const int* ldc);
+void ssyrk_(const char* uplo, const char* trans, const int* n, const int* k, const float* alpha,
+            const float* a, const int* lda, const float* beta, float* c, const int* ldc);
+void dpotri_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+void dgetrf_(const int* m, const int* n, double* a, const int* lda, int* pivots, int* info);
+void dgetri_(const int* n, double* a, const int* lda, const int* pivots, double* work, const int* size,
+             int* info);
 }
 
 namespace taclink::dense {
@@ -60,6 +69,58 @@ void SolveLowerTransposed(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> 
 void AddOuter(const Eigen::MatrixXd& a, Eigen::MatrixXd& c) {
   assert(c.rows() == a.rows());
   Symmetric("N", a, 1, c);
+}
+
+void AddOuter(const Eigen::MatrixXf& a, Eigen::MatrixXf& c) {
+  assert(c.rows() == a.rows());
+  const OneThread one_thread;
+  const int n = Int(a.rows()), k = Int(a.cols()), lda = Int(a.outerStride()), ldc = Int(c.outerStride());
+  const float one = 1;
+  if (n > 0) ssyrk_("L", "N", &n, &k, &one, a.data(), &lda, &one, c.data(), &ldc);
+}
+
+void AddProduct(double scale, const Eigen::Ref<const Eigen::MatrixXd>& a,
+                const Eigen::Ref<const Eigen::MatrixXd>& b, bool transpose_b, Eigen::Ref<Eigen::MatrixXd> c) {
+  assert(a.cols() == (transpose_b ? b.cols() : b.rows()) && c.rows() == a.rows());
+  const OneThread one_thread;
+  const int m = Int(c.rows()), n = Int(c.cols()), k = Int(a.cols()), lda = Int(a.outerStride()),
+            ldb = Int(b.outerStride()), ldc = Int(c.outerStride());
+  const double one = 1;
+  if (m > 0 && n > 0)
+    dgemm_("N", transpose_b ? "T" : "N", &m, &n, &k, &scale, a.data(), &lda, b.data(), &ldb, &one, c.data(),
+           &ldc);
+}
+
+void AddProduct(float scale, const Eigen::Ref<const Eigen::MatrixXf>& a,
+                const Eigen::Ref<const Eigen::MatrixXf>& b, bool transpose_b, Eigen::Ref<Eigen::MatrixXf> c) {
+  assert(a.cols() == (transpose_b ? b.cols() : b.rows()) && c.rows() == a.rows());
+  const OneThread one_thread;
+  const int m = Int(c.rows()), n = Int(c.cols()), k = Int(a.cols()), lda = Int(a.outerStride()),
+            ldb = Int(b.outerStride()), ldc = Int(c.outerStride());
+  const float one = 1;
+  if (m > 0 && n > 0)
+    sgemm_("N", transpose_b ? "T" : "N", &m, &n, &k, &scale, a.data(), &lda, b.data(), &ldb, &one, c.data(),
+           &ldc);
+}
+
+bool InvertSymmetric(Eigen::MatrixXd& a) {
+  const OneThread one_thread;
+  const int n = Int(a.rows()), lda = Int(a.outerStride());
+  if (n == 0) return true;
+  Eigen::MatrixXd factor = a;
+  int info = 0;
+  dpotrf_("L", &n, factor.data(), &lda, &info);
+  if (info == 0) {
+    dpotri_("L", &n, factor.data(), &lda, &info);
+    a = factor.selfadjointView<Eigen::Lower>();
+    return info == 0 && a.allFinite();
+  }
+  Eigen::VectorXi pivots(n);
+  Eigen::VectorXd work(64 * n);
+  const int size = Int(work.size());
+  dgetrf_(&n, &n, a.data(), &lda, pivots.data(), &info);
+  if (info == 0) dgetri_(&n, a.data(), &lda, pivots.data(), work.data(), &size, &info);
+  return info == 0 && a.allFinite();
 }
 
 void Gram(const Eigen::MatrixXd& a, Eigen::MatrixXd& c) {

@@ -16,6 +16,14 @@ void SolveLower(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b);
 void SolveLowerTransposed(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b);
 /// Lower half of c := c + a a^T.
 void AddOuter(const Eigen::MatrixXd& a, Eigen::MatrixXd& c);
+void AddOuter(const Eigen::MatrixXf& a, Eigen::MatrixXf& c);
+/// c := c + scale a b, or scale a b^T.
+void AddProduct(double scale, const Eigen::Ref<const Eigen::MatrixXd>& a,
+                const Eigen::Ref<const Eigen::MatrixXd>& b, bool transpose_b, Eigen::Ref<Eigen::MatrixXd> c);
+void AddProduct(float scale, const Eigen::Ref<const Eigen::MatrixXf>& a,
+                const Eigen::Ref<const Eigen::MatrixXf>& b, bool transpose_b, Eigen::Ref<Eigen::MatrixXf> c);
+/// The inverse of a symmetric matrix, which need not be definite, in its place. False: singular.
+bool InvertSymmetric(Eigen::MatrixXd& a);
 /// c := a^T b.
 void TransposedProduct(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, Eigen::MatrixXd& c);
 /// Lower half of c := a^T a.

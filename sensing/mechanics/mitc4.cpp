@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "sensing/mechanics/plane_stress.h"
 #include "sensing/mechanics/shape_functions.h"
 
 namespace taclink {
@@ -12,7 +13,6 @@ using StrainRow = Eigen::Matrix<double, 1, kElementDofs>;
 using StrainMatrix = Eigen::Matrix<double, 5, kElementDofs>;
 using Corners = std::array<ShellCorner, 4>;
 
-constexpr double kShearCorrection = 5.0 / 6.0;
 constexpr std::array<double, 4> kXi = {-1, 1, 1, -1};
 constexpr std::array<double, 4> kEta = {-1, -1, 1, 1};
 
@@ -92,14 +92,26 @@ StrainMatrix CartesianStrains(const PointKinematics& k, const StrainRow& shear_x
   return strains;
 }
 
-Eigen::Matrix<double, 5, 5> PlaneStress(const Material& material) {
+// The frame's first axis is along xi.
+Eigen::Matrix<double, 5, 5> Elasticity(const std::array<ShellCorner, 4>& corners, double thickness_mm,
+                                       const Material& material) {
   const double e = material.youngs_modulus_mpa, nu = material.poisson_ratio;
   const double membrane = e / (1 - nu * nu), shear = e / (2 * (1 + nu));
   Eigen::Matrix<double, 5, 5> c = Eigen::Matrix<double, 5, 5>::Zero();
   c(0, 0) = c(1, 1) = membrane;
   c(0, 1) = c(1, 0) = nu * membrane;
   c(2, 2) = shear;
-  c(3, 3) = c(4, 4) = kShearCorrection * shear;
+  // Between the middles of two edges.
+  const auto between = [&](Vec3 ShellCorner::*what, std::array<size_t, 2> from, std::array<size_t, 2> to) {
+    return (corners[to[0]].*what + corners[to[1]].*what - corners[from[0]].*what - corners[from[1]].*what)
+               .norm() /
+           2;
+  };
+  const auto by_xi = [&](Vec3 ShellCorner::*what) { return between(what, {0, 3}, {1, 2}); };
+  const auto by_eta = [&](Vec3 ShellCorner::*what) { return between(what, {0, 1}, {2, 3}); };
+  const double xi_mm = by_xi(&ShellCorner::mid_mm), eta_mm = by_eta(&ShellCorner::mid_mm);
+  c(3, 3) = TransverseShearModulus(material, thickness_mm, {xi_mm, by_eta(&ShellCorner::director) / eta_mm});
+  c(4, 4) = TransverseShearModulus(material, thickness_mm, {eta_mm, by_xi(&ShellCorner::director) / xi_mm});
   return c;
 }
 
@@ -114,7 +126,7 @@ std::array<Vec3, 2> TangentsOf(const Vec3& director) {
 ElementMatrix Mitc4Stiffness(const std::array<ShellCorner, 4>& corners, double thickness_mm,
                              const Material& material) {
   const TyingShears tying = TyingShearsOf(corners, thickness_mm);
-  const auto elasticity = PlaneStress(material);
+  const auto elasticity = Elasticity(corners, thickness_mm, material);
   ElementMatrix stiffness = ElementMatrix::Zero();
   for (const double xi : {-kGauss, kGauss}) {
     for (const double eta : {-kGauss, kGauss}) {

@@ -68,11 +68,22 @@ Eigen::Vector4d TyingShears(const Corners& mids, const Corners& directors, doubl
   return shears;
 }
 
+// Along xi and eta, through the middle.
+std::array<ElementSpan, 2> Spans(const Corners& mids, const Corners& directors) {
+  const auto by_xi = [](const Corners& c) { return (c.col(1) + c.col(2) - c.col(0) - c.col(3)).norm() / 2; };
+  const auto by_eta = [](const Corners& c) { return (c.col(2) + c.col(3) - c.col(0) - c.col(1)).norm() / 2; };
+  const double xi_mm = by_xi(mids), eta_mm = by_eta(mids);
+  return {ElementSpan{xi_mm, by_eta(directors) / eta_mm}, ElementSpan{eta_mm, by_xi(directors) / xi_mm}};
+}
+
 }  // namespace
 
 NonlinearElement::NonlinearElement(const ElementState& rest, double thickness_mm, const Material& material)
-    : thickness_mm_(thickness_mm), material_(material), shear_modulus_mpa_(TransverseShearModulus(material)) {
+    : thickness_mm_(thickness_mm), material_(material) {
   const Corners mids = Mids(rest), directors = Directors(rest);
+  const auto [along, across] = Spans(mids, directors);
+  shear_moduli_mpa_ = {TransverseShearModulus(material, thickness_mm, along),
+                       TransverseShearModulus(material, thickness_mm, across)};
   rest_tying_ = TyingShears(mids, directors, thickness_mm / 2);
   for (size_t side = 0; side < 2; ++side) {
     layers_[side].height_mm = (side == 0 ? -kGauss : kGauss) * thickness_mm / 2;
@@ -112,7 +123,9 @@ void NonlinearElement::SetPoint(const Corners& mids, const Corners& directors, s
                    (q(1, k) * q(2, 2) + q(2, k) * q(1, 2)) * eta_shear;
     for (size_t t = 0; t < 4; ++t) layer.shear[row][t].Set(p, shear(k, static_cast<Eigen::Index>(t)));
   }
-  tying_stiffness_ += weight * shear_modulus_mpa_ * shear.transpose() * shear;
+  for (Eigen::Index k = 0; k < 2; ++k)
+    tying_stiffness_ +=
+        weight * shear_moduli_mpa_[static_cast<size_t>(k)] * shear.row(k).transpose() * shear.row(k);
   layer.weight_mm3.Set(p, weight);
   layer.rest_metric[0].Set(p, g1.dot(g1));
   layer.rest_metric[1].Set(p, g2.dot(g2));
@@ -142,7 +155,7 @@ void NonlinearElement::Strain(const Layer& layer, const Corners& at_height, cons
     const auto& by_tying = layer.shear[r];
     shear[r] = Dot(layer.warp[r], covariant) + by_tying[0] * tying[0] + by_tying[1] * tying[1] +
                by_tying[2] * tying[2] + by_tying[3] * tying[3];
-    shear_force[r] = shear_modulus_mpa_ * layer.weight_mm3 * shear[r];
+    shear_force[r] = shear_moduli_mpa_[r] * layer.weight_mm3 * shear[r];
   }
   for (size_t l = 0; l < 3; ++l) {
     force[l] = layer.weight_mm3 *
@@ -210,7 +223,8 @@ void NonlinearElement::AddUpTo(const ElementState& state, ElementResponse& respo
 // Material, and geometric on the diagonals.
 void NonlinearElement::AddStiffness(const Layer& layer, const Strained& strained, Sums& sums) const {
   const Lanes3 &g1 = strained.g1, &g2 = strained.g2, &s = strained.force;
-  const Lanes weighted = shear_modulus_mpa_ * layer.weight_mm3;
+  const std::array<Lanes, 2> weighted = {shear_moduli_mpa_[0] * layer.weight_mm3,
+                                         shear_moduli_mpa_[1] * layer.weight_mm3};
   const auto& p = layer.in_plane;
   const auto& [t11, t22, t33, t12, t13, t23] = strained.sheet.tangent_mpa;
   // By the covariant strains.
@@ -222,7 +236,8 @@ void NonlinearElement::AddStiffness(const Layer& layer, const Strained& strained
     for (size_t k = 0; k <= l; ++k) {
       c[k][l] =
           layer.weight_mm3 * (p[0][k] * by_strain[0] + p[1][k] * by_strain[1] + p[2][k] * by_strain[2]) +
-          weighted * (layer.warp[0][k] * layer.warp[0][l] + layer.warp[1][k] * layer.warp[1][l]);
+          weighted[0] * layer.warp[0][k] * layer.warp[0][l] +
+          weighted[1] * layer.warp[1][k] * layer.warp[1][l];
     }
   }
   Sums::Stiffness stiffness;
@@ -250,7 +265,8 @@ void NonlinearElement::AddStiffness(const Layer& layer, const Strained& strained
   for (size_t t = 0; t < 4; ++t) {
     Lanes3 w;
     for (size_t l = 0; l < 3; ++l)
-      w[l] = weighted * (layer.warp[0][l] * layer.shear[0][t] + layer.warp[1][l] * layer.shear[1][t]);
+      w[l] = weighted[0] * layer.warp[0][l] * layer.shear[0][t] +
+             weighted[1] * layer.warp[1][l] * layer.shear[1][t];
     for (size_t a = 0; a < 3; ++a) {
       double* column = &mixed(0, static_cast<Eigen::Index>(3 * t + a));
       (w[0] * g1[a] + w[2] * g2[a]).Write(column);

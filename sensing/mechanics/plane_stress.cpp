@@ -6,6 +6,7 @@ namespace taclink {
 namespace {
 
 constexpr double kShearCorrection = 5.0 / 6.0;
+constexpr double kFoundation = 16;  // see mitc4.md
 
 void SaintVenantKirchhoff(const Material& material, const Lanes3& strain, PlaneStress& answer) {
   const double nu = material.poisson_ratio;
@@ -48,8 +49,12 @@ void PlaneStressOf(const Material& material, const Lanes3& strain, PlaneStress& 
   }
 }
 
-double TransverseShearModulus(const Material& material) {
-  return kShearCorrection * material.youngs_modulus_mpa / (2 * (1 + material.poisson_ratio));
+double TransverseShearModulus(const Material& material, double thickness_mm, const ElementSpan& span) {
+  const double e = material.youngs_modulus_mpa, nu = material.poisson_ratio;
+  const double shear = kShearCorrection * e / (2 * (1 + nu)), slenderness = span.length_mm / thickness_mm;
+  const double foundation = slenderness * span.length_mm * span.curvature_across_per_mm;
+  const double share = 1 / (1 + kFoundation * 12 * (1 - nu * nu) * foundation * foundation);
+  return 1 / (1 / shear + share * slenderness * slenderness * (1 - nu * nu) / e);
 }
 
 }  // namespace taclink

@@ -20,7 +20,15 @@ struct PlaneStress {
 /// Where C is not positive definite there is no such sheet: the energy is infinite and the rest NaN.
 void PlaneStressOf(const Material& material, const Lanes3& strain, PlaneStress& answer);
 
-/// For transverse shears: stress by engineering strain, shear correction included.
-double TransverseShearModulus(const Material& material);
+/// An element's extent in one direction.
+struct ElementSpan {
+  double length_mm = 0;
+  double curvature_across_per_mm = 0;  ///< of the shell at rest, in the other direction
+};
+
+/// For transverse shears in the direction of `span`: stress by engineering strain, shear correction included,
+/// and what the element is too stiff in bending by (residual bending flexibility: MacNeal, A simple
+/// quadrilateral shell element, Computers & Structures 8, 1978). See mitc4.md.
+double TransverseShearModulus(const Material& material, double thickness_mm, const ElementSpan& span);
 
 }  // namespace taclink

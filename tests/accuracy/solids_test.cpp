@@ -123,6 +123,7 @@ struct Score {
   int held = 0, all = 0, said = 0;  // said: does not hold, and the residual is large
   int forces = 0, within_2_sigma = 0;
   double rms_mm = 0, worst_mm = 0;
+  std::vector<double> ratios;  // of a contact's force along the true one, to that
   double Share() const { return static_cast<double>(held) / std::max(all, 1); }
 };
 using Scores = std::map<std::string, Score>;
@@ -145,9 +146,17 @@ void AddSigmas(const SolidScene& scene, const std::vector<Contact>& found, Score
       if ((f.center_mm - c.center_mm).norm() > 10 || !f.force_covariance_n2) continue;
       ++score.forces;
       const Vec3 off = f.force_n - c.force_n;
+      score.ratios.push_back(f.force_n.dot(c.force_n) / c.force_n.squaredNorm());
       score.within_2_sigma += off.norm() < 2 * std::sqrt(f.force_covariance_n2->trace());
     }
   }
+}
+
+double MedianOf(std::vector<double>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 Scores ScoreAll(const How& how) {
@@ -186,13 +195,12 @@ Scores ScoreAll(const How& how) {
                   estimate.loads.chi2_per_dof, estimate.loads.region_chi2_per_dof,
                   1e6 * estimate.loads.pressure_error_mpa);
   }
-  for (const auto& [name, s] : scores)
+  for (auto& [name, s] : scores)
     std::printf(
         "%-12s %-13s %3d of %3d hold, %d more say that they don't; RMSE to %.3f mm, worst %.2f mm; 2 sigma: "
-        "%.0f %% "
-        "of %d\n",
+        "%.0f %% of %d; forces %.3f of the true ones\n",
         how.name, name.c_str(), s.held, s.all, s.said, s.rms_mm, s.worst_mm,
-        100.0 * s.within_2_sigma / std::max(s.forces, 1), s.forces);
+        100.0 * s.within_2_sigma / std::max(s.forces, 1), s.forces, MedianOf(s.ratios));
   return scores;
 }
 

@@ -90,18 +90,20 @@ void Estimation(benchmark::State& state) {
   for (SkinShape& frame : frames) estimator.Estimate(pressure, finder, frame, forces, contacts);
   size_t next = 0;
   int unsolved = 0;
-  double tangents = 0;
+  double tangents = 0, steps = 0;
   for (auto _ : state) {
     if (motion == kCold) estimator.Restart();
     estimator.Estimate(pressure, finder, frames[next++ % frames.size()], forces, contacts);
     unsolved += forces.converged ? 0 : 1;
     tangents += estimator.estimate().tangents;
+    steps += estimator.estimate().steps;
   }
   Vec3 total = Vec3::Zero();
   for (const Vec3& f : forces.forces_n) total += f;
   state.counters["force_n"] = total.norm();
   state.counters["unsolved"] = unsolved;
   state.counters["tangents"] = tangents / static_cast<double>(state.iterations());
+  state.counters["steps"] = steps / static_cast<double>(state.iterations());
 }
 
 BENCHMARK(Estimation)

@@ -31,7 +31,6 @@ using wire::log::TopicKind;
 constexpr const char* kScene = R"(taclink_scene: 1
 name: push
 model: cylinder
-skin: linear
 frame_rate_hz: 10
 duration_s: 20
 pressure_keyframes: [{time_s: 0, kpa: 0.2}, {time_s: 1.5, kpa: 0.2}, {time_s: 4, kpa: 0.4}, {time_s: 20, kpa: 0.4}]
@@ -254,9 +253,8 @@ class LogSolveWithPicturesTest : public LogSolveTest {
     const json a = LinkOf(changed, "a");
     EXPECT_LT(a.at("identical"), a.at("solved"));
     EXPECT_EQ(a.at("changes").at("force.model"), "auto -> linear");
-    EXPECT_EQ(a.at("difference").at("marker_max_mm"), 0);
+    EXPECT_GT(a.at("difference").at("marker_max_mm"), 0) << "shape and forces are one estimate";
     EXPECT_GT(a.at("difference").at("force_max_n"), 0);
-    EXPECT_TRUE(OnlyForcesDiffer(Frames(log, "a"), Frames(linear, "a")));
     EXPECT_EQ(Messages(log, "/links/b/frame"), Messages(linear, "/links/b/frame")) << "not asked for";
     EXPECT_THAT(Messages(linear, "/links/a/camera/top"), IsEmpty());
     EXPECT_EQ(Metadata(linear, "taclink.link.a").at("force.model"), "linear");

@@ -119,6 +119,31 @@ TEST_F(Dense, TransposedProductIsEigens) {
   ExpectClose(c, a.transpose() * b);
 }
 
+TEST_F(Dense, AddProductIsEigensOnBlocksToo) {
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(9, 13), b = Eigen::MatrixXd::Random(13, 5);
+  const Eigen::MatrixXd before = Eigen::MatrixXd::Random(20, 11);
+  Eigen::MatrixXd c = before, expected = before;
+  dense::AddProduct(-2, a, b, false, c.block(3, 2, 9, 5));
+  dense::AddProduct(0.5, a, b.transpose().eval(), true, c.block(3, 2, 9, 5));
+  expected.block(3, 2, 9, 5) -= 1.5 * a * b;
+  ExpectClose(c, expected);
+  Eigen::MatrixXf single = before.cast<float>();
+  dense::AddProduct(-1.5F, a.cast<float>().eval(), b.cast<float>().eval(), false, single.block(3, 2, 9, 5));
+  EXPECT_LT((single.cast<double>() - expected).norm(), 1e-5 * expected.norm());
+}
+
+TEST_F(Dense, SymmetricInversesOfDefiniteAndIndefinite) {
+  for (const double shift : {0.0, 80.0}) {
+    Eigen::MatrixXd a = PositiveDefinite();
+    a.diagonal().array() -= shift;
+    Eigen::MatrixXd inverse = a;
+    ASSERT_TRUE(dense::InvertSymmetric(inverse));
+    EXPECT_LT((a * inverse - Eigen::MatrixXd::Identity(kRows, kRows)).norm(), 1e-8);
+  }
+  Eigen::MatrixXd singular = Eigen::MatrixXd::Zero(kRows, kRows);
+  EXPECT_FALSE(dense::InvertSymmetric(singular));
+}
+
 TEST_F(Dense, EmptyMatricesAreNoError) {
   Eigen::MatrixXd empty(0, 0), no_columns(kRows, 0), c;
   EXPECT_TRUE(dense::Cholesky(empty));

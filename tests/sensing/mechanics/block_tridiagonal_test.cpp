@@ -1,0 +1,78 @@
+#include "sensing/mechanics/block_tridiagonal.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <cstdlib>
+
+namespace taclink {
+namespace {
+
+constexpr Eigen::Index kBlock = 6, kBlocks = 5, kSize = kBlock * kBlocks;
+
+// Symmetric, with blocks on the diagonal and beside it; definite where `shift` is large.
+Eigen::MatrixXd Tridiagonal(double shift) {
+  std::srand(3);  // Eigen's Random draws from it.
+  const Eigen::MatrixXd any = Eigen::MatrixXd::Random(kSize, kSize);
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(kSize, kSize);
+  for (Eigen::Index i = 0; i < kSize; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      if (i / kBlock - j / kBlock <= 1) matrix(i, j) = matrix(j, i) = any(i, j);
+    }
+    matrix(i, i) += shift;
+  }
+  return matrix;
+}
+
+Eigen::SparseMatrix<double> LowerOf(const Eigen::MatrixXd& matrix) {
+  return Eigen::MatrixXd(matrix.triangularView<Eigen::Lower>()).sparseView();
+}
+
+class BlockTridiagonalTest : public testing::TestWithParam<double> {};
+
+TEST_P(BlockTridiagonalTest, SolutionsAreThoseOfADenseFactor) {
+  const Eigen::MatrixXd matrix = Tridiagonal(GetParam());
+  BlockTridiagonal factor(kBlock, kBlocks);
+  // A factor of another matrix before leaves nothing behind.
+  ASSERT_TRUE(factor.Factorise(LowerOf(Tridiagonal(50))));
+  ASSERT_TRUE(factor.Factorise(LowerOf(matrix)));
+  const Eigen::VectorXd rhs = Eigen::VectorXd::Random(kSize);
+  Eigen::VectorXd x;
+  factor.Solve(rhs, x);
+  EXPECT_LT((matrix * x - rhs).norm(), 1e-9 * rhs.norm());
+}
+
+TEST_P(BlockTridiagonalTest, RowsAreSolvedTogether) {
+  const Eigen::MatrixXd matrix = Tridiagonal(GetParam());
+  BlockTridiagonal factor(kBlock, kBlocks);
+  ASSERT_TRUE(factor.Factorise(LowerOf(matrix)));
+  // Row r reaches from block r / 2 on.
+  constexpr Eigen::Index kRows = 10;
+  Eigen::MatrixXf rhs = Eigen::MatrixXf::Random(kRows, kSize);
+  std::vector<Eigen::Index> filled;
+  for (Eigen::Index block = 0; block < kBlocks; ++block) {
+    filled.push_back(2 * (block + 1));
+    rhs.block(filled.back(), block * kBlock, kRows - filled.back(), kBlock).setZero();
+  }
+  Eigen::MatrixXf x;
+  factor.SolveRows(rhs, filled, x);
+  const Eigen::MatrixXd expected = rhs.cast<double>() * matrix.inverse();
+  EXPECT_LT((x.cast<double>() - expected).norm(), 1e-4 * expected.norm());
+}
+
+INSTANTIATE_TEST_SUITE_P(DefiniteOrNot, BlockTridiagonalTest, testing::Values(20.0, 0.3));
+
+TEST(BlockTridiagonalTest, WhatHasNoSolutionIsSaid) {
+  BlockTridiagonal factor(kBlock, kBlocks);
+  Eigen::MatrixXd matrix = Tridiagonal(20);
+  matrix.row(9).setZero();
+  matrix.col(9).setZero();
+  EXPECT_FALSE(factor.Factorise(LowerOf(matrix)));
+  matrix = Tridiagonal(20);
+  matrix(14, 14) = std::nan("");
+  EXPECT_FALSE(factor.Factorise(LowerOf(matrix)));
+}
+
+}  // namespace
+}  // namespace taclink
