@@ -20,7 +20,6 @@ Linearization::Linearization(const SkinMechanics& mechanics)
       hessian_(mechanics.shell().Pattern()),
       factor_(hessian_.rows() / mechanics.site_rows(), mechanics.site_rows()),
       jacobian_(mechanics.markers().MakeJacobian(mechanics.shell())),
-      dense_jacobian_(Eigen::MatrixXf::Zero(jacobian_.rows(), jacobian_.cols())),
       frames_(static_cast<size_t>(mechanics.site_count())) {
   const Eigen::Index row_dofs = hessian_.rows() / mechanics.site_rows();
   filled_.assign(static_cast<size_t>(mechanics.site_rows()), 0);
@@ -108,17 +107,21 @@ bool Linearization::At(const ShellState& state, double pressure_mpa) {
   if (!gradient_.allFinite() || !factor_.Factorise(hessian_)) return false;
   const MarkerMap& map = mechanics_.markers();
   map.WriteJacobian(shell, state_, jacobian_);
+  Eigen::MatrixXf dense_jacobian = Eigen::MatrixXf::Zero(jacobian_.rows(), jacobian_.cols());
   for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
     for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it)
-      dense_jacobian_(row, it.col()) = static_cast<float>(it.value());
+      dense_jacobian(row, it.col()) = static_cast<float>(it.value());
   }
-  factor_.SolveRows(dense_jacobian_, filled_, adjoint_);
+  factor_.SolveRows(dense_jacobian, filled_, adjoint_);
   if (!adjoint_.allFinite()) return false;
   map.Displacements(state_, base_mm_);
   factor_.Solve(gradient_, motion_);
   base_mm_.noalias() -= jacobian_ * motion_;
   factor_.Solve(pressure_force_, motion_);
   by_pressure_.noalias() = -(jacobian_ * motion_);
+  tangent_pressure_mpa_ = pressure_mpa;
+  tangent_gradient_ = gradient_;
+  tangent_base_mm_ = base_mm_;
   SetFrames();
   SetColumns();
   is_made_ = true;
@@ -143,12 +146,20 @@ void Linearization::SetColumns() {
 }
 
 bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {
-  const NonlinearShell& shell = mechanics_.shell();
+  const bool is_tangent_state =
+      state.mids_mm == tangent_state_.mids_mm && state.directors == tangent_state_.directors;
   state_ = state;
   pressure_mpa_ = pressure_mpa;
+  if (is_tangent_state) {
+    // The pressure's forces are linear in the pressure.
+    const double more_mpa = pressure_mpa - tangent_pressure_mpa_;
+    gradient_ = tangent_gradient_ + more_mpa * pressure_force_;
+    base_mm_ = tangent_base_mm_ + more_mpa * by_pressure_;
+    return base_mm_.allFinite();
+  }
   const FollowerPressure pressure(pressure_mpa);
   const ElementLoad* loads[] = {&pressure};
-  shell.Gradient(state_, loads, gradient_);
+  mechanics_.shell().Gradient(state_, loads, gradient_);
   if (!gradient_.allFinite()) return false;
   factor_.Solve(gradient_, motion_);
   mechanics_.markers().Displacements(state_, base_mm_);

@@ -65,10 +65,11 @@ class Linearization {
   MarkerMap::Jacobian jacobian_;
   ShellState state_, tangent_state_;
   bool is_made_ = false;
-  double pressure_mpa_ = 0;
+  double pressure_mpa_ = 0, tangent_pressure_mpa_ = 0;
+  Eigen::VectorXd tangent_gradient_, tangent_base_mm_;
   Eigen::VectorXd gradient_, pressure_force_, base_mm_, without_, by_pressure_, motion_;
-  Eigen::MatrixXf dense_jacobian_, adjoint_;  // J and J K^-1: 3 markers x dofs
-  std::vector<Eigen::Index> filled_;          // rows of J that reach that row of nodes or one before
+  Eigen::MatrixXf adjoint_;           // J K^-1: 3 markers x dofs
+  std::vector<Eigen::Index> filled_;  // rows of J that reach that row of nodes or one before
   std::array<Eigen::MatrixXf, 3> columns_;
   std::vector<Mat3> frames_;
 };

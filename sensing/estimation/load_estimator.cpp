@@ -13,9 +13,11 @@ namespace {
 
 // Found on three-dimensional solids (docs/calculix.md); forces and lengths in SkinMechanics' units.
 constexpr double kSparsity = 1.5;  // of a load's norm: a load explains so many standard deviations
+constexpr double kBandSparsity =
+    12;  // likewise of a band: rarer, and errors of the model look like a little of one
 constexpr int kReweightings = 2;
-constexpr double kHillN = 0.02, kHillMm = 10;  // the sparsity halves where so much acts nearby
-constexpr double kEndNorm = 0.5;               // of the median: beyond the markers loads hardly show
+constexpr double kHillN = 0.02;   // the sparsity halves where so much acts nearby
+constexpr double kEndNorm = 1.0;  // of the median: beyond the markers loads hardly show
 constexpr double kLeastHillN = 0.01;
 constexpr size_t kMostHills = 24;  // no scene that was ever compared with the truth has a third of it
 constexpr double kLeastOfPeak = 0.03;
@@ -37,17 +39,8 @@ Mat3 NoiseOf(const Mat3& information, double unseen_mm) {
 
 }  // namespace
 
-LoadEstimator::LoadEstimator(const SkinMechanics& mechanics)
-    : mechanics_(mechanics), covariance_(mechanics), hills_(mechanics) {
-  const int sites = mechanics.site_count();
-  const double width = kHillMm * mechanics.length_unit();
-  near_.resize(sites, sites);
-  for (int i = 0; i < sites; ++i) {
-    for (int j = 0; j < sites; ++j)
-      near_(i, j) =
-          std::exp(-(mechanics.RestSite(i) - mechanics.RestSite(j)).squaredNorm() / (2 * width * width));
-  }
-}
+LoadEstimator::LoadEstimator(const SkinMechanics& mechanics, const Neighborhoods& near)
+    : mechanics_(mechanics), near_(near), covariance_(mechanics, near), hills_(mechanics) {}
 
 bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& inflated,
                             const MarkerObservations& observed, const PressurePrior& prior,
@@ -80,8 +73,9 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   return columns_.allFinite();
 }
 
+// Behind the sites' columns, those of bands: of 1 N that a row of sites shares.
 void LoadEstimator::SpreadColumns(const Eigen::MatrixXf& at_nodes) {
-  columns_.resize(at_nodes.rows(), at_nodes.cols());
+  columns_.resize(at_nodes.rows(), at_nodes.cols() + mechanics_.site_rows());
   Eigen::VectorXf sum(at_nodes.rows());
   for (Eigen::Index site = 0; site < at_nodes.cols(); ++site) {
     sum.setZero();
@@ -89,6 +83,9 @@ void LoadEstimator::SpreadColumns(const Eigen::MatrixXf& at_nodes) {
       sum += static_cast<float>(it.value()) * at_nodes.col(it.row());
     columns_.col(site) = sum.cast<double>();
   }
+  const int around = mechanics_.columns();
+  for (int row = 0; row < mechanics_.site_rows(); ++row)
+    columns_.col(at_nodes.cols() + row) = columns_.middleCols(row * around, around).rowwise().mean();
 }
 
 bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const {
@@ -175,26 +172,50 @@ void LoadEstimator::ProjectOut(const Eigen::MatrixXd& tangential) {
   frame_gram_ = &free_gram_;
 }
 
-// Loads of all sites under a penalty that fades where much acts, grouped.
+// What sites bear of loads of sites and bands.
+void LoadEstimator::ShareBands(const Eigen::VectorXd& loads, const std::vector<int>& support) {
+  const int sites = mechanics_.site_count(), around = mechanics_.columns();
+  loads_.setZero(sites);
+  for (const int i : support) {
+    if (i < sites)
+      loads_[i] += loads[i];
+    else
+      loads_.segment((i - sites) * around, around).array() += loads[i] / around;
+  }
+}
+
+// Loads of all sites, and of bands all around, under a penalty that fades where much acts, grouped. What a
+// band does to an inflated skin is little beside what each of its sites would do alone, so that it would not
+// pay for theirs.
 std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
-  const int sites = mechanics_.site_count();
+  const int sites = mechanics_.site_count(), around = mechanics_.columns();
   const double unit = mechanics_.force_unit();
   target_.noalias() = columns_.transpose() * frame_data_;
   norms_ = frame_gram_->diagonal().cwiseMax(0).cwiseSqrt();
-  Eigen::VectorXd sorted = norms_;
+  Eigen::VectorXd sorted = norms_.head(sites);
   std::nth_element(sorted.data(), sorted.data() + sites / 2, sorted.data() + sites);
   usual_norm_ = sorted[sites / 2];
   for (int site = 0; site < sites; ++site) {
     if (mechanics_.IsBeyondMarkers(site)) norms_[site] = std::max(norms_[site], kEndNorm * usual_norm_);
   }
+  Eigen::VectorXd sparsity = kSparsity * norms_;
+  sparsity.tail(mechanics_.site_rows()) *= kBandSparsity / kSparsity;
+  std::vector<int> chosen;
+  weights_ = sparsity;
+  ShareBands(solver_.Solve(*frame_gram_, target_ - weights_, chosen), chosen);
+  for (int pass = 0; pass < kReweightings && !chosen.empty(); ++pass) {
+    Eigen::VectorXd near = Eigen::VectorXd::Zero(norms_.size());
+    for (int site = 0; site < sites; ++site) {
+      if (loads_[site] > 0) near.head(sites) += loads_[site] * near_.load_sites.col(site);
+    }
+    for (Eigen::Index band = sites; band < near.size(); ++band)
+      near[band] = near.segment((band - sites) * around, around).mean();
+    weights_ = sparsity.array() / (1 + near.array() / (kHillN * unit));
+    ShareBands(solver_.Solve(*frame_gram_, target_ - weights_, chosen), chosen);
+  }
   std::vector<int> support;
-  weights_ = kSparsity * norms_;
-  loads_ = solver_.Solve(*frame_gram_, target_ - weights_, support);
-  for (int pass = 0; pass < kReweightings && !support.empty(); ++pass) {
-    Eigen::VectorXd near = Eigen::VectorXd::Zero(sites);
-    for (const int from : support) near += loads_[from] * near_.col(from);
-    weights_ = kSparsity * norms_.array() / (1 + near.array() / (kHillN * unit));
-    loads_ = solver_.Solve(*frame_gram_, target_ - weights_, support);
+  for (int site = 0; site < sites; ++site) {
+    if (loads_[site] > 0) support.push_back(site);
   }
   std::vector<HillFinder::Hill> hills = hills_.Find(skin, loads_, support);
   std::erase_if(hills, [&](const HillFinder::Hill& hill) {
@@ -301,7 +322,7 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
   for (Eigen::Index i = 0; i < n; ++i) {
     const int site = sites[static_cast<size_t>(i)];
     double near_n = 0;
-    for (const int from : sites) near_n += loads_[from] * near_(site, from);
+    for (const int from : sites) near_n += loads_[from] * near_.load_sites(site, from);
     const double norm = std::sqrt(std::max(h(i, i), 0.0));
     b[i] -= kRefitSparsity * norm / (1 + near_n / (kHillN * unit));
     if (mechanics_.IsBeyondMarkers(site))

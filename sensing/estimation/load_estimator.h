@@ -52,7 +52,8 @@ struct PressurePrior {
 /// and a tangential force for each hill that needs one. See estimation.md. One thread.
 class LoadEstimator {
  public:
-  explicit LoadEstimator(const SkinMechanics& mechanics);
+  /// Both are referred to.
+  LoadEstimator(const SkinMechanics& mechanics, const Neighborhoods& near);
 
   /// What does not change from frame to frame while the linearization, the cameras' noise and the loads'
   /// sizes stay as they are: covariance, whitened columns and their products. `local_n`: force in the
@@ -81,6 +82,7 @@ class LoadEstimator {
 
   void SpreadColumns(const Eigen::MatrixXf& at_nodes);
   void Hide(const MarkerObservations& observed);
+  void ShareBands(const Eigen::VectorXd& loads, const std::vector<int>& support);
   std::vector<HillFinder::Hill> Select(const Linearization& skin);
   void Eliminate(std::vector<HillFinder::Hill>& hills);
   double Unexplained(const std::vector<HillFinder::Hill>& hills, size_t without);
@@ -103,13 +105,12 @@ class LoadEstimator {
   void WriteCovariances(const Linearization& skin, LoadEstimate& estimate);
   void WriteStray(const Linearization& skin, LoadEstimate& estimate);
   double WorstRegion(const Eigen::VectorXd& residual);
-  Eigen::VectorXd Near(const std::vector<int>& from, double width_mm) const;
 
   const SkinMechanics& mechanics_;
+  const Neighborhoods& near_;
   MarkerCovariance covariance_;
   HillFinder hills_;
   NonNegativeSolver solver_;
-  Eigen::MatrixXd near_;  // sites x sites: how much of a load counts as near
 
   // Since Prepare. Whitened: in units of independent standard deviations.
   std::vector<Mat3> noise_mm2_, model_covariance_;

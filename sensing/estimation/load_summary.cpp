@@ -96,9 +96,8 @@ void LoadEstimator::WriteStray(const Linearization& skin, LoadEstimate& estimate
   for (size_t i = 0; i < 2; ++i) all.couples_nmm[i] = mechanics_.spread() * couples[i];
   for (size_t k = 0; k < 3; ++k) {
     all.forces_n[k] = mechanics_.spread() * contacts[k];
-    all.forces_n[k].array() +=
-        covariance_.stray_sigmas_n()[k].array().square() *
-        (skin.columns()[k].transpose() * stacked.cast<float>()).cast<double>().array();
+    all.forces_n[k].array() += covariance_.stray_sigmas_n()[k].array().square() *
+                               (skin.columns()[k].transpose() * stacked.cast<float>()).cast<double>().array();
   }
   estimate.pressure_error_mpa = pressure_sigma_ * by_pressure_.dot(stacked);
 }

@@ -9,42 +9,15 @@ namespace {
 
 // Found on three-dimensional solids (docs/calculix.md); lengths and forces in SkinMechanics' units.
 constexpr double kFloorMm = 0.02;
-constexpr double kByMotion = 0.01, kMotionLengthMm = 20, kCommonShare = 0.8;
-constexpr double kSpreadMm = 12, kSpreadShare = 0.5;  // of the error near a large motion
-constexpr double kByInflation = 0.015, kInflationLengthMm = 15, kLeastInflation = 0.3, kAxialShare = 0.5;
-constexpr double kStrayN = 1e-3, kNormalShare = 0.01, kTangentialShare = 0.003, kLocalMm = 15;
-
-double Bell(double distance, double width) {
-  return std::exp(-distance * distance / (2 * width * width));
-}
+constexpr double kByMotion = 0.01;
+constexpr double kSpreadShare = 0.5;  // of the error near a large motion
+constexpr double kByInflation = 0.015, kLeastInflation = 0.3, kAxialShare = 0.5;
+constexpr double kStrayN = 1e-3, kNormalShare = 0.01, kTangentialShare = 0.003;
 
 }  // namespace
 
-MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics) : mechanics_(mechanics) {
-  const int markers = mechanics.marker_count(), sites = mechanics.site_count();
-  const double unit = mechanics.length_unit();
-  near_.resize(markers, markers);
-  alike_.resize(markers, markers);
-  along_.resize(markers, markers);
-  for (int i = 0; i < markers; ++i) {
-    for (int j = 0; j < markers; ++j) {
-      const Vec3 off = mechanics.RestMarker(i) - mechanics.RestMarker(j);
-      near_(i, j) = Bell(off.norm(), kSpreadMm * unit);
-      alike_(i, j) =
-          kCommonShare * Bell(off.norm(), kMotionLengthMm * unit) + (i == j ? 1 - kCommonShare : 0);
-      along_(i, j) = Bell(off.z(), kInflationLengthMm * unit);
-    }
-  }
-  by_sites_.resize(sites, sites);
-  by_markers_.resize(sites, markers);
-  for (int i = 0; i < sites; ++i) {
-    const Vec3& at = mechanics.RestSite(i);
-    for (int j = 0; j < sites; ++j)
-      by_sites_(i, j) = Bell((at - mechanics.RestSite(j)).norm(), kLocalMm * unit);
-    for (int j = 0; j < markers; ++j)
-      by_markers_(i, j) = Bell((at - mechanics.RestMarker(j)).norm(), kLocalMm * unit);
-  }
-}
+MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics, const Neighborhoods& near)
+    : mechanics_(mechanics), near_(near) {}
 
 void MarkerCovariance::Write(const Linearization& skin, const InflatedSkin& inflated,
                              const Eigen::VectorXd& local_n, Eigen::MatrixXd& covariance_mm2) {
@@ -55,15 +28,15 @@ void MarkerCovariance::Write(const Linearization& skin, const InflatedSkin& infl
     moved[m] = kByMotion * (skin.state().mids_mm[node] - inflated.state.mids_mm[node]).norm();
     grown[m] = inflated.markers_mm.segment<3>(3 * m).norm();
   }
-  moved = moved.cwiseMax(kSpreadShare * (near_ * moved.asDiagonal()).rowwise().maxCoeff());
+  moved = moved.cwiseMax(kSpreadShare * (near_.motion_near * moved.asDiagonal()).rowwise().maxCoeff());
   grown = kByInflation * grown.cwiseMax(kLeastInflation * grown.maxCoeff());
   covariance_mm2.setZero(3 * markers, 3 * markers);
   for (int j = 0; j < markers; ++j) {
     const Vec3 out_j = Vec3(mechanics_.RestMarker(j).x(), mechanics_.RestMarker(j).y(), 0).normalized();
     for (int i = j; i < markers; ++i) {
       const Vec3 out_i = Vec3(mechanics_.RestMarker(i).x(), mechanics_.RestMarker(i).y(), 0).normalized();
-      const double growth = grown[i] * grown[j] * along_(i, j);
-      Mat3 block = moved[i] * moved[j] * alike_(i, j) * Mat3::Identity();
+      const double growth = grown[i] * grown[j] * near_.growth_alike(i, j);
+      Mat3 block = moved[i] * moved[j] * near_.motion_alike(i, j) * Mat3::Identity();
       block.topLeftCorner<2, 2>() += growth * out_i.head<2>() * out_j.head<2>().transpose();
       block(2, 2) += kAxialShare * kAxialShare * growth;
       if (i == j) block.diagonal().array() += kFloorMm * kFloorMm;
@@ -72,16 +45,16 @@ void MarkerCovariance::Write(const Linearization& skin, const InflatedSkin& infl
   }
   const double unit = mechanics_.force_unit();
   const int sites = mechanics_.site_count();
-  scaled_.resize(3 * markers, 3 * sites);
+  Eigen::MatrixXf scaled(3 * markers, 3 * sites);
   for (size_t k = 0; k < 3; ++k) {
     const double share = k == 0 ? kNormalShare : kTangentialShare;
     stray_n_[k] = ((share * local_n).cwiseAbs2().array() + kStrayN * kStrayN * unit * unit).sqrt();
-    scaled_.middleCols(static_cast<Eigen::Index>(k) * sites, sites).noalias() =
+    scaled.middleCols(static_cast<Eigen::Index>(k) * sites, sites).noalias() =
         skin.columns()[k] * stray_n_[k].cast<float>().asDiagonal();
   }
-  stray_mm2_.setZero(3 * markers, 3 * markers);
-  dense::AddOuter(scaled_, stray_mm2_);
-  covariance_mm2.triangularView<Eigen::Lower>() += stray_mm2_.cast<double>();
+  Eigen::MatrixXf stray_mm2 = Eigen::MatrixXf::Zero(3 * markers, 3 * markers);
+  dense::AddOuter(scaled, stray_mm2);
+  covariance_mm2.triangularView<Eigen::Lower>() += stray_mm2.cast<double>();
 }
 
 }  // namespace taclink

@@ -5,6 +5,7 @@
 
 #include "sensing/estimation/assimilation.h"
 #include "sensing/estimation/linearization.h"
+#include "sensing/estimation/neighborhoods.h"
 #include "sensing/estimation/skin_mechanics.h"
 
 namespace taclink {
@@ -16,7 +17,8 @@ namespace taclink {
 /// One thread.
 class MarkerCovariance {
  public:
-  explicit MarkerCovariance(const SkinMechanics& mechanics);
+  /// Both are referred to.
+  MarkerCovariance(const SkinMechanics& mechanics, const Neighborhoods& near);
 
   /// `local_n`: force in the neighborhood of each site. Sets `covariance_mm2` (lower half, stacked markers)
   /// and the stray forces' standard deviations by direction and site.
@@ -25,15 +27,15 @@ class MarkerCovariance {
   const std::array<Eigen::VectorXd, 3>& stray_sigmas_n() const { return stray_n_; }
 
   /// Forces on sites, or on markers, smoothed over the neighborhood in which they count as local.
-  Eigen::VectorXd LocalOfSites(const Eigen::VectorXd& forces_n) const { return by_sites_ * forces_n; }
-  Eigen::VectorXd LocalOfMarkers(const Eigen::VectorXd& forces_n) const { return by_markers_ * forces_n; }
+  Eigen::VectorXd LocalOfSites(const Eigen::VectorXd& forces_n) const { return near_.local_sites * forces_n; }
+  Eigen::VectorXd LocalOfMarkers(const Eigen::VectorXd& forces_n) const {
+    return near_.local_markers * forces_n;
+  }
 
  private:
   const SkinMechanics& mechanics_;
-  Eigen::MatrixXd near_, alike_, along_;   // markers x markers
-  Eigen::MatrixXd by_sites_, by_markers_;  // sites x sites, sites x markers
+  const Neighborhoods& near_;
   std::array<Eigen::VectorXd, 3> stray_n_;
-  Eigen::MatrixXf scaled_, stray_mm2_;
 };
 
 }  // namespace taclink

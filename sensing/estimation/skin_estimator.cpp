@@ -7,8 +7,9 @@ namespace taclink {
 namespace {
 
 // In units of length (SkinMechanics) where mm.
-constexpr double kSettledMm = 0.02;         // of the next step
-constexpr double kTangentErrorPerMm = 0.2;  // share of a step that a tangent gets wrong, by how far it is from
+constexpr double kSettledMm = 0.02;  // of the next step
+constexpr double kTangentErrorPerMm =
+    0.2;                                  // share of a step that a tangent gets wrong, by how far it is from
 constexpr double kNearlySettledMm = 0.3;  // of the last step, when they run out
 constexpr double kLongestStepMm = 5;
 constexpr double kStillReachMm = 0.4;    // from the inflated skin: its tangent is good enough
@@ -34,8 +35,8 @@ double LongestOff(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 }  // namespace
 
 struct SkinEstimator::Tangent {
-  Tangent(const SkinMechanics& mechanics, double reach)
-      : reach_mm(reach * mechanics.length_unit()), skin(mechanics), loads(mechanics) {}
+  Tangent(const SkinMechanics& mechanics, const Neighborhoods& near, double reach)
+      : reach_mm(reach * mechanics.length_unit()), skin(mechanics), loads(mechanics, near) {}
   double reach_mm;  // from where it was made: it is good enough
   Linearization skin;
   LoadEstimator loads;
@@ -62,10 +63,11 @@ struct SkinEstimator::Problem {
 
 SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions& options)
     : mechanics_(model, options.refinement),
+      near_(mechanics_),
       options_(options),
       assimilation_(mechanics_),
-      still_(std::make_unique<Tangent>(mechanics_, kStillReachMm)),
-      touched_(std::make_unique<Tangent>(mechanics_, kTouchedReachMm)),
+      still_(std::make_unique<Tangent>(mechanics_, near_, kStillReachMm)),
+      touched_(std::make_unique<Tangent>(mechanics_, near_, kTouchedReachMm)),
       used_(still_.get()),
       radial_pull_(mechanics_.marker_count()),
       radial_weight_(mechanics_.marker_count()) {}
@@ -172,7 +174,8 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const Problem& problem, SkinEst
   const bool linear = options_.model == ForceModel::kLinear;
   const ShellState about = linear ? mechanics_.shell().Rest() : problem.inflated.state;
   const double unit = mechanics_.length_unit();
-  if (!tangent.is_prepared || !tangent.IsNear(about) || !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
+  if (!tangent.is_prepared || !tangent.IsNear(about) ||
+      !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
     Problem mine = problem;
     if (linear) mine.pressure_mpa = 0;

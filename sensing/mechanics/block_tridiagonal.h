@@ -24,15 +24,12 @@ class BlockTridiagonal {
 
   /// Rows of x are the solutions for the rows of `rhs`, in single precision: enough for derivatives, as what
   /// they are used for comes from states that are solved in double. Of block i, only the first
-  /// `filled[i]` rows of `rhs` may be other than zero, and `filled` does not fall.
-  void SolveRows(const Eigen::MatrixXf& rhs, const std::vector<Eigen::Index>& filled, Eigen::MatrixXf& x);
+  /// `filled[i]` rows of `rhs` are read, and `filled` does not fall. `rhs` is used up.
+  void SolveRows(Eigen::MatrixXf& rhs, const std::vector<Eigen::Index>& filled, Eigen::MatrixXf& x) const;
 
  private:
-  Eigen::Index block_, blocks_;
-  std::vector<Eigen::MatrixXd> inverse_, below_;         // S_i^-1, E_i
-  std::vector<Eigen::MatrixXf> inverse_f_, below_f_;     // the same
-  std::vector<Eigen::MatrixXd> off_diagonal_;            // B_i, of the matrix in work
-  Eigen::MatrixXf forward_;
+  Eigen::Index block_;
+  std::vector<Eigen::MatrixXd> inverse_, below_;  // S_i^-1, E_i
 };
 
 }  // namespace taclink

@@ -102,13 +102,13 @@ Eigen::Matrix<double, 5, 5> Elasticity(const std::array<ShellCorner, 4>& corners
   c(0, 1) = c(1, 0) = nu * membrane;
   c(2, 2) = shear;
   // Between the middles of two edges.
-  const auto between = [&](Vec3 ShellCorner::*what, std::array<size_t, 2> from, std::array<size_t, 2> to) {
+  const auto between = [&](Vec3 ShellCorner::* what, std::array<size_t, 2> from, std::array<size_t, 2> to) {
     return (corners[to[0]].*what + corners[to[1]].*what - corners[from[0]].*what - corners[from[1]].*what)
                .norm() /
            2;
   };
-  const auto by_xi = [&](Vec3 ShellCorner::*what) { return between(what, {0, 3}, {1, 2}); };
-  const auto by_eta = [&](Vec3 ShellCorner::*what) { return between(what, {0, 1}, {2, 3}); };
+  const auto by_xi = [&](Vec3 ShellCorner::* what) { return between(what, {0, 3}, {1, 2}); };
+  const auto by_eta = [&](Vec3 ShellCorner::* what) { return between(what, {0, 1}, {2, 3}); };
   const double xi_mm = by_xi(&ShellCorner::mid_mm), eta_mm = by_eta(&ShellCorner::mid_mm);
   c(3, 3) = TransverseShearModulus(material, thickness_mm, {xi_mm, by_eta(&ShellCorner::director) / eta_mm});
   c(4, 4) = TransverseShearModulus(material, thickness_mm, {eta_mm, by_xi(&ShellCorner::director) / xi_mm});

@@ -68,7 +68,7 @@ class NonlinearElement {
   double thickness_mm_;
   Material material_;
   std::array<double, 2> shear_moduli_mpa_;  // along xi and across it
-  std::array<Layer, 2> layers_;  // as far below the mid-surface as above
+  std::array<Layer, 2> layers_;             // as far below the mid-surface as above
   Eigen::Matrix4d tying_stiffness_ = Eigen::Matrix4d::Zero();
   Eigen::Vector4d rest_tying_;
 };

@@ -93,8 +93,12 @@ TEST_P(PushTest, EveryPlaceOfTheSkin) {
     const TrueContact& real = solved.truth.contacts.at(0);
     const double force_error = (found.force_n - real.force_n).norm() / real.force_n.norm();
     const double center_error = (found.center_mm - real.center_mm).norm();
-    // Beside a clamp, a load is hard to tell from one along the axis.
-    EXPECT_LT(force_error, beside_clamp ? 0.45 : 0.25);
+    // Beside a clamp, the same markers may tell of a larger force still nearer to it, which the link then
+    // says.
+    const bool is_said = std::any_of(solved.state.reasons.begin(), solved.state.reasons.end(),
+                                     [](const Reason& why) { return why.id == ReasonId::kBeyondMarkers; });
+    EXPECT_TRUE(beside_clamp || !is_said);
+    EXPECT_LT(force_error, is_said ? 0.65 : 0.25);
     EXPECT_LT(center_error, 8);
     worst_force = std::max(worst_force, force_error);
     worst_center = std::max(worst_center, center_error);

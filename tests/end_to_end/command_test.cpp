@@ -87,7 +87,7 @@ TEST_F(CommandTest, SkinPushAnswersWithForceAndInflation) {
   EXPECT_NEAR(real.at("force_n").get<double>(), 0.59, 0.06);  // measured with a probe
   EXPECT_NEAR(real.at("inflation_mm").get<double>(), 1.5, 0.1);
   EXPECT_NEAR(push("linear", "1").at("force_n").get<double>(), 0.30,
-              0.02);  // linear column of the probe table
+              0.03);  // linear column of the probe table
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ class LogJudge : public ScratchFolder {
   // Some seconds of two links, pictures as well. Returns the log's path.
   std::string Record(const std::string& compression) const {
     Write("touch.yaml",
-          "taclink_scene: 1\nname: touch\nmodel: cylinder\nskin: linear\nframe_rate_hz: 10\nduration_s: 3\n"
+          "taclink_scene: 1\nname: touch\nmodel: cylinder\nframe_rate_hz: 10\nduration_s: 3\n"
           "contacts:\n  - {at: {path: 7, ring: 5}, force_n: 0.2, begin_s: 1, end_s: 2, ramp_s: 0.2}\n");
     const std::string config =
         Write("arm.yaml",

@@ -55,9 +55,9 @@ TEST_P(BlockTridiagonalTest, RowsAreSolvedTogether) {
     filled.push_back(2 * (block + 1));
     rhs.block(filled.back(), block * kBlock, kRows - filled.back(), kBlock).setZero();
   }
+  const Eigen::MatrixXd expected = rhs.cast<double>() * matrix.inverse();
   Eigen::MatrixXf x;
   factor.SolveRows(rhs, filled, x);
-  const Eigen::MatrixXd expected = rhs.cast<double>() * matrix.inverse();
   EXPECT_LT((x.cast<double>() - expected).norm(), 1e-4 * expected.norm());
 }
 

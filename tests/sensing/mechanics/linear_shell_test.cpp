@@ -34,8 +34,9 @@ class CylinderShell : public testing::Test {
   const int node_127_ = shell_.mesh().NodeOfMarker(model_, model_.MarkerIndex(6, 4));
 };
 
-// The thesis' (6.3): 1 mm along X, Y and Z together; the numbers are those of a locking-free Mindlin element on
-// the same mesh, without residual bending flexibility (mitc4.md), which makes the skin a tenth softer around.
+// The thesis' (6.3): 1 mm along X, Y and Z together; the numbers are those of a locking-free Mindlin element
+// on the same mesh, without residual bending flexibility (mitc4.md), which makes the skin a tenth softer
+// around.
 TEST_F(CylinderShell, ResponseOfNode127) {
   const Vec3 force = NodeCompliance(shell_, node_127_).inverse() * Vec3(1, 1, 1);
   EXPECT_NEAR(force.x(), 0.084, 0.006);

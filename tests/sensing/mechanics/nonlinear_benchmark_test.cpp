@@ -12,6 +12,8 @@ namespace taclink::benchmark {
 namespace {
 
 constexpr double kShare = 0.02;  // of the published value
+constexpr double kPointShare =
+    0.03;  // likewise under a point load on a thin shell (linear_benchmark_test.cpp)
 
 // Published displacements by the share of the whole load, percent.
 using Published = std::map<int, double>;
@@ -23,12 +25,12 @@ double Moved(const NonlinearShell& shell, const ShellState& state, int node, int
 
 // Where something is published for this share; only at the last mesh it is expected.
 void RecordAt(bool last, const Published& published, double share, const std::string& name,
-              const std::string& mesh, double computed) {
+              const std::string& mesh, double computed, double allowed = kShare) {
   const int percent = static_cast<int>(std::lround(100 * share));
   if (std::abs(percent - 100 * share) > 1e-9 || !published.contains(percent)) return;
   const std::string part = name + ", " + std::to_string(percent) + " %";
   if (last) {
-    Compare(part, mesh, published.at(percent), computed, kShare);
+    Compare(part, mesh, published.at(percent), computed, allowed);
   } else {
     Tabulate(part, mesh, published.at(percent), computed);
   }
@@ -197,7 +199,8 @@ TEST(NonlinearBenchmark, PinchedCylinder) {
   const LoadPath path{.shares = EvenShares(20), .options = {.tolerance_n = 1e-3, .max_iterations = 200}};
   FollowLoad(shell, loads.values(), path, [&](double share, const ShellState& state) {
     const std::string size = MeshName(kSide, kSide);
-    RecordAt(true, w_a, share, "pinched cylinder, diaphragms: -W_A", size, -Moved(shell, state, a, 0));
+    RecordAt(true, w_a, share, "pinched cylinder, diaphragms: -W_A", size, -Moved(shell, state, a, 0),
+             kPointShare);
     RecordAt(false, u_b, share, "pinched cylinder, diaphragms: U_B", size, Moved(shell, state, b, 1));
   });
 }

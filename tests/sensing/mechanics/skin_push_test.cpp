@@ -30,7 +30,8 @@ class SkinPushTest : public testing::Test {
 };
 
 // Linear column of the probe table: an independent linear MITC4 model, one node pushed. Its elements have no
-// residual bending flexibility (mitc4.md), so that it is stiffer than this one, which is nearer to finer meshes.
+// residual bending flexibility (mitc4.md), so that it is stiffer than this one, which is nearer to finer
+// meshes.
 TEST_F(SkinPushTest, AgreesWithTheLinearProbeTable) {
   const auto expect = [&](double pressure_kpa, double depth_mm, double table_n) {
     const double share = ForceN(pressure_kpa, depth_mm) / table_n;
