@@ -192,4 +192,9 @@ double Linearization::Step(const SiteLoads& loads, double pressure_error_mpa, do
   return longest;
 }
 
+void Linearization::FirstOrderMarkers(Eigen::VectorXd& stacked_mm) const {
+  mechanics_.markers().Displacements(state_, stacked_mm);
+  stacked_mm.noalias() += jacobian_ * motion_;
+}
+
 }  // namespace taclink

@@ -50,6 +50,8 @@ class Linearization {
   /// Where loads and a pressure error take the state, to first order. Returns
   /// the longest motion of a node, mm.
   double Step(const SiteLoads& loads, double pressure_error_mpa, double longest_mm, ShellState& state);
+  /// The markers' displacements from the slack skin to first order, where the last Step led without a limit.
+  void FirstOrderMarkers(Eigen::VectorXd& stacked_mm) const;
 
  private:
   void SetFrames();

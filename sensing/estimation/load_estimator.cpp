@@ -307,14 +307,17 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
     data -= hidden_ * (hidden_.transpose() * data);
   }
   const Eigen::VectorXd prior = TangentialPrior(tangential.cols());
-  Eigen::MatrixXd h = normal.transpose() * normal;
+  Eigen::MatrixXd h;
+  dense::TransposedProduct(normal, normal, h);
   Eigen::VectorXd b = normal.transpose() * data;
   Eigen::LLT<Eigen::MatrixXd> inner;
   if (tangential.cols() > 0) {
     Eigen::MatrixXd g = tangential.transpose() * tangential;
     g.diagonal() += prior;
     inner.compute(g);
-    const Eigen::MatrixXd cross = tangential.transpose() * normal, solved = inner.solve(cross);
+    Eigen::MatrixXd cross;
+    dense::TransposedProduct(tangential, normal, cross);
+    const Eigen::MatrixXd solved = inner.solve(cross);
     h -= cross.transpose() * solved;
     b -= solved.transpose() * (tangential.transpose() * data);
   }
@@ -341,6 +344,37 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
   return solution;
 }
 
+// What each hill's tangential force would explain beside the loads that act and the tangential forces that
+// were let in, if no load had to stay above zero: chi^2.
+std::vector<double> LoadEstimator::TangentialGains(const std::vector<int>& sites,
+                                                   const std::vector<Eigen::MatrixXd>& columns,
+                                                   const Eigen::MatrixXd& tangential,
+                                                   const Solution& solution) const {
+  std::vector<int> acting;
+  for (size_t i = 0; i < sites.size(); ++i) {
+    if (solution.loads[static_cast<Eigen::Index>(i)] > 0) acting.push_back(sites[i]);
+  }
+  const auto loads = static_cast<Eigen::Index>(acting.size());
+  Eigen::MatrixXd basis(data_.size(), loads + tangential.cols());
+  basis << columns_(Eigen::all, acting), tangential;
+  if (hidden_.cols() > 0) basis -= hidden_ * (hidden_.transpose() * basis);
+  Eigen::MatrixXd information;
+  dense::TransposedProduct(basis, basis, information);
+  information.diagonal().head(loads).array() += kRidge * information.diagonal().head(loads).mean();
+  information.diagonal().tail(tangential.cols()) += TangentialPrior(tangential.cols());
+  const Eigen::LLT<Eigen::MatrixXd> factor(information);
+  std::vector<double> gains;
+  for (const Eigen::MatrixXd& own : columns) {
+    Eigen::MatrixXd cross;
+    dense::TransposedProduct(basis, own, cross);
+    Eigen::MatrixXd left = own.transpose() * own - cross.transpose() * factor.solve(cross);
+    left.diagonal() += TangentialPrior(own.cols());
+    const Eigen::VectorXd pull = own.transpose() * solution.residual;
+    gains.push_back(pull.dot(left.ldlt().solve(pull)));
+  }
+  return gains;
+}
+
 // One after the other, the hill first whose tangential force explains most; none that explains little: what a
 // shell gets wrong of a solid looks like a tangential force of the normal one's size.
 void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
@@ -353,23 +387,17 @@ void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<HillFin
   std::vector<Eigen::MatrixXd> columns;
   for (const auto& hill : hills) columns.push_back(TangentialColumns(skin, hill));
   while (slipping.size() < hills.size()) {
-    double most = kTangentialGain;
-    int best = -1;
-    Eigen::MatrixXd with;
-    for (size_t i = 0; i < hills.size(); ++i) {
-      if (std::find(slipping.begin(), slipping.end(), static_cast<int>(i)) != slipping.end()) continue;
-      Eigen::MatrixXd more(data_.size(), tangential.cols() + kTangential);
-      more << tangential, columns[i];
-      const double gain = solution.chi2 - Refit(sites, more).chi2;
-      if (gain <= most) continue;
-      most = gain;
-      best = static_cast<int>(i);
-      with = std::move(more);
-    }
-    if (best < 0) return;
-    slipping.push_back(best);
-    tangential = std::move(with);
-    solution = Refit(sites, tangential);
+    std::vector<double> gains = TangentialGains(sites, columns, tangential, solution);
+    for (const int hill : slipping) gains[static_cast<size_t>(hill)] = 0;
+    const auto best = std::max_element(gains.begin(), gains.end()) - gains.begin();
+    if (!(gains[static_cast<size_t>(best)] > kTangentialGain)) return;
+    Eigen::MatrixXd more(data_.size(), tangential.cols() + kTangential);
+    more << tangential, columns[static_cast<size_t>(best)];
+    Solution with = Refit(sites, more);
+    if (!(solution.chi2 - with.chi2 > kTangentialGain)) return;
+    slipping.push_back(static_cast<int>(best));
+    tangential = std::move(more);
+    solution = std::move(with);
   }
 }
 

@@ -98,6 +98,9 @@ class LoadEstimator {
   Solution Refit(const std::vector<int>& sites, const Eigen::MatrixXd& tangential);
   void LetSlip(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
                std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution);
+  std::vector<double> TangentialGains(const std::vector<int>& sites,
+                                      const std::vector<Eigen::MatrixXd>& columns,
+                                      const Eigen::MatrixXd& tangential, const Solution& solution) const;
   void ProjectOut(const Eigen::MatrixXd& tangential);
   void Finish(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
               const std::vector<int>& slipping, LoadEstimate& estimate);

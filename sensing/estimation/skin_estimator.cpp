@@ -11,7 +11,7 @@ constexpr double kSettledMm = 0.02;  // of the next step
 constexpr double kTangentErrorPerMm =
     0.2;                                  // share of a step that a tangent gets wrong, by how far it is from
 constexpr double kNearlySettledMm = 0.3;  // of the last step, when they run out
-constexpr double kLongestStepMm = 5;
+constexpr double kLongestStepMm = 5, kUnlimitedMm = 1e9;
 constexpr double kStillReachMm = 0.4;    // from the inflated skin: its tangent is good enough
 constexpr double kTouchedReachMm = 2.5;  // likewise from where the touched one was made
 constexpr double kAssimilateMm = 2.5;    // farther off, a marker is pulled to its place first
@@ -85,6 +85,10 @@ const Linearization& SkinEstimator::linearization() const {
 }
 const LoadEstimator& SkinEstimator::loads() const {
   return used_->loads;
+}
+
+bool SkinEstimator::IsFirstOrder() const {
+  return options_.model == ForceModel::kLinear || options_.model == ForceModel::kPressurised;
 }
 
 bool SkinEstimator::IsPossible(const SkinEstimate& estimate) const {
@@ -164,8 +168,9 @@ bool SkinEstimator::StepOnce(Tangent& tangent, const Problem& problem, SkinEstim
   if (!tangent.skin.Rebase(estimate.state, problem.pressure_mpa)) return false;
   tangent.loads.Fit(tangent.skin, problem.observed, estimate.loads);
   if (!estimate.loads.converged) return false;
-  step_mm = tangent.skin.Step(estimate.loads.at_sites, estimate.loads.pressure_error_mpa,
-                              kLongestStepMm * mechanics_.length_unit(), estimate.state);
+  const double longest_mm = IsFirstOrder() ? kUnlimitedMm : kLongestStepMm * mechanics_.length_unit();
+  step_mm = tangent.skin.Step(estimate.loads.at_sites, estimate.loads.pressure_error_mpa, longest_mm,
+                              estimate.state);
   return std::isfinite(step_mm);
 }
 
@@ -185,7 +190,7 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const Problem& problem, SkinEst
   double step_mm = 0;
   if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
   estimate.model = linear ? ForceModel::kLinear : ForceModel::kPressurised;
-  if (linear || options_.model == ForceModel::kPressurised) return true;
+  if (IsFirstOrder()) return true;
   if (estimate.loads.loads.empty()) {
     // The nonlinear skin without loads is where the tangent is.
     estimate.model = options_.model.value_or(estimate.model);
@@ -333,7 +338,10 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
     return;
   }
   used_->loads.Conclude(used_->skin, estimate.loads);
-  mechanics_.markers().Displacements(estimate.state, estimate.displacements_mm);
+  if (IsFirstOrder())
+    used_->skin.FirstOrderMarkers(estimate.displacements_mm);
+  else
+    mechanics_.markers().Displacements(estimate.state, estimate.displacements_mm);
   estimate.pressure_mpa = pressure_mpa + estimate.loads.pressure_error_mpa;
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
                      : estimate.loads.converged ? EstimateFailure::kNone
@@ -355,11 +363,10 @@ SkinEstimator::Problem SkinEstimator::MakeProblem(const SkinObservation& observa
 }
 
 bool SkinEstimator::Solve(const Problem& problem, SkinEstimate& estimate) {
-  const bool is_simple = options_.model == ForceModel::kLinear || options_.model == ForceModel::kPressurised;
-  const bool is_small = is_simple || FurthestOff(problem.inflated.state, problem.observed) <
-                                         2 * kStillReachMm * mechanics_.length_unit();
+  const bool is_small = IsFirstOrder() || FurthestOff(problem.inflated.state, problem.observed) <
+                                              2 * kStillReachMm * mechanics_.length_unit();
   if (is_small && SolveSmall(*still_, problem, estimate)) return true;
-  if (is_simple) return false;
+  if (IsFirstOrder()) return false;
   const SkinEstimate small = estimate;
   Eigen::VectorXd local_n;
   if (!Start(problem, estimate, local_n)) return false;

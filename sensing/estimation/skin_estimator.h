@@ -88,6 +88,8 @@ class SkinEstimator {
                       const Eigen::VectorXd& baseline_mm) const;
   bool Solve(const Problem& problem, SkinEstimate& estimate);
   bool IsPossible(const SkinEstimate& estimate) const;
+  /// One step from the slack or the inflated skin, whatever is asked of it.
+  bool IsFirstOrder() const;
 
   SkinMechanics mechanics_;
   const Neighborhoods near_;
