@@ -26,6 +26,7 @@ constexpr double kRefitSparsity = 0.1, kRefitEndSparsity = 1.0;
 constexpr double kRidge = 1e-9;
 constexpr double kUnseenMm = 30;  // standard deviation of a direction that is not seen, in units of length
 constexpr double kSameNoise = 2;  // ratio of standard deviations
+constexpr double kSameDirection = 0.9999;  // cosine
 
 // The cameras' covariance of a marker; what they do not see is as good as unknown.
 Mat3 NoiseOf(const Mat3& information, double unseen_mm) {
@@ -66,6 +67,7 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   factor_ = covariance_mm2_;
   if (!dense::Cholesky(factor_)) return false;
   SpreadColumns(skin.columns()[0]);
+  hidden_.resize(0, 0);
   dense::SolveLower(factor_, columns_);
   dense::Gram(columns_, gram_);
   gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
@@ -113,7 +115,7 @@ bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const Pres
 // projected out of data and columns, which is the same as leaving these rows out.
 void LoadEstimator::Hide(const MarkerObservations& observed) {
   const double unseen = kUnseenMm * mechanics_.length_unit(), unseen2 = unseen * unseen;
-  std::vector<std::pair<int, Vec3>> missing;
+  std::vector<Direction> missing;
   is_shown_.assign(static_cast<size_t>(3 * mechanics_.marker_count()), 1);
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const auto i = static_cast<size_t>(m);
@@ -132,6 +134,15 @@ void LoadEstimator::Hide(const MarkerObservations& observed) {
       if (direction.dot(noise_mm2_[i] * direction) < 0.3 * unseen2) missing.emplace_back(3 * m, direction);
     }
   }
+  // What a body hides stays hidden while it stands there.
+  const auto is_same = [](const Direction& a, const Direction& b) {
+    return a.first == b.first && std::abs(a.second.dot(b.second)) > kSameDirection;
+  };
+  if (hidden_.rows() == factor_.rows() &&
+      std::equal(missing.begin(), missing.end(), missing_.begin(), missing_.end(), is_same))
+    return;
+  missing_ = missing;
+  is_hidden_projected_ = false;
   hidden_.setZero(factor_.rows(), static_cast<Eigen::Index>(missing.size()));
   for (size_t k = 0; k < missing.size(); ++k)
     hidden_.block<3, 1>(missing[k].first, static_cast<Eigen::Index>(k)) = missing[k].second;
@@ -164,12 +175,14 @@ void LoadEstimator::ProjectOut(const Eigen::MatrixXd& tangential) {
   frame_gram_ = &gram_;
   if (basis.cols() == 0) return;
   frame_data_ -= basis * (shrink.asDiagonal() * (basis.transpose() * data_));
+  frame_gram_ = &free_gram_;
+  if (is_hidden_projected_ && tangential.cols() == 0) return;
+  is_hidden_projected_ = tangential.cols() == 0;
   dense::TransposedProduct(basis, columns_, hidden_columns_);
   Eigen::MatrixXd product;
   const Eigen::MatrixXd scaled = shrink.asDiagonal() * hidden_columns_;
   dense::TransposedProduct(hidden_columns_, scaled, product);
   free_gram_ = gram_ - product;
-  frame_gram_ = &free_gram_;
 }
 
 // What sites bear of loads of sites and bands.

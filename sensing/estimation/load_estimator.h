@@ -130,7 +130,10 @@ class LoadEstimator {
 
   // Of the frame. Hidden: an orthonormal basis of what the frame does not show, whitened, and of the
   // tangential forces that were let in; data and Gram matrix without it.
+  using Direction = std::pair<int, Vec3>;  // first row of the marker, unit vector
+  std::vector<Direction> missing_;         // what hidden_ is of
   Eigen::MatrixXd hidden_, hidden_columns_, free_gram_;
+  bool is_hidden_projected_ = false;             // free_gram_ is without hidden_ alone
   const Eigen::MatrixXd* frame_gram_ = nullptr;  // gram_, where nothing is hidden
   Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
   std::vector<char> is_shown_;  // by row

@@ -16,7 +16,7 @@
 
 namespace taclink::testing {
 
-inline constexpr int kRigRateHz = 4;
+inline constexpr int kRigRateHz = 3;
 inline constexpr double kRigForever = 120;  // s; ends a test that hangs, nothing is judged by it
 
 int64_t MonotonicNs();

@@ -186,9 +186,9 @@ TEST_F(RigTest, BForcesAreTheTruths) {
         worst_n);
     EXPECT_GE(frames.size(), rig_->pictures().count() - 1);
     EXPECT_EQ(LostBetween(frames), 0);
-    EXPECT_GT(largest_n, 0.25);
-    EXPECT_GT(largest_measured_n, 0.25);
-    EXPECT_LE(worst_n, 0.05);
+    EXPECT_GT(largest_n, 0.12);
+    EXPECT_GT(largest_measured_n, 0.12);
+    EXPECT_LE(worst_n, 0.03);
   }
 }
 

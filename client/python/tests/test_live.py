@@ -90,7 +90,8 @@ def test_forces_of_a_full_frame_add_up(client: taclink.Client, touched: None) ->
     assert contact.force_n == pytest.approx(frame.total_force_n, abs=1e-9)
     # 0.2 N against the normal at marker (7, 5).
     assert contact.normal_force_n == pytest.approx(0.2, rel=0.1)
-    assert contact.force_n @ contact.normal == pytest.approx(-contact.normal_force_n)
+    # The resultant is a little less than the integral of the normal load: the normal turns over the contact.
+    assert contact.force_n @ contact.normal == pytest.approx(-contact.normal_force_n, rel=0.02)
     assert 4 * 24 + 6 in contact.markers
     assert np.linalg.norm(contact.center_m - frame.positions_m[4 * 24 + 6]) < 5e-3
     assert contact.force_covariance_n2 is not None and contact.force_covariance_n2.shape == (3, 3)
