@@ -95,20 +95,22 @@ bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const Pres
       pressure_sigma_ > kSameNoise * prior.sigma_mpa)
     return false;
   const double unseen = kUnseenMm * mechanics_.length_unit(), unseen2 = unseen * unseen;
-  constexpr double kMost = kSameNoise * kSameNoise, kNewlySeenShare = 0.02;
-  int worse = 0;
+  constexpr double kMost = kSameNoise * kSameNoise, kNewlySeenShare = 0.02, kHiddenShare = 0.15;
+  int worse = 0, hidden = 0;
   for (size_t m = 0; m < noise_mm2_.size(); ++m) {
-    const double trace = observed.information[m].trace();
-    if (!(trace > 0)) continue;  // missing now
+    const Mat3& information = observed.information[m];
     const double then = noise_mm2_[m].trace();
-    if (then > 0.3 * unseen2) {
-      ++worse;  // seen now and not then, in a direction at least
-      continue;
+    const bool was_seen = then < 0.3 * unseen2;
+    const double now = NoiseOf(information, unseen).trace();
+    if (now > 0.3 * unseen2) {
+      // One camera hides one direction.
+      hidden += was_seen ? (information.trace() > 0 ? 1 : 3) : 0;
+    } else if (!was_seen || now > kMost * then || then > kMost * now) {
+      ++worse;
     }
-    const double now = NoiseOf(observed.information[m], unseen).trace();
-    if (now < 0.3 * unseen2 && (now > kMost * then || then > kMost * now)) ++worse;
   }
-  return worse <= kNewlySeenShare * static_cast<double>(noise_mm2_.size());
+  const auto markers = static_cast<double>(noise_mm2_.size());
+  return worse <= kNewlySeenShare * markers && hidden <= kHiddenShare * 3 * markers;
 }
 
 // What was seen when all was prepared and is not seen now is unknown: its unit vectors, whitened, are
