@@ -95,22 +95,14 @@ bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const Pres
       pressure_sigma_ > kSameNoise * prior.sigma_mpa)
     return false;
   const double unseen = kUnseenMm * mechanics_.length_unit(), unseen2 = unseen * unseen;
-  constexpr double kMost = kSameNoise * kSameNoise, kNewlySeenShare = 0.02, kHiddenShare = 0.15;
-  int worse = 0, hidden = 0;
+  constexpr double kMost = kSameNoise * kSameNoise, kNewlySeenShare = 0.02;
+  int worse = 0;
   for (size_t m = 0; m < noise_mm2_.size(); ++m) {
-    const Mat3& information = observed.information[m];
-    const double then = noise_mm2_[m].trace();
-    const bool was_seen = then < 0.3 * unseen2;
-    const double now = NoiseOf(information, unseen).trace();
-    if (now > 0.3 * unseen2) {
-      // One camera hides one direction.
-      hidden += was_seen ? (information.trace() > 0 ? 1 : 3) : 0;
-    } else if (!was_seen || now > kMost * then || then > kMost * now) {
-      ++worse;
-    }
+    const double then = noise_mm2_[m].trace(), now = NoiseOf(observed.information[m], unseen).trace();
+    if (now > 0.3 * unseen2) continue;  // in a direction at least, which is hidden
+    if (then > 0.3 * unseen2 || now > kMost * then || then > kMost * now) ++worse;
   }
-  const auto markers = static_cast<double>(noise_mm2_.size());
-  return worse <= kNewlySeenShare * markers && hidden <= kHiddenShare * 3 * markers;
+  return worse <= kNewlySeenShare * static_cast<double>(noise_mm2_.size());
 }
 
 // What was seen when all was prepared and is not seen now is unknown: its unit vectors, whitened, are
@@ -375,7 +367,8 @@ std::vector<double> LoadEstimator::TangentialGains(const std::vector<int>& sites
   if (hidden_.cols() > 0) basis -= hidden_ * (hidden_.transpose() * basis);
   Eigen::MatrixXd information;
   dense::TransposedProduct(basis, basis, information);
-  information.diagonal().head(loads).array() += kRidge * information.diagonal().head(loads).mean();
+  if (loads > 0)
+    information.diagonal().head(loads).array() += kRidge * information.diagonal().head(loads).mean();
   information.diagonal().tail(tangential.cols()) += TangentialPrior(tangential.cols());
   const Eigen::LLT<Eigen::MatrixXd> factor(information);
   std::vector<double> gains;

@@ -60,8 +60,8 @@ class LoadEstimator {
   /// neighborhood of each site, for the model's errors. False: the covariance has no factor.
   bool Prepare(const Linearization& skin, const InflatedSkin& inflated, const MarkerObservations& observed,
                const PressurePrior& prior, const Eigen::VectorXd& local_n);
-  /// Whether these observations are nearly as good, everywhere, as those that were prepared for; some may be
-  /// missing now.
+  /// Whether these observations are nearly as good, everywhere, as those that were prepared for; what is
+  /// missing now does not matter.
   bool IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const;
 
   /// After Prepare. The linearization may have been rebased. Covariances and what is left unexplained are not

@@ -25,9 +25,9 @@ namespace {
 using client::LinkStatus;
 using ::testing::HasSubstr;
 
-// On a processor half of that; the guest emulates one, in which the first frame after a change of what is
-// seen computes for a second.
-constexpr double kToStatusS = 3, kToRecoveryS = 4;
+// Asked of a processor are 1 s and 2 s. The guest emulates one, in which a change of what is seen is computed
+// for seconds (30 ms on a processor).
+constexpr double kToStatusS = 5, kToRecoveryS = 8;
 enum : size_t { kATop, kABottom, kBTop, kBBottom };
 
 bool Blames(const client::Frame& frame, const std::string& reason) {
