@@ -39,12 +39,7 @@ class LinkPipelineTest : public testing::Test {
   }
 
   const LinkModel model_ = LoadLinkModel("cylinder").value();
-  static Scene LinearPress() {
-    Scene scene = LoadScene("press").value();
-    scene.skin = SkinKind::kLinear;  // as the force model
-    return scene;
-  }
-  const Scene scene_ = LinearPress();
+  const Scene scene_ = LoadScene("press").value();
   std::unique_ptr<SimulatedSkin> skin_ = SimulatedSkin::Make(model_, scene_).value();
   Renderer renderer_{model_, model_.nominal_rig, scene_.camera, 1};
   SkinTruth truth_;

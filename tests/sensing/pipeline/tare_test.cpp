@@ -29,7 +29,6 @@ class TareTest : public testing::Test {
  protected:
   static Scene TouchScene() {
     Scene scene;
-    scene.skin = SkinKind::kLinear;
     scene.model = "cylinder";
     scene.duration_s = 40;
     scene.pressure = {{0, 0}};
