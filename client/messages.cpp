@@ -279,6 +279,8 @@ const char* Name(ForceModel model) {
       return "pressurised";
     case ForceModel::kNonlinear:
       return "nonlinear";
+    case ForceModel::kAuto:
+      return "auto";
     case ForceModel::kUnknown:
       break;
   }
@@ -429,6 +431,8 @@ v1::ForceModel ToMessage(ForceModel model) {
       return v1::FORCE_MODEL_PRESSURISED;
     case ForceModel::kNonlinear:
       return v1::FORCE_MODEL_NONLINEAR;
+    case ForceModel::kAuto:
+      return v1::FORCE_MODEL_AUTO;
     case ForceModel::kUnknown:
       break;
   }

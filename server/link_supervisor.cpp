@@ -364,7 +364,7 @@ void LinkSupervisor::EndCameraOrders(const Error& why) {
   if (const auto worker = current()) worker->EndCameraOrders(why);
 }
 
-Result<void> LinkSupervisor::SetForceModel(ForceModel model) {
+Result<void> LinkSupervisor::SetForceModel(std::optional<ForceModel> model) {
   if (!factories_.estimator)
     return Error{ErrorCode::kFailedPrecondition, "link '" + name_ + "' computes no forces here"};
   const auto worker = current();

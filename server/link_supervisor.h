@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,10 +42,11 @@ struct WatchdogOptions {
 struct LinkFactories {
   std::function<Result<std::unique_ptr<FrameSource>>()> source = {};
   std::function<Result<std::unique_ptr<LinkProcessor>>()> processor = {};
-  /// Makes the forces' part of a processor by another model. None: the link has no forces to compute.
-  std::function<std::shared_ptr<StateEstimator>(ForceModel)> estimator = {};
+  /// Makes the forces' part of a processor by another model (none: by tolerance, frame by frame). Empty: the
+  /// link has no forces to compute.
+  std::function<std::shared_ptr<StateEstimator>(std::optional<ForceModel>)> estimator = {};
   /// Processors that are made from now on compute so.
-  std::function<void(ForceModel)> choose = {};
+  std::function<void(std::optional<ForceModel>)> choose = {};
 };
 
 /// How a link's worker does, for those who report it.
@@ -103,9 +105,10 @@ class LinkSupervisor {
   Result<void> SetCamera(const CameraOrder& order, CameraObserver observer);
   /// At shutdown: answers those that wait, whatever their cameras do.
   void EndCameraOrders(const Error& why);
-  /// Computes the forces by `model` from the next frame on, also after a restart. Takes up to seconds.
-  /// Errors: kUnavailable (no worker now), kFailedPrecondition (nothing is computed here).
-  Result<void> SetForceModel(ForceModel model);
+  /// Computes the forces by `model` (none: by tolerance, frame by frame) from the next frame on, also after a
+  /// restart. Takes up to seconds. Errors: kUnavailable (no worker now), kFailedPrecondition (nothing is
+  /// computed here).
+  Result<void> SetForceModel(std::optional<ForceModel> model);
 
  private:
   enum class Phase { kRunning, kEnding, kBackoff, kBuilding, kResting };

@@ -22,8 +22,9 @@ struct Options {
 };
 
 client::ForceModel ForceModelOf(const std::string& name) {
-  for (const auto model : {client::ForceModel::kLiteral, client::ForceModel::kLinear,
-                           client::ForceModel::kPressurised, client::ForceModel::kNonlinear})
+  for (const auto model :
+       {client::ForceModel::kLiteral, client::ForceModel::kLinear, client::ForceModel::kPressurised,
+        client::ForceModel::kNonlinear, client::ForceModel::kAuto})
     if (name == client::Name(model)) return model;
   return client::ForceModel::kUnknown;
 }
@@ -41,7 +42,8 @@ Result<void> Run(const Options& options) {
   if (options.force_model) {
     if (auto set = connection->SetForceModel(options.link, ForceModelOf(*options.force_model)); !set)
       return set;
-    fmt::print("link {}: forces are computed by the {} model\n", options.link, *options.force_model);
+    fmt::print("link {}: forces are computed by the {} model\n", options.link,
+               *options.force_model == "auto" ? "cheapest good enough" : *options.force_model);
   }
   return {};
 }
@@ -54,8 +56,10 @@ void AddSet(const Arguments& app, Selected& selected) {
       app.AddCommand("set", "Set a link's cameras or its force model until the server ends");
   AddServerOption(command, options->server);
   command.AddOption("--link", options->link, "Name of the link").Required();
-  command.AddOption("--force-model", options->force_model, "nonlinear, pressurised, linear or literal")
-      .Must(OneOf({"nonlinear", "pressurised", "linear", "literal"}));
+  command
+      .AddOption("--force-model", options->force_model,
+                 "auto (the cheapest that is good enough), nonlinear, pressurised, linear or literal")
+      .Must(OneOf({"auto", "nonlinear", "pressurised", "linear", "literal"}));
   command.AddOption("--camera", options->camera, "top or bottom (default: both)")
       .Must(OneOf({"top", "bottom"}));
   const Option exposure =

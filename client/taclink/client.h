@@ -36,7 +36,8 @@ enum class Delivery {
 enum class LinkStatus { kUnknown, kStarting, kCalibrating, kOk, kDegraded, kLost };
 const char* Name(LinkStatus status);  ///< "ok", "lost", ...
 
-enum class ForceModel { kUnknown, kLiteral, kLinear, kPressurised, kNonlinear };
+/// `kAuto` is for SetForceModel only: the cheapest that is good enough, frame by frame.
+enum class ForceModel { kUnknown, kLiteral, kLinear, kPressurised, kNonlinear, kAuto };
 const char* Name(ForceModel model);
 
 enum class MarkerSource : uint8_t { kUnknown, kBoth, kTop, kBottom, kInferred };

@@ -132,8 +132,26 @@ Result<SkinKey> SceneSolver::Begin(const PlayedPart* before, const ScenePart& pa
   return key;
 }
 
+// A disc's force may rise with its depth and then fall, so that more force has no equilibrium nearby although
+// there is one at the tube. Then by depth as far as a disc goes; a balance finds the way back from there.
 Result<SkinBalance> SceneSolver::Jump(const SkinLoad& from, const SkinLoad& to, SkinBalance balance,
                                       double time_s) {
+  auto reached = JumpAlong(from, to, balance, time_s);
+  SkinLoad pressed = to;
+  std::vector<bool> limited(to.discs.size(), false);
+  for (size_t i = 0; i < to.discs.size(); ++i) {
+    limited[i] = to.discs[i].on && !from.discs[i].on && to.discs[i].force_n;
+    if (limited[i]) pressed.discs[i].force_n.reset();
+  }
+  if (reached || std::find(limited.begin(), limited.end(), true) == limited.end()) return reached;
+  auto deep = JumpAlong(from, pressed, std::move(balance), time_s);
+  if (!deep) return reached;
+  for (size_t i = 0; i < limited.size(); ++i) deep->limited[i] = deep->limited[i] || limited[i];
+  return skin_.Balance(to, *deep).ok() ? std::move(deep) : std::move(reached);
+}
+
+Result<SkinBalance> SceneSolver::JumpAlong(const SkinLoad& from, const SkinLoad& to, SkinBalance balance,
+                                           double time_s) {
   std::vector<double> touching;
   for (size_t i = 0; i < to.discs.size(); ++i)
     touching.push_back(loads_.TouchingDepth(i, {to.discs[i].angle_rad, to.discs[i].z_mm}, balance.state));

@@ -53,6 +53,7 @@ class SceneSolver {
   Result<void> SolveFreeSkins();
   Result<SkinKey> Begin(const PlayedPart* before, const ScenePart& part);
   Result<SkinBalance> Jump(const SkinLoad& from, const SkinLoad& to, SkinBalance balance, double time_s);
+  Result<SkinBalance> JumpAlong(const SkinLoad& from, const SkinLoad& to, SkinBalance balance, double time_s);
   Result<void> SolvePart(PlayedPart& part);
   Result<void> Reach(const ScenePart& part, double time_s, Keys& keys);
   Result<void> Refine(const ScenePart& part, const SkinKey& from, const SkinKey& to, Keys& keys);

@@ -22,7 +22,7 @@ class ChosenForceModel {
  public:
   explicit ChosenForceModel(std::optional<ForceModel> configured) : model_(configured) {}
 
-  void Set(ForceModel model) {
+  void Set(std::optional<ForceModel> model) {
     const std::lock_guard lock(mutex_);
     model_ = model;
   }
@@ -46,12 +46,12 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
       .source = [link, model = *model, &clock] { return MakeSource(link, model, clock); },
       .processor = [link, model = *model, chosen] { return MakeProcessor(chosen->In(link), model); },
       .estimator =
-          [link, model = *model](ForceModel force_model) {
+          [link, model = *model](std::optional<ForceModel> force_model) {
             LinkConfig changed = link;
             changed.force_model = force_model;
             return MakeStateEstimator(model, ToPipelineOptions(changed).force);
           },
-      .choose = [chosen](ForceModel force_model) { chosen->Set(force_model); }};
+      .choose = [chosen](std::optional<ForceModel> force_model) { chosen->Set(force_model); }};
   auto source = factories.source();
   if (!source) return source.error();
   auto processor = factories.processor();

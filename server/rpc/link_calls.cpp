@@ -60,14 +60,15 @@ Operation ToOperation(const v1::SetCameraRequest& request, const Result<void>& e
   return out;
 }
 
-Result<ForceModel> ParseForceModel(const v1::SetForceModelRequest& request) {
+Result<std::optional<ForceModel>> ParseForceModel(const v1::SetForceModelRequest& request) {
   if (!v1::ForceModel_IsValid(request.model()) || request.model() == v1::FORCE_MODEL_UNSPECIFIED)
-    return Invalid("model must be LINEAR, LITERAL, PRESSURISED or NONLINEAR");
-  return wire::FromWire(request.model());
+    return Invalid("model must be AUTO, LINEAR, LITERAL, PRESSURISED or NONLINEAR");
+  if (request.model() == v1::FORCE_MODEL_AUTO) return std::optional<ForceModel>();
+  return std::optional(wire::FromWire(request.model()));
 }
 
-Operation ToOperation(ForceModel model, const Result<void>& end, std::string who) {
-  return Ended(end, std::move(who), v1::ForceModel_Name(wire::ToWire(model)));
+Operation ToOperation(std::optional<ForceModel> model, const Result<void>& end, std::string who) {
+  return Ended(end, std::move(who), v1::ForceModel_Name(model ? wire::ToWire(*model) : v1::FORCE_MODEL_AUTO));
 }
 
 Result<size_t> FindLiveLink(const Arm& arm, const std::string& name) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "sensing/core/result.h"
@@ -16,8 +17,9 @@ Result<CameraOrder> ParseCameraRequest(const v1::SetCameraRequest& request);
 Operation ToOperation(const v1::SetCameraRequest& request, const Result<void>& end, std::string who);
 
 /// Errors: kInvalidArgument.
-Result<ForceModel> ParseForceModel(const v1::SetForceModelRequest& request);
-Operation ToOperation(ForceModel model, const Result<void>& end, std::string who);
+/// None: by tolerance, frame by frame.
+Result<std::optional<ForceModel>> ParseForceModel(const v1::SetForceModelRequest& request);
+Operation ToOperation(std::optional<ForceModel> model, const Result<void>& end, std::string who);
 
 /// The index of a link to which something is to be done. Errors: kNotFound, kFailedPrecondition (a log is
 /// played).

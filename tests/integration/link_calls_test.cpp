@@ -37,7 +37,7 @@ class LinkCallsTest : public ::testing::Test {
   struct Log {
     std::mutex mutex;
     std::vector<std::pair<CameraId, CameraSettings>> set;  // guarded by mutex
-    std::vector<ForceModel> made;                          // likewise
+    std::vector<std::optional<ForceModel>> made;           // likewise
     std::atomic<int> used = 0;
   };
 
@@ -91,11 +91,12 @@ class LinkCallsTest : public ::testing::Test {
         {.description = {.name = "upper", .model = *LoadLinkModel("cylinder")},
          .source = std::make_unique<Source>(script_, log_),
          .processor = std::make_unique<Processor>(log_),
-         .factories = {.estimator = [log = log_](ForceModel model) -> std::shared_ptr<StateEstimator> {
-           const std::lock_guard lock(log->mutex);
-           log->made.push_back(model);
-           return MakeStateEstimator(*LoadLinkModel("cylinder"), {.model = model});
-         }}});
+         .factories = {
+             .estimator = [log = log_](std::optional<ForceModel> model) -> std::shared_ptr<StateEstimator> {
+               const std::lock_guard lock(log->mutex);
+               log->made.push_back(model);
+               return MakeStateEstimator(*LoadLinkModel("cylinder"), {.model = model});
+             }}});
     arm_ = std::make_unique<Arm>("test", std::move(links), MakeEncoder({"upper"}), clock_,
                                  ArmOptions{.worker = {.poll = std::chrono::milliseconds(5)}});
     server_ = std::move(*RpcServer::Start("127.0.0.1:0", *arm_, TestLimits(), nullptr, nullptr));
@@ -231,6 +232,15 @@ TEST_F(LinkCallsTest, AForceModelIsMadeAsideAndUsed) {
   log_->used.wait(0);
   const std::lock_guard lock(log_->mutex);
   EXPECT_THAT(log_->made, ElementsAre(ForceModel::kNonlinear));
+}
+
+TEST_F(LinkCallsTest, TheChoiceOfTheForceModelIsGivenBack) {
+  WaitUntilRunning();
+  EXPECT_TRUE(SetForceModel("upper", v1::FORCE_MODEL_AUTO).ok());
+  script_->Push(1);
+  log_->used.wait(0);
+  const std::lock_guard lock(log_->mutex);
+  EXPECT_THAT(log_->made, ElementsAre(std::nullopt));
 }
 
 TEST_F(LinkCallsTest, NoForceModelNoChange) {

@@ -6,7 +6,7 @@ import { colourIndex, colourTable, COLOUR_MAPS, roundUp, StickyRange } from "../
 import { markerAreas, MarkerFields } from "../src/skin/fields";
 import { clampedWeights, linear, periodicWeights } from "../src/skin/interpolation";
 import { SkinSurface } from "../src/skin/surface";
-import { contourFlat, sampleFlat } from "../src/skin/unroll";
+import { outlineFlat, sampleFlat } from "../src/skin/unroll";
 
 const LENGTH = 0.2;
 const RADIUS = 0.05;
@@ -152,13 +152,23 @@ describe("flat map", () => {
     expect(sampleFlat(values, grid, PATHS + 0.5, 4.5)).toBeCloseTo(10, 12);
     expect(sampleFlat(values, grid, 0.5, 6.5)).toBe(0);
   });
-  test("a contour runs where the value passes the level", () => {
-    const segments = contourFlat(values, grid, 5, 8);
-    expect(segments.length).toBeGreaterThan(0);
-    for (let i = 0; i < segments.length; i += 2)
-      expect(Math.abs(sampleFlat(values, grid, segments[i], segments[i + 1]) - 5)).toBeLessThan(0.3);
-  });
-  test("nothing above the level, no contour", () => {
-    expect(contourFlat(values, grid, 11)).toEqual([]);
+  test("an outline lies over its markers and does not jump at the seam", () => {
+    const ringZM = [0.01, 0.03, 0.05];
+    const at = (path: number, z: number) => {
+      const angle = (2 * Math.PI * path) / PATHS;
+      return [0.04 * Math.cos(angle), 0.04 * Math.sin(angle), z];
+    };
+    const corners = [at(-1, 0.01), at(1, 0.01), at(1, 0.04), at(-1, 0.06)].flat();
+    const flat = outlineFlat(corners, { paths: PATHS, firstPathAngleRad: 0, ringZM });
+    const expected = [
+      [PATHS - 0.5, 0.5],
+      [PATHS + 1.5, 0.5],
+      [PATHS + 1.5, 2],
+      [PATHS - 0.5, 3],
+    ];
+    flat.forEach((corner, i) =>
+      corner.forEach((value, axis) => expect(value).toBeCloseTo(expected[i][axis], 9)),
+    );
+    expect(outlineFlat([], { paths: PATHS, firstPathAngleRad: 0, ringZM })).toEqual([]);
   });
 });

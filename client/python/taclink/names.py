@@ -70,6 +70,7 @@ class ForceModel(Name):
     LITERAL = "literal"
     PRESSURISED = "pressurised"
     NONLINEAR = "nonlinear"
+    AUTO = "auto"  # to set only: the cheapest that is good enough; frames tell which one that was
 
 
 class MarkerSource(IntEnum):

@@ -76,6 +76,7 @@ def test_a_force_model_is_used_from_the_next_frame_on(client: taclink.Client, me
     client.set_force_model("idle", "nonlinear")
     with client.frames("idle", every=True) as frames:
         assert next(frame for frame in frames if frame.times.exposure_utc_ns).force_model == "nonlinear"
+    client.set_force_model("idle", taclink.ForceModel.AUTO)
     client.set_force_model("idle", taclink.ForceModel.LINEAR)
     with pytest.raises(taclink.InvalidArgument, match="linear, literal"):
         client.set_force_model("idle", "best")

@@ -56,8 +56,8 @@ def test_names_are_texts() -> None:
     assert names.name_of(names.LinkStatus, 3) is names.LinkStatus.OK
     assert names.name_of(names.LinkStatus, 99) is names.LinkStatus.UNKNOWN
     assert names.number_of(names.ForceModel, "nonlinear", "model") == 4
-    with pytest.raises(taclink.InvalidArgument, match="linear, literal, pressurised, nonlinear, not 'auto'"):
-        names.number_of(names.ForceModel, "auto", "model")
+    with pytest.raises(taclink.InvalidArgument, match="linear, literal, pressurised, nonlinear, auto, not 'best'"):
+        names.number_of(names.ForceModel, "best", "model")
 
 
 def test_covariances_are_symmetric_matrices() -> None:

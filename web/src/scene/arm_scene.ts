@@ -274,7 +274,12 @@ export class ArmScene {
     for (const link of arm.links) {
       const object = this.links.get(link.name);
       const frame = this.store.link(link.name).newest;
-      if (!object || !frame) continue;
+      if (!object) continue;
+      if (!frame) {
+        object.outline([]);
+        continue;
+      }
+      object.outline(frame.contacts.map((contact) => contact.outlineM));
       for (const contact of frame.contacts) {
         const { centerM, forceN } = contact;
         if (!centerM || !forceN) continue;
@@ -284,7 +289,8 @@ export class ArmScene {
         out.push({
           tip: new THREE.Vector3(centerM.x, centerM.y, centerM.z).applyMatrix4(object.group.matrix),
           force: new THREE.Vector3(forceN.x, forceN.y, forceN.z).applyMatrix3(rotation),
-          text: `${newtons.toFixed(2)} N  #${contact.id}`,
+          // A hug has hardly a resultant: what it presses with is told.
+          text: `${Math.max(newtons, contact.normalForceN).toFixed(2)} N  #${contact.id}`,
         });
       }
     }

@@ -10,6 +10,8 @@ const CAP_LENGTH_M = 0.012;
 const CAP_COLOUR = 0x3a4048;
 const CAP_SELECTED = 0x2f81f7;
 const UNMEASURED = 0x808890;
+const OUTLINE = 0xffffff;
+const OUTLINE_ABOVE_M = 0.0008; // the skin, so that it is not hidden between the vertices that are drawn
 
 /** How scalar values become colours. */
 export interface Colouring {
@@ -31,6 +33,10 @@ export class LinkObject {
   private readonly fields: MarkerFields;
   private readonly colours: THREE.BufferAttribute;
   private readonly caps: THREE.MeshLambertMaterial;
+  private readonly outlines = new THREE.LineSegments(
+    new THREE.BufferGeometry(),
+    new THREE.LineBasicMaterial({ color: OUTLINE }),
+  );
 
   constructor(
     readonly name: string,
@@ -50,7 +56,9 @@ export class LinkObject {
     );
     this.skin.userData.link = name;
     this.caps = new THREE.MeshLambertMaterial({ color: CAP_COLOUR });
-    this.group.add(this.skin, this.cap(0), this.cap(model.lengthM));
+    this.outlines.frustumCulled = false;
+    this.outlines.userData.link = name;
+    this.group.add(this.skin, this.outlines, this.cap(0), this.cap(model.lengthM));
     // A skin dents by less than its radius.
     const radius = Math.max(...model.profileRadiusM, 0.01);
     geometry.boundingSphere = new THREE.Sphere(
@@ -116,6 +124,26 @@ export class LinkObject {
     this.colours.needsUpdate = true;
   }
 
+  /** Draws the contacts' outlines: x, y, z of each corner, link frame, m. */
+  outline(contacts: readonly (readonly number[])[]): void {
+    const points: number[] = [];
+    for (const corners of contacts) {
+      const corner = (i: number) => {
+        const [x, y, z] = [0, 1, 2].map((axis) => corners[(3 * i + axis) % corners.length]);
+        const out = 1 + OUTLINE_ABOVE_M / Math.max(Math.hypot(x, y), OUTLINE_ABOVE_M);
+        points.push(x * out, y * out, z);
+      };
+      for (let i = 0; 3 * i < corners.length; ++i) {
+        corner(i);
+        corner(i + 1);
+      }
+    }
+    const { geometry } = this.outlines;
+    if (points.length === 0 && !this.outlines.visible) return;
+    this.outlines.visible = points.length > 0;
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+  }
+
   /** The middle of the link, base frame. */
   center(): THREE.Vector3 {
     return new THREE.Vector3(0, 0, this.model.lengthM / 2).applyMatrix4(this.group.matrix);
@@ -125,6 +153,8 @@ export class LinkObject {
     this.group.traverse((object) => {
       if (object instanceof THREE.Mesh) object.geometry.dispose();
     });
+    this.outlines.geometry.dispose();
+    this.outlines.material.dispose();
     this.skin.material.dispose();
     this.caps.dispose();
   }

@@ -49,37 +49,35 @@ export function paintFlat(
   }
 }
 
-/** Line segments (x0, y0, x1, y1 in cells) where `values` passes `level`: marching squares, three steps a cell. */
-export function contourFlat(values: ArrayLike<number>, grid: FlatGrid, level: number, fine = 3): number[] {
-  const columns = grid.paths * fine;
-  const rows = grid.rings * fine;
-  const samples = new Float64Array((columns + 1) * (rows + 1));
-  for (let row = 0; row <= rows; ++row)
-    for (let column = 0; column <= columns; ++column)
-      samples[row * (columns + 1) + column] = sampleFlat(values, grid, column / fine, row / fine) - level;
-  const out: number[] = [];
-  const at = (column: number, row: number) => samples[row * (columns + 1) + column];
-  for (let row = 0; row < rows; ++row) {
-    for (let column = 0; column < columns; ++column) {
-      const corners = [at(column, row), at(column + 1, row), at(column + 1, row + 1), at(column, row + 1)];
-      const places = [
-        [column, row],
-        [column + 1, row],
-        [column + 1, row + 1],
-        [column, row + 1],
-      ];
-      const cuts: number[] = [];
-      for (let edge = 0; edge < 4; ++edge) {
-        const a = corners[edge];
-        const b = corners[(edge + 1) % 4];
-        if (a > 0 === b > 0) continue;
-        const t = a / (a - b);
-        const [ax, ay] = places[edge];
-        const [bx, by] = places[(edge + 1) % 4];
-        cuts.push((ax + t * (bx - ax)) / fine, (ay + t * (by - ay)) / fine);
-      }
-      for (let cut = 0; cut + 3 < cuts.length; cut += 4) out.push(...cuts.slice(cut, cut + 4));
-    }
+/** What `outlineFlat` needs of a link's marker grid. */
+export interface FlatPlaces {
+  paths: number;
+  firstPathAngleRad: number;
+  ringZM: readonly number[];
+}
+
+/**
+ * A contact's outline (x, y, z of each corner; link frame, m) on the map: path and ring of each corner in units of
+ * cells, as `sampleFlat` has them. Corners follow each other without a jump at the seam, so that paths may lie beyond
+ * 0 or the last one.
+ */
+export function outlineFlat(outlineM: ArrayLike<number>, places: FlatPlaces): [path: number, ring: number][] {
+  const out: [number, number][] = [];
+  const { paths } = places;
+  for (let i = 0; i + 2 < outlineM.length; i += 3) {
+    const angle = Math.atan2(outlineM[i + 1], outlineM[i]) - places.firstPathAngleRad;
+    let path = (angle / (2 * Math.PI)) * paths + 0.5;
+    path -=
+      paths *
+      (out.length === 0 ? Math.floor(path / paths) : Math.round((path - out[out.length - 1][0]) / paths));
+    out.push([path, ringAt(outlineM[i + 2], places.ringZM) + 0.5]);
   }
   return out;
+}
+
+// Linear between the rings and beyond the first and last one.
+function ringAt(z: number, ringZM: readonly number[]): number {
+  let low = 0;
+  while (low + 2 < ringZM.length && z > ringZM[low + 1]) ++low;
+  return low + (z - ringZM[low]) / (ringZM[low + 1] - ringZM[low]);
 }

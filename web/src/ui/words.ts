@@ -36,6 +36,7 @@ export const MODEL_WORDS: Record<ForceModel, string> = {
   [ForceModel.LITERAL]: "literal (for comparison only)",
   [ForceModel.PRESSURISED]: "pressurised",
   [ForceModel.NONLINEAR]: "nonlinear",
+  [ForceModel.AUTO]: "cheapest good enough",
 };
 
 const SEVERITY: Record<LinkStatus, number> = {

@@ -186,11 +186,15 @@ function Model({ link }: { link: Link }) {
             value={chosen.value ?? now}
             onChange={(event) => (chosen.value = Number(event.currentTarget.value) as ForceModel)}
           >
-            {[ForceModel.NONLINEAR, ForceModel.PRESSURISED, ForceModel.LINEAR, ForceModel.LITERAL].map(
-              (model) => (
-                <option value={model}>{MODEL_WORDS[model]}</option>
-              ),
-            )}
+            {[
+              ForceModel.AUTO,
+              ForceModel.NONLINEAR,
+              ForceModel.PRESSURISED,
+              ForceModel.LINEAR,
+              ForceModel.LITERAL,
+            ].map((model) => (
+              <option value={model}>{MODEL_WORDS[model]}</option>
+            ))}
           </select>
         </label>
         <OperatorButton

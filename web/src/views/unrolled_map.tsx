@@ -6,12 +6,11 @@ import { useApp } from "../app_state";
 import { colourTable, roundUp, StickyRange } from "../skin/colour_map";
 import { MarkerFields, QUANTITIES } from "../skin/fields";
 import { sameShape } from "../skin/same_shape";
-import { contourFlat, paintFlat } from "../skin/unroll";
+import { outlineFlat, paintFlat } from "../skin/unroll";
 import { fixed } from "../ui/format";
+import { ContactList } from "./contact_list";
 
 const FINE = 6; // pixels of the picture a cell, before the browser scales it
-const OUTLINE_SHARE = 0.15; // of the largest pressure
-const LEAST_OUTLINE_PA = 300;
 
 interface Cell {
   path: number;
@@ -43,12 +42,10 @@ export function UnrolledMap({ link }: { link: Link }) {
       const quantity = app.quantity.value;
       const { scale } = QUANTITIES[quantity];
       if (!frame) return painter.clear();
-      const pressures = Float64Array.from(fields.values(frame, "pressure"));
       const values = fields.values(frame, quantity);
       range.include(Math.max(...values) / scale);
       painter.paint(values, range.top * scale, colourTable(app.colourMap.value));
-      const level = Math.max(LEAST_OUTLINE_PA, OUTLINE_SHARE * Math.max(...pressures));
-      painter.outline(contourFlat(pressures, grid, level));
+      for (const contact of frame.contacts) painter.outline(outlineFlat(contact.outlineM, grid));
       const now = store.arm.peek()?.links.find((each) => each.name === link.name);
       painter.regions(now?.forceLevels.flatMap((level) => (level.markers ? [level.markers] : [])) ?? []);
       painter.mark(cell.value);
@@ -107,6 +104,7 @@ export function UnrolledMap({ link }: { link: Link }) {
         <span class="axis-x">path (around the axis)</span>
       </div>
       <Readout link={link} cell={cell.value} fields={fields} top={range.top} />
+      <ContactList link={link.name} />
     </div>
   );
 }
@@ -123,7 +121,7 @@ function Readout(props: { link: Link; cell: Cell | undefined; fields: MarkerFiel
   if (!cell)
     return (
       <p class="readout numbers">
-        0 to {top} {info.unit}. White line: contact. Point at a marker, or use the arrow keys.
+        0 to {top} {info.unit}. White lines: contacts. Point at a marker, or use the arrow keys.
       </p>
     );
   const marker = cell.ring * link.model!.markers!.paths + cell.path;
@@ -195,12 +193,16 @@ class FlatPainter {
     return (1 - ring / this.rings) * this.canvas.height;
   }
 
-  outline(segments: readonly number[]): void {
+  // A second and a third time a turn away: what crosses the seam is on both sides of it.
+  outline(corners: readonly [path: number, ring: number][]): void {
     const { context } = this;
     context.beginPath();
-    for (let i = 0; i < segments.length; i += 4) {
-      context.moveTo(this.x(segments[i]), this.y(segments[i + 1]));
-      context.lineTo(this.x(segments[i + 2]), this.y(segments[i + 3]));
+    for (const turn of [-this.paths, 0, this.paths]) {
+      for (const [i, [path, ring]] of corners.entries()) {
+        if (i === 0) context.moveTo(this.x(path + turn), this.y(ring));
+        else context.lineTo(this.x(path + turn), this.y(ring));
+      }
+      context.closePath();
     }
     context.strokeStyle = "white";
     context.lineWidth = 2 * devicePixelRatio;
