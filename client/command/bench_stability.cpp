@@ -2,6 +2,8 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <functional>
+#include <iterator>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -29,22 +31,29 @@ std::string Short(double value) {
   return text;
 }
 
-std::vector<StabilityRow> RunSkins(const std::vector<SkinCase>& cases, const Options& options) {
-  std::vector<StabilityRow> rows(cases.size());
+void Tell(const StabilityRow& row) {
+  std::fprintf(stderr, "%-60s %s: %s\n", row.name.c_str(), Name(row.ending), row.reason.c_str());
+}
+
+using RunCase = std::function<std::vector<StabilityRow>(const SkinCase&)>;
+
+std::vector<StabilityRow> RunAll(const std::vector<SkinCase>& cases, int jobs, const RunCase& run) {
+  std::vector<std::vector<StabilityRow>> by_case(cases.size());
   std::atomic<size_t> next = 0;
   std::mutex mutex;
   const auto work = [&] {
     for (size_t i = next++; i < cases.size(); i = next++) {
-      rows[i] = RunSkinCase(cases[i], options.refinement);
+      by_case[i] = run(cases[i]);
       const std::lock_guard lock(mutex);
-      std::fprintf(stderr, "%-50s %s: %s\n", rows[i].name.c_str(), Name(rows[i].ending),
-                   rows[i].reason.c_str());
+      for (const StabilityRow& row : by_case[i]) Tell(row);
     }
   };
   std::vector<std::thread> workers;
-  for (int i = 1; i < options.jobs; ++i) workers.emplace_back(work);
+  for (int i = 1; i < jobs; ++i) workers.emplace_back(work);
   work();
   for (std::thread& worker : workers) worker.join();
+  std::vector<StabilityRow> rows;
+  for (auto& each : by_case) std::move(each.begin(), each.end(), std::back_inserter(rows));
   return rows;
 }
 
@@ -60,8 +69,8 @@ ReportTable SkinTable(const std::vector<StabilityRow>& rows) {
   return table;
 }
 
-ReportTable InputTable(const std::vector<StabilityRow>& rows) {
-  ReportTable table{"Numbers that are none, markers that are gone", {"case", "ends", "how"}, {}};
+ReportTable PlainTable(const char* title, const std::vector<StabilityRow>& rows) {
+  ReportTable table{title, {"case", "ends", "how"}, {}};
   for (const StabilityRow& row : rows) table.rows.push_back({row.name, Name(row.ending), row.reason});
   return table;
 }
@@ -79,16 +88,23 @@ std::string Count(const std::vector<StabilityRow>& rows, const char* what) {
 Result<void> Stability(const Options& options) {
   const auto base = LoadLinkModel("cylinder");
   if (!base) return base.error();
-  std::vector<SkinCase> cases = SkinCases(*base);
-  std::erase_if(cases, [&](const SkinCase& c) { return c.name.find(options.only) == std::string::npos; });
-  const std::vector<StabilityRow> skins = RunSkins(cases, options);
-  std::vector<StabilityRow> inputs = RunInputCases(*base, [](const StabilityRow& row) {
-    std::fprintf(stderr, "%-70s %s: %s\n", row.name.c_str(), Name(row.ending), row.reason.c_str());
-  });
-  std::string markdown = "Mesh of refinement " + std::to_string(options.refinement) + ".\n\n" +
-                         Count(skins, "Forward solver") + "\n" + Count(inputs, "Input") + "\n";
+  const auto chosen = [&](std::vector<SkinCase> cases) {
+    std::erase_if(cases, [&](const SkinCase& c) { return c.name.find(options.only) == std::string::npos; });
+    return cases;
+  };
+  const std::vector<StabilityRow> skins =
+      RunAll(chosen(SkinCases(*base)), options.jobs,
+             [&](const SkinCase& skin) { return std::vector{RunSkinCase(skin, options.refinement)}; });
+  const std::vector<StabilityRow> live = RunAll(chosen(LiveCases(*base)), options.jobs, RunLiveCase);
+  std::vector<StabilityRow> inputs;
+  if (options.only.empty()) inputs = RunInputCases(*base, Tell);
+  std::string markdown = "Mesh of the forward solver of refinement " + std::to_string(options.refinement) +
+                         ".\n\n" + Count(skins, "Forward solver") + "\n" + Count(live, "Live path") + "\n" +
+                         Count(inputs, "Input") + "\n";
   std::printf("%s", markdown.c_str());
-  for (const ReportTable& table : {SkinTable(skins), InputTable(inputs)}) {
+  for (const ReportTable& table :
+       {SkinTable(skins), PlainTable("The live path: skins, pressures and bodies", live),
+        PlainTable("The live path: numbers that are none, markers that are gone", inputs)}) {
     std::printf("%s\n", AlignedText(table).c_str());
     markdown += Markdown(table) + "\n";
   }
@@ -101,7 +117,7 @@ void AddBenchStability(const Arguments& bench, Selected& selected) {
   auto options = std::make_shared<Options>();
   const Arguments stability =
       bench.AddCommand("stability", "The mechanics at extreme skins, loads and inputs, case by case");
-  stability.AddOption("--only", options->only, "Skins whose name holds this");
+  stability.AddOption("--only", options->only, "Skins whose name holds this; without the inputs");
   stability.AddOption("--refinement", options->refinement, "Of the mesh").Must(Between(1, 4)).ShowDefault();
   stability.AddOption("--jobs", options->jobs, "Cases at the same time").Must(Between(1, 256));
   stability.AddOption("--markdown", options->markdown,

@@ -8,7 +8,7 @@
 #include "client/command/marker_csv.h"
 #include "client/command/picture_solver.h"
 #include "sensing/model/model_file.h"
-#include "sensing/pipeline/judge.h"
+#include "sensing/pipeline/marker_solve.h"
 
 namespace taclink::command {
 namespace {
@@ -109,25 +109,17 @@ double SigmaMpa(const SolveOptions& options) {
   return 1e-6 * options.pressure_sigma_pa.value_or(1e6 * PressureSigma(PressureOrigin::kFile));
 }
 
-Result<LinkState> SolveMarkers(const SolveOptions& options, const LinkModel& model) {
+Result<LinkState> SolveMarkerFile(const SolveOptions& options, const LinkModel& model) {
   auto shape = ReadMarkerCsv(options.markers, model, options.sigma_mm);
   if (!shape) return shape.error();
-  LinkState state;
-  state.shape = std::move(*shape);
   const auto estimator = MakeStateEstimator(
       model, {.model = ForceModelNamed(options.force_model), .refinement = options.force_refinement});
-  ContactFinder finder(model);
   const PressureReading now{1e-3 * options.pressure_kpa, SigmaMpa(options)};
   const double baseline_kpa = options.baseline_pressure_kpa;
   const PressureReading baseline{1e-3 * baseline_kpa, baseline_kpa == 0 ? 0 : SigmaMpa(options)};
   const int64_t start = SystemClock().MonotonicNs();
-  estimator->Estimate({.now = now, .baseline = baseline}, finder, state.shape, state.forces, state.contacts);
+  LinkState state = SolveMarkers(model, *estimator, {.now = now, .baseline = baseline}, std::move(*shape));
   state.stage_ms.force = static_cast<double>(SystemClock().MonotonicNs() - start) * 1e-6;
-  for (const auto& contact : state.contacts) state.total_force_n += contact.force_n;
-  const SkinEstimate& estimate = estimator->estimate();
-  if (state.forces.converged)
-    state.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
-  Judge({.model = model, .camera_trouble = "", .drift_advice = "", .told = now, .estimate = estimate}, state);
   return state;
 }
 
@@ -145,7 +137,8 @@ Result<LinkState> SolvePictures(const SolveOptions& options, const LinkModel& mo
 Result<void> Solve(const SolveOptions& options) {
   const auto model = LoadLinkModel(options.model);
   if (!model) return model.error();
-  const auto state = options.markers.empty() ? SolvePictures(options, *model) : SolveMarkers(options, *model);
+  const auto state =
+      options.markers.empty() ? SolvePictures(options, *model) : SolveMarkerFile(options, *model);
   if (!state) return state.error();
   const bool invalid = IsInvalid(*state);
   if (!invalid) {

@@ -26,6 +26,10 @@ const char* Name(ReasonId id) {
       return "too_deep";
     case ReasonId::kBeyondMarkers:
       return "beyond_markers";
+    case ReasonId::kSparseMarkers:
+      return "sparse_markers";
+    case ReasonId::kForceModel:
+      return "force_model";
     case ReasonId::kDrift:
       return "drift";
   }

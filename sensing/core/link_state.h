@@ -35,6 +35,8 @@ enum class ReasonId : uint8_t {
   kLabels,            ///< markers of one region were left out as contradicting
   kTooDeep,           ///< pressed in deeper than forces were compared with the truth
   kBeyondMarkers,     ///< a load between a clamp and the first ring: how much of it is seen is not sure
+  kSparseMarkers,     ///< a load on this skin may hide between markers
+  kForceModel,        ///< the force model that was asked for does not hold here
   kDrift,             ///< the baseline has drifted
 };
 inline constexpr int kReasonCount = static_cast<int>(ReasonId::kDrift) + 1;

@@ -352,11 +352,10 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
 }
 
 // What each hill's tangential force would explain beside the loads that act and the tangential forces that
-// were let in, if no load had to stay above zero: chi^2.
-std::vector<double> LoadEstimator::TangentialGains(const std::vector<int>& sites,
-                                                   const std::vector<Eigen::MatrixXd>& columns,
-                                                   const Eigen::MatrixXd& tangential,
-                                                   const Solution& solution) const {
+// were let in, if no load had to stay above zero.
+std::vector<LoadEstimator::TangentialGain> LoadEstimator::TangentialGains(
+    const std::vector<int>& sites, const std::vector<Eigen::MatrixXd>& columns,
+    const Eigen::MatrixXd& tangential, const Solution& solution) const {
   std::vector<int> acting;
   for (size_t i = 0; i < sites.size(); ++i) {
     if (solution.loads[static_cast<Eigen::Index>(i)] > 0) acting.push_back(sites[i]);
@@ -371,14 +370,15 @@ std::vector<double> LoadEstimator::TangentialGains(const std::vector<int>& sites
     information.diagonal().head(loads).array() += kRidge * information.diagonal().head(loads).mean();
   information.diagonal().tail(tangential.cols()) += TangentialPrior(tangential.cols());
   const Eigen::LLT<Eigen::MatrixXd> factor(information);
-  std::vector<double> gains;
+  std::vector<TangentialGain> gains;
   for (const Eigen::MatrixXd& own : columns) {
     Eigen::MatrixXd cross;
     dense::TransposedProduct(basis, own, cross);
     Eigen::MatrixXd left = own.transpose() * own - cross.transpose() * factor.solve(cross);
     left.diagonal() += TangentialPrior(own.cols());
     const Eigen::VectorXd pull = own.transpose() * solution.residual;
-    gains.push_back(pull.dot(left.ldlt().solve(pull)));
+    const Eigen::VectorXd force = left.ldlt().solve(pull);
+    gains.push_back({pull.dot(force), force.head<2>()});
   }
   return gains;
 }
@@ -394,16 +394,20 @@ void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<HillFin
   solution = Refit(sites, tangential);
   std::vector<Eigen::MatrixXd> columns;
   for (const auto& hill : hills) columns.push_back(TangentialColumns(skin, hill));
+  left_out_.assign(hills.size(), {});
   while (slipping.size() < hills.size()) {
-    std::vector<double> gains = TangentialGains(sites, columns, tangential, solution);
-    for (const int hill : slipping) gains[static_cast<size_t>(hill)] = 0;
-    const auto best = std::max_element(gains.begin(), gains.end()) - gains.begin();
-    if (!(gains[static_cast<size_t>(best)] > kTangentialGain)) return;
+    left_out_ = TangentialGains(sites, columns, tangential, solution);
+    for (const int hill : slipping) left_out_[static_cast<size_t>(hill)] = {};
+    const auto best = std::max_element(left_out_.begin(), left_out_.end(),
+                                       [](const auto& a, const auto& b) { return a.chi2 < b.chi2; }) -
+                      left_out_.begin();
+    if (!(left_out_[static_cast<size_t>(best)].chi2 > kTangentialGain)) return;
     Eigen::MatrixXd more(data_.size(), tangential.cols() + kTangential);
     more << tangential, columns[static_cast<size_t>(best)];
     Solution with = Refit(sites, more);
     if (!(solution.chi2 - with.chi2 > kTangentialGain)) return;
     slipping.push_back(static_cast<int>(best));
+    left_out_[static_cast<size_t>(best)] = {};
     tangential = std::move(more);
     solution = std::move(with);
   }

@@ -21,6 +21,7 @@ struct EstimatedLoad {
   bool has_tangential = false;
   Vec2 tangential_n = Vec2::Zero();  ///< around and along
   Vec2 couple_nmm = Vec2::Zero();    ///< about around and along: a glued body may turn the skin
+  Vec2 left_out_n = Vec2::Zero();    ///< a tangential force that may be there, but explains too little
   Vec3 force_n = Vec3::Zero();       ///< link frame
   double normal_force_n = 0;         ///< sum of the inward loads
   Vec2 center = Vec2::Zero();        ///< column (not wrapped) and row of the site grid: centroid of the load
@@ -98,9 +99,15 @@ class LoadEstimator {
   Solution Refit(const std::vector<int>& sites, const Eigen::MatrixXd& tangential);
   void LetSlip(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
                std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution);
-  std::vector<double> TangentialGains(const std::vector<int>& sites,
-                                      const std::vector<Eigen::MatrixXd>& columns,
-                                      const Eigen::MatrixXd& tangential, const Solution& solution) const;
+  /// What a hill's tangential force would be, and would explain: chi^2.
+  struct TangentialGain {
+    double chi2 = 0;
+    Vec2 force_n = Vec2::Zero();
+  };
+  std::vector<TangentialGain> TangentialGains(const std::vector<int>& sites,
+                                              const std::vector<Eigen::MatrixXd>& columns,
+                                              const Eigen::MatrixXd& tangential,
+                                              const Solution& solution) const;
   void ProjectOut(const Eigen::MatrixXd& tangential);
   void Finish(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
               const std::vector<int>& slipping, LoadEstimate& estimate);
@@ -138,6 +145,7 @@ class LoadEstimator {
   Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
   std::vector<char> is_shown_;  // by row
   Solution solution_;
+  std::vector<TangentialGain> left_out_;  // by hill: of those that were not let in
 };
 
 }  // namespace taclink

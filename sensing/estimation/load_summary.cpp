@@ -37,6 +37,7 @@ void LoadEstimator::Finish(const Linearization& skin, const std::vector<HillFind
       load.tangential_n = solution_.tangential.segment<2>(first);
       load.couple_nmm = solution_.tangential.segment<2>(first + 2);
     }
+    load.left_out_n = left_out_[i].force_n;
     if (load.normal_force_n <= 0) continue;
     WriteLoad(skin, hills[i], load);
     estimate.loads.push_back(std::move(load));
@@ -152,6 +153,9 @@ void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& es
         std::max_element(load.inward_n.begin(), load.inward_n.end()) - load.inward_n.begin())];
     const Mat3& frame = skin.frames()[static_cast<size_t>(site)];
     load.force_covariance_n2 = frame * covariance.block<3, 3>(5 * i, 5 * i) * frame.transpose();
+    // Left out because it explains little, not because it is known to be none.
+    const Vec3 left_out = frame.rightCols<2>() * load.left_out_n;
+    load.force_covariance_n2 += left_out * left_out.transpose();
     load.force_covariance_n2 += kForceShare * kForceShare / 3 * load.force_n.squaredNorm() * Mat3::Identity();
     load.center_covariance = covariance.block<2, 2>(5 * i + 3, 5 * i + 3);
     load.center_covariance.diagonal().array() += kCenterShare * kCenterShare;

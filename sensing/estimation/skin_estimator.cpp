@@ -190,7 +190,10 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const Problem& problem, SkinEst
   double step_mm = 0;
   if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
   estimate.model = linear ? ForceModel::kLinear : ForceModel::kPressurised;
-  if (IsFirstOrder()) return true;
+  if (IsFirstOrder()) {
+    estimate.first_order_mm = LongestOff(estimate.state.mids_mm, about.mids_mm);
+    return true;
+  }
   if (estimate.loads.loads.empty()) {
     // The nonlinear skin without loads is where the tangent is.
     estimate.model = options_.model.value_or(estimate.model);
@@ -306,6 +309,7 @@ bool SkinEstimator::AreNeighborsStill() const {
 void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& estimate) {
   estimate.failure = EstimateFailure::kNoEquilibrium;
   estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
+  estimate.first_order_mm = 0;
   estimate.has_shape = false;
   PressurePrior prior;
   const InflatedSkin* baseline = mechanics_.Inflated(observation.baseline_pressure.mpa);

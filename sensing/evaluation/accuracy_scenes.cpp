@@ -31,17 +31,26 @@ Place At(const LinkModel& model, double path, double ring) {
 PressBody Body(const Place& at, const RigidBody& body, bool sticks) {
   return {body, -at.normal, kHalf * (at.around + at.axial), sticks};
 }
-PressBody Stamp(const Place& at, double radius_mm = kStampMm, double rim_mm = kRimMm) {
-  return Body(at, RigidStamp{at.point, -at.normal, radius_mm, rim_mm}, true);
-}
-PressBody Sphere(const Place& at, bool sticks = false) {
-  return Body(at, RigidSphere{at.point + kSphereMm * at.normal, kSphereMm}, sticks);
-}
-PressBody Bar(const Place& at) {
-  return Body(at, RigidBar{at.point + kBarMm * at.normal, kHalf * (at.around + at.axial), kBarMm}, false);
-}
 
-std::vector<PressBody> Bodies(const LinkModel& model, PressKind kind) {
+// What presses, `unit` times as large.
+struct Bodies {
+  double unit;
+
+  PressBody Stamp(const Place& at, double radius_mm = kStampMm, double rim_mm = kRimMm) const {
+    return Body(at, RigidStamp{at.point, -at.normal, unit * radius_mm, unit * rim_mm}, true);
+  }
+  PressBody Sphere(const Place& at, bool sticks = false) const {
+    return Body(at, RigidSphere{at.point + unit * kSphereMm * at.normal, unit * kSphereMm}, sticks);
+  }
+  PressBody Bar(const Place& at) const {
+    const RigidBar bar{at.point + unit * kBarMm * at.normal, kHalf * (at.around + at.axial), unit * kBarMm};
+    return Body(at, bar, false);
+  }
+
+  std::vector<PressBody> Of(const LinkModel& model, PressKind kind) const;
+};
+
+std::vector<PressBody> Bodies::Of(const LinkModel& model, PressKind kind) const {
   const int paths = model.markers.paths, rings = model.markers.rings();
   const double path = paths / 4, ring = rings / 2 - 1;  // NOLINT(bugprone-integer-division)
   const auto at = [&](double p, double r) { return At(model, p, r); };
@@ -113,15 +122,26 @@ const char* Name(PressKind kind) {
   return kNames[static_cast<size_t>(kind)];
 }
 
-PressPath MakePressPath(const LinkModel& model, PressKind kind, double pressure_mpa) {
+SkinUnits UnitsOf(const LinkModel& model) {
+  const double radius = model.PointAtDepth(0, model.length_mm / 2, model.thickness_mm / 2).x();
+  // Of the shipped cylinder.
+  constexpr double kLengthMm = 11.57, kForceMpaMm2 = 1.2275;
+  return {
+      .length = std::sqrt(radius * model.thickness_mm) / kLengthMm,
+      .force = model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm / kForceMpaMm2};
+}
+
+PressPath MakePressPath(const LinkModel& model, PressKind kind, double pressure_mpa, double unit) {
   char pressure[32];
   std::snprintf(pressure, sizeof pressure, "%gkPa", 1e3 * pressure_mpa);
+  std::vector<PressStage> stages = Stages(kind);
+  for (PressStage& stage : stages) stage = {unit * stage.depth_mm, unit * stage.drag_mm};
   return {.name = std::string(Name(kind)) + "-" + model.name + "-" + pressure,
           .kind = kind,
           .model = model.name,
           .pressure_mpa = pressure_mpa,
-          .bodies = Bodies(model, kind),
-          .stages = Stages(kind)};
+          .bodies = Bodies{unit}.Of(model, kind),
+          .stages = std::move(stages)};
 }
 
 std::vector<PressPath> PressPaths(const LinkModel& model, const std::vector<double>& pressures_mpa) {

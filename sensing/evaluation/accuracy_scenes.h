@@ -37,6 +37,12 @@ struct PressBody {
   Vec3 Offset(double depth_mm, double drag_mm) const { return depth_mm * into + drag_mm * along; }
 };
 
+/// How large and how stiff a skin is against the shipped cylinder: lengths go as sqrt(R t), forces as E t^2.
+struct SkinUnits {
+  double length = 1, force = 1;
+};
+SkinUnits UnitsOf(const LinkModel& model);
+
 /// A point of a path where the truth is recorded.
 struct PressStage {
   double depth_mm = 0;  ///< of every body, from where it touches the undeformed skin
@@ -58,6 +64,7 @@ struct PressPath {
 
 /// Every kind at every pressure, MPa. Depends on nothing else.
 std::vector<PressPath> PressPaths(const LinkModel& model, const std::vector<double>& pressures_mpa);
-PressPath MakePressPath(const LinkModel& model, PressKind kind, double pressure_mpa);
+/// Bodies and depths are `unit` times those of the shipped cylinder.
+PressPath MakePressPath(const LinkModel& model, PressKind kind, double pressure_mpa, double unit = 1);
 
 }  // namespace taclink

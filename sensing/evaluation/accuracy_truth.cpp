@@ -9,8 +9,9 @@
 namespace taclink {
 namespace {
 
-constexpr double kClearMm = 0.1;     // of a body before it touches
-constexpr double kBackMm = 0.25;     // per step back
+constexpr double kClearMm = 0.1;  // of a body before it touches
+constexpr double kBackMm = 0.25;  // a step towards the skin
+constexpr double kDeepestMm = 10;
 constexpr double kTouchedMm = 0.03;  // of a node from a body
 
 std::vector<Vec3> Displacements(const LinkModel& model, const PressedSkin& skin) {
@@ -19,15 +20,20 @@ std::vector<Vec3> Displacements(const LinkModel& model, const PressedSkin& skin)
   return u;
 }
 
-// How deep a body may be without touching the inflated skin.
+// How deep a body may come without touching the inflated skin, from outside: inside of a much inflated one it
+// would be free as well.
 double FreeDepth(const LinkModel& model, const PressedSkin& skin, const PressBody& body) {
-  double depth = 10;
-  for (bool free = false; !free;) {
-    depth -= kBackMm;
-    const RigidBody grown = Grown(Moved(body.touching, body.Offset(depth, 0)), model.thickness_mm / 2);
-    free = std::all_of(skin.state().mids_mm.begin(), skin.state().mids_mm.end(),
-                       [&](const Vec3& p) { return GapOf(grown, p).distance_mm > kClearMm; });
-  }
+  const double unit = UnitsOf(model).length;
+  double grown_mm = 0;
+  for (size_t i = 0; i < skin.state().mids_mm.size(); ++i)
+    grown_mm = std::max(grown_mm, (skin.state().mids_mm[i] - skin.mesh().mid_mm[i]).norm());
+  const auto is_free = [&](double depth) {
+    const RigidBody there = Grown(Moved(body.touching, body.Offset(depth, 0)), model.thickness_mm / 2);
+    return std::all_of(skin.state().mids_mm.begin(), skin.state().mids_mm.end(),
+                       [&](const Vec3& p) { return GapOf(there, p).distance_mm > kClearMm * unit; });
+  };
+  double depth = -grown_mm - 2 * kBackMm * unit;
+  while (depth < kDeepestMm * unit && is_free(depth + kBackMm * unit)) depth += kBackMm * unit;
   return depth;
 }
 
@@ -36,7 +42,8 @@ BodyContact ContactOf(const LinkModel& model, const PressedSkin& skin, int index
   BodyContact contact{.force_n = summary.force_n, .center_mm = summary.center_mm, .touched_mm = {}};
   const RigidBody grown = Grown(body, model.thickness_mm / 2);
   for (int node = 0; node < skin.mesh().node_count(); ++node) {
-    if (GapOf(grown, skin.state().mids_mm[static_cast<size_t>(node)]).distance_mm < kTouchedMm)
+    if (GapOf(grown, skin.state().mids_mm[static_cast<size_t>(node)]).distance_mm <
+        kTouchedMm * UnitsOf(model).length)
       contact.touched_mm.push_back(skin.state().AtOffset(node, model.thickness_mm / 2));
   }
   return contact;
@@ -95,7 +102,12 @@ PathTruth SolvePath(const LinkModel& model, const PressPath& path, int refinemen
   const int64_t start = ThreadCpuClock().MonotonicNs();
   PathTruth truth;
   truth.path = path;
-  PressedSkin skin(model, {.refinement = refinement});
+  const double unit = UnitsOf(model).length;
+  const PressedSkinOptions usual;
+  PressedSkin skin(model, {.refinement = refinement,
+                           .step_mm = unit * usual.step_mm,
+                           .least_step_mm = unit * usual.least_step_mm,
+                           .spacing_mm = unit * usual.spacing_mm});
   const PressSummary inflated = skin.Inflate(path.pressure_mpa);
   if (!inflated.ok() || !inflated.stable) {
     truth.failure = "inflating: " + inflated.Text();

@@ -2,6 +2,8 @@
 
 #include <cstdio>
 
+#include "sensing/model/model_file.h"
+
 namespace taclink {
 namespace {
 
@@ -111,7 +113,7 @@ LinkModel VariedModel(const LinkModel& base, double modulus_mpa, double thicknes
 double ScaledPressureMpa(const LinkModel& base, const LinkModel& model, double pressure_kpa) {
   constexpr double kShippedModulus = 0.1;
   return 1e-3 * pressure_kpa * model.material.youngs_modulus_mpa / kShippedModulus * model.thickness_mm /
-         base.thickness_mm;
+         base.thickness_mm * MidRadius(base) / MidRadius(model);
 }
 
 std::vector<SkinCase> SkinCases(const LinkModel& base) {
@@ -120,6 +122,38 @@ std::vector<SkinCase> SkinCases(const LinkModel& base) {
   AddMaterials(cases, base, slenderness);
   AddShapesAndLoads(cases, slenderness);
   return std::move(cases.cases);
+}
+
+std::vector<SkinCase> LiveCases(const LinkModel& base) {
+  std::vector<SkinCase> cases;
+  const auto add = [&](const std::string& name, const LinkModel& model, double kpa) {
+    char load[48];
+    std::snprintf(load, sizeof load, ", %g kPa", kpa);
+    constexpr double kSigmaKpa = 0.02;
+    cases.push_back({.name = name + load,
+                     .model = model,
+                     .pressure_mpa = ScaledPressureMpa(base, model, kpa),
+                     .pressure_sigma_mpa = ScaledPressureMpa(base, model, kSigmaKpa)});
+  };
+  for (const std::string& name : ShippedModelNames()) {
+    const auto model = LoadLinkModel(name);
+    if (!model) continue;
+    for (const double kpa : {0.0, 0.5, 1.5}) add(name, *model, kpa);
+  }
+  const double slenderness = base.thickness_mm / MidRadius(base);
+  for (const MaterialLaw law : kBothLaws) {
+    for (const double modulus : {1e-4, 0.02, 1.0, 1e2})
+      add(Label("E = %g MPa", modulus, law), VariedModel(base, modulus, slenderness, PoissonOf(law), law), 1);
+    for (const double ratio : {0.01, 0.03, 0.2})
+      add(Label("t/R = %g", ratio, law), VariedModel(base, 0.1, ratio, PoissonOf(law), law), 1);
+    for (const double kpa : {-0.2, -0.1, 2.5})
+      add(Label("t/R = %g", slenderness, law), VariedModel(base, 0.1, slenderness, PoissonOf(law), law), kpa);
+  }
+  for (const double poisson : {0.0, 0.3}) {
+    const auto law = MaterialLaw::kSaintVenantKirchhoff;
+    add(Label("nu = %g", poisson, law), VariedModel(base, 0.1, slenderness, poisson, law), 1);
+  }
+  return cases;
 }
 
 }  // namespace taclink

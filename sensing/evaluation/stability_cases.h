@@ -30,7 +30,8 @@ struct SkinCase {
   std::string name;
   LinkModel model;
   double pressure_mpa = 0;
-  double depth_mm = 0;  ///< from the undeformed surface; 0: no body
+  double pressure_sigma_mpa = 0;  ///< told to the estimator
+  double depth_mm = 0;            ///< from the undeformed surface; 0: no body
   /// The same skin of another stiffness under loads scaled alike: must move alike.
   double reference_modulus_mpa = 0;  ///< 0: none
 };
@@ -43,6 +44,12 @@ LinkModel VariedModel(const LinkModel& base, double modulus_mpa, double thicknes
 double ScaledPressureMpa(const LinkModel& base, const LinkModel& model, double pressure_kpa);
 
 std::vector<SkinCase> SkinCases(const LinkModel& base);
+/// Every shipped model and the cylinder of other materials, slack, inflated, in suction and over-pressure.
+std::vector<SkinCase> LiveCases(const LinkModel& base);
+/// What links do with such a skin: markers of the forward solver with noise, untouched and under bodies as
+/// large as the skin asks for, shown to the estimator by itself; what is not right must be told. A row for
+/// each body.
+std::vector<StabilityRow> RunLiveCase(const SkinCase& skin_case);
 /// `refinement` of the mesh.
 StabilityRow RunSkinCase(const SkinCase& skin_case, int refinement);
 

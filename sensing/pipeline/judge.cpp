@@ -12,6 +12,11 @@ namespace {
 constexpr double kDegradedFraction = 0.7, kLostFraction = 0.4;
 // Forces were compared with the truth down to dents of 15 mm on a link of sqrt(R t) = 11.6 mm.
 constexpr double kDeepestDentMm = 16;
+constexpr double kCylinderMm = 11.8;  // sqrt(R t) of the shipped cylinder, outside
+// Rings of markers so far apart, in sqrt(R t), over which a dent decays: on thinner skins forces were wrong.
+constexpr double kWidestRings = 3.5;
+// A tangent is wrong by a fifth a millimeter (estimation.md); likewise.
+constexpr double kFirstOrderMm = 2.5;
 constexpr double kPressureDeviations = 3;
 // chi^2 per number of a region of 3 x 3 markers: right answers stay below 3, wrong ones are above 7.
 constexpr double kMostRegionResidual = 5;
@@ -27,6 +32,19 @@ std::string Text(const char* format, ...) {
   std::vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
   return text;
+}
+
+// Of the skin's sqrt(R t) in that of the shipped cylinder.
+double LengthUnit(const LinkModel& model) {
+  const double radius = model.PointAtDepth(0, model.length_mm / 2, 0).head<2>().norm();
+  return std::sqrt(radius * model.thickness_mm) / kCylinderMm;
+}
+
+double WidestRingsMm(const LinkModel& model) {
+  double widest_mm = 0;
+  const auto& rings = model.markers.rings_z_mm;
+  for (size_t i = 1; i < rings.size(); ++i) widest_mm = std::max(widest_mm, rings[i] - rings[i - 1]);
+  return widest_mm;
 }
 
 // Toward the axis from the inflated skin, of the marker that went furthest.
@@ -125,13 +143,31 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
         {ReasonId::kBeyondMarkers,
          "a contact lies between a clamped end and the first ring of markers: how strong it is "
          "and where, the markers hardly show"});
+  if (const double apart_mm = WidestRingsMm(evidence.model),
+      decay_mm = kCylinderMm * LengthUnit(evidence.model);
+      apart_mm > kWidestRings * decay_mm)
+    state.reasons.push_back(
+        {ReasonId::kSparseMarkers, Text("rings of markers are %.0f mm apart, but a dent on this skin decays "
+                                        "within %.1f mm: loads may hide "
+                                        "between markers",
+                                        apart_mm, decay_mm)});
   if (MostLeftOut(evidence.model, state.shape) >= kLeftOutTogether)
     state.reasons.push_back(
         {ReasonId::kLabels,
          "neighboring markers were left out because they contradict the others; clean the "
          "cameras' view, or calibrate again"});
-  const double radius = evidence.model.PointAtDepth(0, evidence.model.length_mm / 2, 0).head<2>().norm();
-  const double unit = std::sqrt(radius * evidence.model.thickness_mm) / 11.8;
+  const double unit = LengthUnit(evidence.model);
+  if (state.forces.model == ForceModel::kLiteral)
+    state.reasons.push_back(
+        {ReasonId::kForceModel,
+         "forces are stiffness times displacements, as the thesis has them: for comparison "
+         "only; choose the force model auto"});
+  if (evidence.estimate.first_order_mm > kFirstOrderMm * unit)
+    state.reasons.push_back(
+        {ReasonId::kForceModel,
+         Text("the %s force model was asked for, but the skin is %.1f mm from where it holds; choose "
+              "auto",
+              Name(state.forces.model), evidence.estimate.first_order_mm)});
   if (const double dent_mm = DeepestDent(evidence); dent_mm > kDeepestDentMm * unit)
     state.reasons.push_back(
         {ReasonId::kTooDeep,

@@ -29,7 +29,7 @@ TEST_F(CommandTest, BadInputGivesOneLineAndAnExitCode) {
   ExpectRefused({"dance"}, 2, "dance");
   ExpectRefused({"solve"}, 2, "--model");
   ExpectRefused({"solve", "--model", "cylinder"}, 2, "--markers");
-  ExpectRefused({"solve", "--model", "cone", "--markers", "m.csv"}, 1, "shipped model");
+  ExpectRefused({"solve", "--model", "cube", "--markers", "m.csv"}, 1, "shipped model");
   ExpectRefused({"solve", "--model", "cylinder", "--markers", Path("none.csv")}, 1, "none.csv");
   ExpectRefused({"solve", "--model", "cylinder", "--rest", "a.png", "b.png"}, 2, "--images");
   ExpectRefused({"detect", Path("none.png")}, 1, "none.png");

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "sensing/core/link_model.h"
+#include "sensing/core/link_state.h"
+#include "sensing/pipeline/state_estimator.h"
+
+namespace taclink {
+
+/// The state of one moment from its markers' displacements alone, judged as a link's frames are. `shape` has
+/// what is measured: displacements from the baseline, with their information.
+LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, const PressurePair& pressure,
+                       SkinShape shape);
+
+}  // namespace taclink
