@@ -69,7 +69,7 @@ TEST_F(OperationsTest, CheckConfigFindsAllThatIsWrongAndStartsNothing) {
        Write("bad.yaml",
              "taclink_config: 1\nserver: {listen: '0.0.0.0:0'}\nsecurity: {tokens: no-such-tokens}\n"
              "publish: {url: 'nats://localhost', token_file: no-such-secret}\narm:\n  name: x\n  links:\n"
-             "    - {name: a, model: cone, source: simulated, scene: rest.yaml}\n"
+             "    - {name: a, model: cube, source: simulated, scene: rest.yaml}\n"
              "    - {name: b, model: cylinder, source: simulated, scene: nowhere.yaml}\n"
              "    - {name: c, model: cylinder, source: v4l2, devices: [/dev/video9990, /dev/video9991]}\n"
              "    - {name: d, model: cylinder, source: v4l2, devices: [/dev/video9990, /dev/video9992]}\n")});
@@ -78,7 +78,7 @@ TEST_F(OperationsTest, CheckConfigFindsAllThatIsWrongAndStartsNothing) {
   EXPECT_THAT(bad.err, HasSubstr("no-such-secret"));
   EXPECT_THAT(bad.err, HasSubstr("0.0.0.0"));
   EXPECT_THAT(bad.err, HasSubstr("link 'a': "));
-  EXPECT_THAT(bad.err, HasSubstr("cone"));
+  EXPECT_THAT(bad.err, HasSubstr("cube"));
   EXPECT_THAT(bad.err, HasSubstr("link 'b': "));
   EXPECT_THAT(bad.err, HasSubstr("nowhere.yaml"));
   EXPECT_THAT(bad.err, HasSubstr("/dev/video9990 is used by link 'c' already"));

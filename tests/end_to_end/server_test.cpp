@@ -241,9 +241,9 @@ TEST_F(ServerTest, BadConfigurationIsRefusedWithFileAndLine) {
       "scen: press}\n",
       "bad.yaml:5: 'arm.links[0].scen' is not a known key");
   refused(
-      "taclink_config: 1\narm:\n  name: x\n  links:\n    - {name: a, model: cone, source: simulated, scene: "
+      "taclink_config: 1\narm:\n  name: x\n  links:\n    - {name: a, model: cube, source: simulated, scene: "
       "press}\n",
-      "cone");
+      "cube");
   EXPECT_EQ(RunToEnd({TACLINKD, "--no-such-option"}).exit_code, 2);
   const Finished open = RunToEnd({TACLINKD, "--listen", "0.0.0.0:0"});
   EXPECT_EQ(open.exit_code, 1);

@@ -61,11 +61,11 @@ TEST_F(VisionBenchTest, ResultsDoNotDependOnWhatWasPlayedBefore) {
 
 TEST_F(VisionBenchTest, ASceneWithoutItsModelIsRefused) {
   EvaluationScene scene = GenerateScene(models_, "rest-cylinder-1", 1).value();
-  scene.model = "cone";
+  scene.model = "cube";
   const auto outcomes =
       RunVisionBench(models_, {scene}, {.methods = {kThesis}, .progress = {}, .on_frame = {}});
   ASSERT_FALSE(outcomes.ok());
-  EXPECT_NE(outcomes.error().message.find("cone"), std::string::npos);
+  EXPECT_NE(outcomes.error().message.find("cube"), std::string::npos);
 }
 
 TEST(TruthRefinement, IsFinerThanAnyEstimate) {

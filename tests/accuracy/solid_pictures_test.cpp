@@ -1,0 +1,200 @@
+// The whole way from pictures to forces against three-dimensional solids: pictures of their markers, by
+// cameras that sit elsewhere than the model says and blur more than the renderer's default.
+// TACLINK_SOLIDS=NAME: the scenes whose name begins so, and all of them for "" (the test takes those that
+// were kept out of tuning).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <opencv2/core.hpp>
+
+#include "sensing/core/clock.h"
+#include "sensing/pipeline/link_pipeline.h"
+#include "sensing/simulation/renderer.h"
+#include "tests/accuracy/solid_judge.h"
+#include "tests/accuracy/solid_scenes.h"
+
+namespace taclink {
+namespace {
+
+constexpr int kRestFrames = 4, kWayFrames = 5, kHeldFrames = 3;
+constexpr double kRmsMm = 0.15, kWorstMm = 3;
+
+// The skin between its markers is straight; its normals are those of their neighbors.
+class SolidWriter {
+ public:
+  explicit SolidWriter(const LinkModel& model) : model_(model) {}
+
+  void Write(const std::vector<Vec3>& displacements_mm, SkinTruth& truth) {
+    const auto count = static_cast<size_t>(model_.markers.count());
+    truth.marker_mm.resize(count);
+    truth.marker_wall_mm.resize(count);
+    truth.marker_normal.resize(count);
+    for (int m = 0; m < model_.markers.count(); ++m)
+      truth.marker_mm[static_cast<size_t>(m)] =
+          model_.RestMarker(m) + displacements_mm[static_cast<size_t>(m)];
+    const double dome_mm = model_.markers.center_depth_mm - model_.thickness_mm;
+    for (int m = 0; m < model_.markers.count(); ++m) {
+      const auto i = static_cast<size_t>(m);
+      truth.marker_normal[i] = Normal(truth, m);
+      truth.marker_wall_mm[i] = truth.marker_mm[i] + dome_mm * truth.marker_normal[i];
+    }
+    WriteWall(truth);
+  }
+
+ private:
+  // Of a neighbor; beyond the first and the last ring, of the clamped end.
+  Vec3 At(const SkinTruth& truth, int path, int ring) const {
+    const int paths = model_.markers.paths, rings = model_.markers.rings();
+    path = (path + paths) % paths;
+    if (ring >= 0 && ring < rings)
+      return truth.marker_mm[static_cast<size_t>(model_.MarkerIndex(path, ring))];
+    const double angle = model_.markers.first_path_angle_rad + path * model_.markers.path_pitch_rad();
+    return model_.PointAtDepth(angle, ring < 0 ? 0 : model_.length_mm, model_.markers.center_depth_mm);
+  }
+  Vec3 Normal(const SkinTruth& truth, int marker) const {
+    const int path = model_.PathOf(marker), ring = model_.RingOf(marker);
+    const Vec3 around = At(truth, path + 1, ring) - At(truth, path - 1, ring);
+    const Vec3 along = At(truth, path, ring + 1) - At(truth, path, ring - 1);
+    return around.cross(along).normalized();
+  }
+  void WriteWall(SkinTruth& truth) const {
+    RadiusGrid& wall = truth.inner_wall;
+    const int paths = model_.markers.paths, rows = model_.markers.rings() + 2;
+    wall.columns = paths;
+    wall.first_angle_rad = model_.markers.first_path_angle_rad;
+    wall.z_mm.assign(1, 0);
+    wall.z_mm.insert(wall.z_mm.end(), model_.markers.rings_z_mm.begin(), model_.markers.rings_z_mm.end());
+    wall.z_mm.push_back(model_.length_mm);
+    wall.radius_mm.assign(static_cast<size_t>(rows * paths), 0);
+    wall.row_min_mm.assign(static_cast<size_t>(rows), 1e9);
+    wall.largest_inward_change_mm = 0;
+    for (int row = 0; row < rows; ++row) {
+      const auto r = static_cast<size_t>(row);
+      const double rest = model_.PointAtDepth(0, wall.z_mm[r], model_.thickness_mm).head<2>().norm();
+      for (int path = 0; path < paths; ++path) {
+        double& radius = wall.radius_mm[static_cast<size_t>(row * paths + path)];
+        const bool clamped = row == 0 || row == rows - 1;
+        const auto marker = clamped ? 0 : static_cast<size_t>(model_.MarkerIndex(path, row - 1));
+        radius = clamped ? rest : truth.marker_wall_mm[marker].head<2>().norm();
+        wall.row_min_mm[r] = std::min(wall.row_min_mm[r], radius);
+        wall.largest_inward_change_mm = std::max(wall.largest_inward_change_mm, rest - radius);
+      }
+    }
+  }
+
+  const LinkModel& model_;
+};
+
+CameraEffects OtherCameras() {
+  CameraEffects effects;
+  effects.blur_px = 1.1;
+  effects.exposure = 0.85;
+  effects.mount[Index(CameraId::kTop)] = {.shift_mm = {0.4, -0.3, 0.5}, .turn_rad = {0.006, 0.004, -0.01}};
+  effects.mount[Index(CameraId::kBottom)] = {.shift_mm = {-0.3, 0.5, -0.4},
+                                             .turn_rad = {-0.005, 0.007, 0.012}};
+  return effects;
+}
+
+// A link that sees solids.
+class SolidLink {
+ public:
+  SolidLink() {
+    PipelineOptions options;
+    options.rest_frames = kRestFrames;
+    pipeline_ = std::make_unique<LinkPipeline>(model_, options);
+  }
+
+  // Rest, a few frames on the way, and the scene for some: the state of the last frame.
+  const LinkState& Show(const SolidScene& scene) {
+    for (int k = 0; k < kRestFrames; ++k) Process(scene.baseline_mm, scene.baseline_kpa);
+    std::vector<Vec3> between(scene.markers_mm.size());
+    for (int k = 1; k <= kWayFrames + kHeldFrames; ++k) {
+      const double share = std::min(1.0, static_cast<double>(k) / kWayFrames);
+      for (size_t m = 0; m < between.size(); ++m)
+        between[m] = scene.baseline_mm[m] + share * (scene.markers_mm[m] - scene.baseline_mm[m]);
+      Process(between, scene.baseline_kpa + share * (scene.pressure_kpa - scene.baseline_kpa));
+    }
+    return state_;
+  }
+
+ private:
+  void Process(const std::vector<Vec3>& displacements_mm, double kpa) {
+    writer_.Write(displacements_mm, truth_);
+    truth_.frame = ++frame_.sequence;
+    truth_.pressure_mpa = 1e-3 * kpa;
+    for (const CameraId id : kBothCameras) {
+      renderer_.Render(truth_, id, gray_);
+      PackYuyv(gray_, renderer_.chroma(id), frame_.images[Index(id)]);
+    }
+    frame_.pressure_mpa = truth_.pressure_mpa;
+    pipeline_->Process(frame_, state_);
+  }
+
+  const LinkModel model_ = SolidSkin();
+  const CameraEffects effects_ = OtherCameras();
+  const Renderer renderer_{model_, MountedRig(model_.nominal_rig, effects_), effects_, 7};
+  SolidWriter writer_{model_};
+  std::unique_ptr<LinkPipeline> pipeline_;
+  SkinTruth truth_;
+  StereoFrame frame_;
+  cv::Mat gray_;
+  LinkState state_;
+};
+
+struct Shape {
+  double rms_mm = 0, worst_mm = 0;
+};
+
+Shape ShapeOf(const SolidScene& scene, const LinkModel& model, const LinkState& state) {
+  Shape shape;
+  for (int m = 0; m < model.markers.count(); ++m) {
+    const auto i = static_cast<size_t>(m);
+    const double off = (state.shape.positions_mm[i] - model.RestMarker(m) - scene.markers_mm[i]).norm();
+    shape.rms_mm += off * off / model.markers.count();
+    shape.worst_mm = std::max(shape.worst_mm, off);
+  }
+  shape.rms_mm = std::sqrt(shape.rms_mm);
+  return shape;
+}
+
+TEST(SolidPictures, ForcesHold) {
+  const char* only = std::getenv("TACLINK_SOLIDS");
+  const LinkModel model = SolidSkin();
+  int all = 0, held = 0, said = 0, silent = 0, near = 0, close = 0, ok = 0;
+  for (const SolidScene& scene : ReadSolidScenes()) {
+    if (only == nullptr ? !scene.held_out : !scene.name.starts_with(only)) continue;
+    SolidLink link;
+    const LinkState& state = link.Show(scene);
+    ++all;
+    const std::string fault = state.measured() ? FaultOf(scene, state.contacts) : "no answer";
+    const bool is_ok = state.status == LinkStatus::kOk;
+    held += fault.empty();
+    said += !fault.empty() && !is_ok;
+    silent += !fault.empty() && is_ok;
+    Shape shape;
+    if (is_ok) {
+      shape = ShapeOf(scene, model, state);
+      ++ok;
+      near += shape.rms_mm <= kRmsMm;
+      close += shape.worst_mm <= kWorstMm;
+    }
+    if (!fault.empty() || only != nullptr || shape.worst_mm > kWorstMm)
+      std::printf("  %s: %s; %s; markers %.3f mm RMS, %.2f mm at most; %d seen\n", scene.name.c_str(),
+                  fault.empty() ? "holds" : fault.c_str(), is_ok ? "ok" : state.status_reason.c_str(),
+                  shape.rms_mm, shape.worst_mm, state.shape.seen());
+  }
+  std::printf(
+      "pictures: %d of %d hold, %d more say that they don't, %d don't; of %d that are ok, %d within %.2f mm "
+      "RMS, "
+      "%d within %.0f mm\n",
+      held, all, said, silent, ok, near, kRmsMm, close, kWorstMm);
+  ASSERT_GT(all, 0) << "tests/accuracy/calculix has no scenes";
+  EXPECT_GE(held, 0.8 * all);
+  EXPECT_GE(close, 0.95 * ok);
+}
+
+}  // namespace
+}  // namespace taclink
