@@ -191,7 +191,7 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const Problem& problem, SkinEst
   if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
   estimate.model = linear ? ForceModel::kLinear : ForceModel::kPressurised;
   if (IsFirstOrder()) {
-    estimate.first_order_mm = LongestOff(estimate.state.mids_mm, about.mids_mm);
+    estimate.first_order_mm = LongestOff(problem.inflated.state.mids_mm, about.mids_mm);
     return true;
   }
   if (estimate.loads.loads.empty()) {

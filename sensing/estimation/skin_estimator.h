@@ -43,7 +43,8 @@ struct SkinEstimate {
   Eigen::VectorXd inflated_mm;       ///< of the model's markers under this pressure without loads
   LoadEstimate loads;
   double pressure_mpa = 0;  ///< with the estimated error taken off
-  /// The longest way of a point of the skin from where a first-order model that was asked for holds; else 0.
+  /// The longest way of a point of the skin under this pressure, without loads, from where a first-order
+  /// model that was asked for begins; else 0.
   double first_order_mm = 0;
   int assimilation_steps = 0, tangents = 0, steps = 0;
 };

@@ -164,10 +164,10 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
          "only; choose the force model auto"});
   if (evidence.estimate.first_order_mm > kFirstOrderMm * unit)
     state.reasons.push_back(
-        {ReasonId::kForceModel,
-         Text("the %s force model was asked for, but the skin is %.1f mm from where it holds; choose "
-              "auto",
-              Name(state.forces.model), evidence.estimate.first_order_mm)});
+        {ReasonId::kForceModel, Text("the %s force model was asked for, but pressure moves the skin %.1f mm "
+                                     "from where it holds; choose "
+                                     "auto",
+                                     Name(state.forces.model), evidence.estimate.first_order_mm)});
   if (const double dent_mm = DeepestDent(evidence); dent_mm > kDeepestDentMm * unit)
     state.reasons.push_back(
         {ReasonId::kTooDeep,
