@@ -107,20 +107,33 @@ class SolidLink {
     pipeline_ = std::make_unique<LinkPipeline>(model_, options);
   }
 
-  // Rest, a few frames on the way, and the scene for some: the state of the last frame.
+  // The cameras are calibrated on the slack skin, which is tared where the baseline is another one; a few
+  // frames on the way, and the scene for some: the state of the last frame.
   const LinkState& Show(const SolidScene& scene) {
-    for (int k = 0; k < kRestFrames; ++k) Process(scene.baseline_mm, scene.baseline_kpa);
-    std::vector<Vec3> between(scene.markers_mm.size());
-    for (int k = 1; k <= kWayFrames + kHeldFrames; ++k) {
-      const double share = std::min(1.0, static_cast<double>(k) / kWayFrames);
-      for (size_t m = 0; m < between.size(); ++m)
-        between[m] = scene.baseline_mm[m] + share * (scene.markers_mm[m] - scene.baseline_mm[m]);
-      Process(between, scene.baseline_kpa + share * (scene.pressure_kpa - scene.baseline_kpa));
+    const std::vector<Vec3> slack(scene.markers_mm.size(), Vec3::Zero());
+    for (int k = 0; k < kRestFrames; ++k) Process(slack, 0);
+    if (scene.baseline_kpa > 0) {
+      Go(slack, 0, scene.baseline_mm, scene.baseline_kpa);
+      const TareOptions tare{.frames = kHeldFrames};
+      if (pipeline_->BeginTare(tare)) {
+        for (int k = 0; k < tare.frames; ++k) Process(scene.baseline_mm, scene.baseline_kpa);
+        if (const auto end = pipeline_->TakeTareEnd(); end && !*end) tare_trouble_ = end->error().message;
+      }
     }
+    Go(scene.baseline_mm, scene.baseline_kpa, scene.markers_mm, scene.pressure_kpa);
     return state_;
   }
+  const std::string& tare_trouble() const { return tare_trouble_; }
 
  private:
+  void Go(const std::vector<Vec3>& from_mm, double from_kpa, const std::vector<Vec3>& to_mm, double to_kpa) {
+    std::vector<Vec3> between(from_mm.size());
+    for (int k = 1; k <= kWayFrames + kHeldFrames; ++k) {
+      const double share = std::min(1.0, static_cast<double>(k) / kWayFrames);
+      for (size_t m = 0; m < between.size(); ++m) between[m] = from_mm[m] + share * (to_mm[m] - from_mm[m]);
+      Process(between, from_kpa + share * (to_kpa - from_kpa));
+    }
+  }
   void Process(const std::vector<Vec3>& displacements_mm, double kpa) {
     writer_.Write(displacements_mm, truth_);
     truth_.frame = ++frame_.sequence;
@@ -142,6 +155,7 @@ class SolidLink {
   StereoFrame frame_;
   cv::Mat gray_;
   LinkState state_;
+  std::string tare_trouble_;
 };
 
 struct Shape {
@@ -182,9 +196,9 @@ TEST(SolidPictures, ForcesHold) {
       close += shape.worst_mm <= kWorstMm;
     }
     if (!fault.empty() || only != nullptr || shape.worst_mm > kWorstMm)
-      std::printf("  %s: %s; %s; markers %.3f mm RMS, %.2f mm at most; %d seen\n", scene.name.c_str(),
+      std::printf("  %s: %s; %s%s; markers %.3f mm RMS, %.2f mm at most; %d seen\n", scene.name.c_str(),
                   fault.empty() ? "holds" : fault.c_str(), is_ok ? "ok" : state.status_reason.c_str(),
-                  shape.rms_mm, shape.worst_mm, state.shape.seen());
+                  link.tare_trouble().c_str(), shape.rms_mm, shape.worst_mm, state.shape.seen());
   }
   std::printf(
       "pictures: %d of %d hold, %d more say that they don't, %d don't; of %d that are ok, %d within %.2f mm "
