@@ -10,8 +10,8 @@
 
 namespace taclink {
 
-/// Loads a link model: the name of a shipped one ("cylinder", "barrel", "cone", ...) or a path of a YAML file.
-/// Errors: kNotFound (names the shipped ones), kInvalidArgument (file, line, what was expected).
+/// Loads a link model: the name of a shipped one ("cylinder", "barrel", "cone", ...) or a path of a YAML
+/// file. Errors: kNotFound (names the shipped ones), kInvalidArgument (file, line, what was expected).
 Result<LinkModel> LoadLinkModel(const std::string& name_or_path);
 
 /// Parses a model file's text; `name` stands for the file in messages.
