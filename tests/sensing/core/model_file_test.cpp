@@ -26,7 +26,12 @@ std::string Cylinder() {
 }
 
 TEST(ModelFile, ShippedModelsLoad) {
-  EXPECT_THAT(ShippedModelNames(), testing::UnorderedElementsAre("cylinder", "barrel"));
+  EXPECT_THAT(ShippedModelNames(),
+              testing::UnorderedElementsAre("cylinder", "barrel", "third", "triple", "cone", "bottle"));
+  for (const std::string_view name : ShippedModelNames()) {
+    const auto model = LoadLinkModel(std::string(name));
+    EXPECT_TRUE(model.ok()) << model.error().message;
+  }
   const auto cylinder = LoadLinkModel("cylinder");
   ASSERT_TRUE(cylinder.ok()) << cylinder.error().message;
   EXPECT_EQ(cylinder->markers.count(), 240);
