@@ -92,6 +92,23 @@ Eigen::MatrixXd Linearization::CoupleColumns(const Eigen::VectorXd& shares) cons
   return columns;
 }
 
+// (J K^-1 B)' = B' K^-1 J'.
+std::array<Eigen::VectorXd, 3> Linearization::PulledAtSites(const Eigen::VectorXd& at_markers) {
+  factor_.Solve(jacobian_.transpose() * at_markers, motion_);
+  std::array<Eigen::VectorXd, 3> pulled;
+  for (auto& part : pulled) part.resize(mechanics_.site_count());
+  for (int site = 0; site < mechanics_.site_count(); ++site) {
+    const int node = mechanics_.NodeOfSite(site), dof = mechanics_.shell().Dof(node, 0);
+    const Mat3& frame = frames_[static_cast<size_t>(site)];
+    const auto move = motion_.segment<3>(dof);
+    const auto turn = motion_.segment<2>(dof + 3);
+    pulled[0][site] = frame.col(0).dot(move);
+    for (int k = 1; k < 3; ++k)
+      pulled[static_cast<size_t>(k)][site] = frame.col(k).dot(move) + Moment(node, frame.col(k)).dot(turn);
+  }
+  return pulled;
+}
+
 bool Linearization::At(const ShellState& state, double pressure_mpa) {
   const NonlinearShell& shell = mechanics_.shell();
   is_made_ = false;

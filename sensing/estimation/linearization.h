@@ -41,6 +41,10 @@ class Linearization {
   /// shares; mm, stacked.
   Eigen::MatrixXd CoupleColumns(const Eigen::VectorXd& shares) const;
 
+  /// The transposes of columns() times forces on the markers (3 each, stacked), in one solution instead of
+  /// three large products.
+  std::array<Eigen::VectorXd, 3> PulledAtSites(const Eigen::VectorXd& at_markers);
+
   /// What acts on the skin, by site, in the site's frame: forces inward, around and along, couples about
   /// around and along.
   struct SiteLoads {

@@ -66,9 +66,12 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   }
   factor_ = covariance_mm2_;
   if (!dense::Cholesky(factor_)) return false;
+  whitened_pressure_ = by_pressure_;
+  dense::SolveLower(factor_, whitened_pressure_);
   SpreadColumns(skin.columns()[0]);
   hidden_.resize(0, 0);
   dense::SolveLower(factor_, columns_);
+  single_columns_ = columns_.cast<float>();
   dense::Gram(columns_, gram_);
   gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
   regions_.clear();
@@ -197,7 +200,9 @@ void LoadEstimator::ShareBands(const Eigen::VectorXd& loads, const std::vector<i
 std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
   const int sites = mechanics_.site_count(), around = mechanics_.columns();
   const double unit = mechanics_.force_unit();
-  target_.noalias() = columns_.transpose() * frame_data_;
+  Eigen::VectorXf target(columns_.cols());
+  dense::TransposedProduct(single_columns_, frame_data_.cast<float>(), target);
+  target_ = target.cast<double>();
   norms_ = frame_gram_->diagonal().cwiseMax(0).cwiseSqrt();
   Eigen::VectorXd sorted = norms_.head(sites);
   std::nth_element(sorted.data(), sorted.data() + sites / 2, sorted.data() + sites);
@@ -392,7 +397,8 @@ void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<HillFin
   slipping.clear();
   tangential.resize(data_.size(), 0);
   solution = Refit(sites, tangential);
-  std::vector<Eigen::MatrixXd> columns;
+  std::vector<Eigen::MatrixXd>& columns = tangential_columns_;
+  columns.clear();
   for (const auto& hill : hills) columns.push_back(TangentialColumns(skin, hill));
   left_out_.assign(hills.size(), {});
   while (slipping.size() < hills.size()) {
@@ -413,8 +419,7 @@ void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<HillFin
   }
 }
 
-void LoadEstimator::Fit(const Linearization& skin, const MarkerObservations& observed,
-                        LoadEstimate& estimate) {
+void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed, LoadEstimate& estimate) {
   estimate = {};
   Eigen::MatrixXd data(factor_.rows(), 1);
   for (int m = 0; m < mechanics_.marker_count(); ++m) {

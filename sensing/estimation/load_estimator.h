@@ -67,7 +67,7 @@ class LoadEstimator {
 
   /// After Prepare. The linearization may have been rebased. Covariances and what is left unexplained are not
   /// written.
-  void Fit(const Linearization& skin, const MarkerObservations& observed, LoadEstimate& estimate);
+  void Fit(Linearization& skin, const MarkerObservations& observed, LoadEstimate& estimate);
   /// Writes these for what was fitted last.
   void Conclude(const Linearization& skin, LoadEstimate& estimate);
 
@@ -109,11 +109,11 @@ class LoadEstimator {
                                               const Eigen::MatrixXd& tangential,
                                               const Solution& solution) const;
   void ProjectOut(const Eigen::MatrixXd& tangential);
-  void Finish(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
+  void Finish(Linearization& skin, const std::vector<HillFinder::Hill>& hills,
               const std::vector<int>& slipping, LoadEstimate& estimate);
   void WriteLoad(const Linearization& skin, const HillFinder::Hill& hill, EstimatedLoad& load) const;
   void WriteCovariances(const Linearization& skin, LoadEstimate& estimate);
-  void WriteStray(const Linearization& skin, LoadEstimate& estimate);
+  void WriteStray(Linearization& skin, LoadEstimate& estimate);
   double WorstRegion(const Eigen::VectorXd& residual);
 
   const SkinMechanics& mechanics_;
@@ -126,8 +126,10 @@ class LoadEstimator {
   std::vector<Mat3> noise_mm2_, model_covariance_;
   Eigen::MatrixXd covariance_mm2_, factor_;
   Eigen::VectorXd by_pressure_;  // stacked, of one standard deviation
+  Eigen::MatrixXd whitened_pressure_;
   double pressure_sigma_ = 0;
   Eigen::MatrixXd columns_, gram_;
+  Eigen::MatrixXf single_columns_;  // for what all of them pull at, which is bound by memory
   struct Region {
     std::vector<int> rows;
     Eigen::LLT<Eigen::MatrixXd> factor;
@@ -145,7 +147,9 @@ class LoadEstimator {
   Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
   std::vector<char> is_shown_;  // by row
   Solution solution_;
-  std::vector<TangentialGain> left_out_;  // by hill: of those that were not let in
+  std::vector<TangentialGain> left_out_;             // by hill: of those that were not let in
+  std::vector<Eigen::MatrixXd> tangential_columns_;  // by hill
+  std::vector<size_t> hill_of_load_;                 // by load of the estimate
 };
 
 }  // namespace taclink

@@ -16,9 +16,10 @@ constexpr double kCenterShare = 0.25;  // of a site's spacing: what the grid of 
 
 }  // namespace
 
-void LoadEstimator::Finish(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
+void LoadEstimator::Finish(Linearization& skin, const std::vector<HillFinder::Hill>& hills,
                            const std::vector<int>& slipping, LoadEstimate& estimate) {
   Eigen::Index at = 0;
+  hill_of_load_.clear();
   for (size_t i = 0; i < hills.size(); ++i) {
     EstimatedLoad load;
     double sum = 0;
@@ -41,6 +42,7 @@ void LoadEstimator::Finish(const Linearization& skin, const std::vector<HillFind
     if (load.normal_force_n <= 0) continue;
     WriteLoad(skin, hills[i], load);
     estimate.loads.push_back(std::move(load));
+    hill_of_load_.push_back(i);
   }
   WriteStray(skin, estimate);
 }
@@ -73,11 +75,12 @@ void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill&
   load.center = Vec2(origin, 0) + center / load.normal_force_n;
 }
 
-void LoadEstimator::WriteStray(const Linearization& skin, LoadEstimate& estimate) {
+void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
   // Of the whitened residual, what it pulls at each marker.
   Eigen::MatrixXd pulls = solution_.residual;
   dense::SolveLowerTransposed(factor_, pulls);
   const Eigen::VectorXd stacked = pulls.col(0);
+  const std::array<Eigen::VectorXd, 3> pulled = skin.PulledAtSites(stacked);
   std::array<Eigen::VectorXd, 3> contacts;
   std::array<Eigen::VectorXd, 2> couples;
   for (auto& part : contacts) part.setZero(mechanics_.site_count());
@@ -97,8 +100,7 @@ void LoadEstimator::WriteStray(const Linearization& skin, LoadEstimate& estimate
   for (size_t i = 0; i < 2; ++i) all.couples_nmm[i] = mechanics_.spread() * couples[i];
   for (size_t k = 0; k < 3; ++k) {
     all.forces_n[k] = mechanics_.spread() * contacts[k];
-    all.forces_n[k].array() += covariance_.stray_sigmas_n()[k].array().square() *
-                               (skin.columns()[k].transpose() * stacked.cast<float>()).cast<double>().array();
+    all.forces_n[k].array() += covariance_.stray_sigmas_n()[k].array().square() * pulled[k].array();
   }
   estimate.pressure_error_mpa = pressure_sigma_ * by_pressure_.dot(stacked);
 }
@@ -131,15 +133,15 @@ void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& es
       for (const Eigen::Index column : {5 * i, 5 * i + 3, 5 * i + 4})
         design.col(column) -= hidden_ * (hidden_.transpose() * design.col(column));
     }
-    design.middleCols<2>(5 * i + 1) = TangentialColumns(skin, load.sites).leftCols<2>();
+    design.middleCols<2>(5 * i + 1) =
+        tangential_columns_[hill_of_load_[static_cast<size_t>(i)]].leftCols<2>();
     const double sigma =
         load.has_tangential ? kTangentialN * mechanics_.force_unit() : kStillTangential * load.normal_force_n;
     prior.segment<2>(5 * i + 1).setConstant(1 / (sigma * sigma));
     prior.segment<2>(5 * i + 3).setConstant(0.04);  // five sites
   }
   // The pressure is in the covariance already: its column is that of the prior, its information the data's.
-  Eigen::MatrixXd pressure = by_pressure_;
-  dense::SolveLower(factor_, pressure);
+  Eigen::VectorXd pressure = whitened_pressure_;
   if (hidden_.cols() > 0) pressure -= hidden_ * (hidden_.transpose() * pressure);
   const double told = pressure.squaredNorm();
   estimate.pressure_sigma_mpa = pressure_sigma_ * std::sqrt(std::max(0.0, 1 - told));

@@ -19,7 +19,8 @@ constexpr double kSameLocal = 0.5;       // of the local forces: the model's err
 constexpr double kLittleLocalN = 0.05;
 constexpr double kModelPressureShare = 0.01;  // of the pressure: what the model's inflation is wrong by
 constexpr double kNoiseDeviations = 2;        // of a spring's pull, that noise alone makes
-constexpr double kStillMarkerChi2 = 12, kStillSumChi2 = 9;  // below what any load has to explain
+// Below what any load has to explain (kHillGain of LoadEstimator): 3 x 3 markers show two thirds of a load.
+constexpr double kStillMarkerChi2 = 20, kStillSumChi2 = 12;
 constexpr double kLeastPressureSigma =
     1e-3;  // of the steps in which the skin is inflated: a prior is no certainty
 constexpr int kMostSteps = 8, kMostTangents = 3;

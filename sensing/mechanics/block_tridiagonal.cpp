@@ -9,14 +9,14 @@ namespace taclink {
 
 BlockTridiagonal::BlockTridiagonal(Eigen::Index block, Eigen::Index blocks)
     : block_(block),
-      inverse_(static_cast<size_t>(blocks), Eigen::MatrixXd(block, block)),
-      below_(static_cast<size_t>(blocks), Eigen::MatrixXd(block, block)) {}
+      inverse_(static_cast<size_t>(blocks), Eigen::MatrixXf(block, block)),
+      below_(static_cast<size_t>(blocks), Eigen::MatrixXf(block, block)) {}
 
 bool BlockTridiagonal::Factorise(const Eigen::SparseMatrix<double>& lower) {
   assert(lower.cols() == block_ * static_cast<Eigen::Index>(inverse_.size()));
   Eigen::MatrixXd off(block_, block_), next_off(block_, block_);  // B_i, B_(i+1)
+  Eigen::MatrixXd diagonal(block_, block_), before(block_, block_), below(block_, block_);
   for (size_t i = 0; i < inverse_.size(); ++i) {
-    Eigen::MatrixXd& diagonal = inverse_[i];
     diagonal.setZero();
     next_off.setZero();
     const Eigen::Index first = static_cast<Eigen::Index>(i) * block_;
@@ -29,11 +29,14 @@ bool BlockTridiagonal::Factorise(const Eigen::SparseMatrix<double>& lower) {
     }
     diagonal.triangularView<Eigen::StrictlyUpper>() = diagonal.transpose();
     if (i > 0) {
-      below_[i].setZero();
-      dense::AddProduct(1, off, inverse_[i - 1], false, below_[i]);
-      dense::AddProduct(-1, below_[i], off, true, diagonal);
+      below.setZero();
+      dense::AddProduct(1, off, before, false, below);
+      dense::AddProduct(-1, below, off, true, diagonal);
+      below_[i] = below.cast<float>();
     }
     if (!dense::InvertSymmetric(diagonal)) return false;
+    inverse_[i] = diagonal.cast<float>();
+    std::swap(diagonal, before);
     std::swap(off, next_off);
   }
   return true;
@@ -41,13 +44,20 @@ bool BlockTridiagonal::Factorise(const Eigen::SparseMatrix<double>& lower) {
 
 void BlockTridiagonal::Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const {
   assert(rhs.size() == block_ * static_cast<Eigen::Index>(inverse_.size()));
-  x = rhs;
-  const auto part = [&](size_t i) { return x.segment(static_cast<Eigen::Index>(i) * block_, block_); };
-  for (size_t i = 1; i < inverse_.size(); ++i) part(i).noalias() -= below_[i] * part(i - 1);
-  for (size_t i = inverse_.size(); i-- > 0;) {
-    part(i) = inverse_[i] * part(i);
-    if (i + 1 < inverse_.size()) part(i).noalias() -= below_[i + 1].transpose() * part(i + 1);
+  Eigen::VectorXf all = rhs.cast<float>(), product(block_);
+  const auto part = [&](size_t i) { return all.segment(static_cast<Eigen::Index>(i) * block_, block_); };
+  for (size_t i = 1; i < inverse_.size(); ++i) {
+    dense::Product(below_[i], part(i - 1), product);
+    part(i) -= product;
   }
+  for (size_t i = inverse_.size(); i-- > 0;) {
+    dense::Product(inverse_[i], part(i), product);
+    part(i) = product;
+    if (i + 1 == inverse_.size()) continue;
+    dense::TransposedProduct(below_[i + 1], part(i + 1), product);
+    part(i) -= product;
+  }
+  x = all.cast<double>();
 }
 
 void BlockTridiagonal::SolveRows(Eigen::MatrixXf& rhs, const std::vector<Eigen::Index>& filled,
@@ -58,18 +68,14 @@ void BlockTridiagonal::SolveRows(Eigen::MatrixXf& rhs, const std::vector<Eigen::
   const auto part = [&](Eigen::MatrixXf& all, size_t i, Eigen::Index rows) {
     return all.block(0, static_cast<Eigen::Index>(i) * block_, rows, block_);
   };
-  Eigen::MatrixXf single;
   for (size_t i = 1; i < filled.size(); ++i) {
-    single = below_[i].cast<float>();
-    dense::AddProduct(-1.0F, part(rhs, i - 1, filled[i - 1]), single, true, part(rhs, i, filled[i - 1]));
+    dense::AddProduct(-1.0F, part(rhs, i - 1, filled[i - 1]), below_[i], true, part(rhs, i, filled[i - 1]));
   }
   for (size_t i = filled.size(); i-- > 0;) {
     part(x, i, rhs.rows()).setZero();
-    single = inverse_[i].cast<float>();
-    dense::AddProduct(1.0F, part(rhs, i, filled[i]), single, false, part(x, i, filled[i]));
+    dense::AddProduct(1.0F, part(rhs, i, filled[i]), inverse_[i], false, part(x, i, filled[i]));
     if (i + 1 == filled.size()) continue;
-    single = below_[i + 1].cast<float>();
-    dense::AddProduct(-1.0F, part(x, i + 1, rhs.rows()), single, false, part(x, i, rhs.rows()));
+    dense::AddProduct(-1.0F, part(x, i + 1, rhs.rows()), below_[i + 1], false, part(x, i, rhs.rows()));
   }
 }
 

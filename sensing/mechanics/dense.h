@@ -24,6 +24,11 @@ void AddProduct(float scale, const Eigen::Ref<const Eigen::MatrixXf>& a,
                 const Eigen::Ref<const Eigen::MatrixXf>& b, bool transpose_b, Eigen::Ref<Eigen::MatrixXf> c);
 /// The inverse of a symmetric matrix, which need not be definite, in its place. False: singular.
 bool InvertSymmetric(Eigen::MatrixXd& a);
+/// y := a x, or a^T x.
+void Product(const Eigen::MatrixXf& a, const Eigen::Ref<const Eigen::VectorXf>& x,
+             Eigen::Ref<Eigen::VectorXf> y);
+void TransposedProduct(const Eigen::MatrixXf& a, const Eigen::Ref<const Eigen::VectorXf>& x,
+                       Eigen::Ref<Eigen::VectorXf> y);
 /// c := a^T b.
 void TransposedProduct(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, Eigen::MatrixXd& c);
 /// Lower half of c := a^T a.

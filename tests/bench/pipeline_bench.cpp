@@ -22,9 +22,9 @@ namespace {
 
 constexpr double kRestS = 0, kTouchedS = 3;
 
-Scene LinearPress() {
+Scene NonlinearPress() {
   Scene scene = LoadScene("press").value();
-  scene.skin = SkinKind::kLinear;
+  scene.skin = SkinKind::kNonlinear;
   return scene;
 }
 
@@ -32,7 +32,7 @@ Scene LinearPress() {
 struct Bench {
   explicit Bench(const std::string& model_name)
       : model(LoadLinkModel(model_name).value()),
-        scene(LinearPress()),
+        scene(NonlinearPress()),
         skin(SimulatedSkin::Make(model, scene).value()),
         renderer(model, model.nominal_rig, scene.camera, 1) {
     cv::setNumThreads(1);

@@ -119,6 +119,20 @@ TEST_F(Dense, TransposedProductIsEigens) {
   ExpectClose(c, a.transpose() * b);
 }
 
+TEST_F(Dense, ProductsWithAVectorAreEigens) {
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 13);
+  const Eigen::VectorXd x = Eigen::VectorXd::Random(13), z = Eigen::VectorXd::Random(kRows);
+  // What the result held before does not count.
+  const Eigen::MatrixXf single = a.cast<float>();
+  Eigen::VectorXf forward = Eigen::VectorXf::Constant(kRows, std::nanf("")), back = forward.head(13);
+  dense::Product(single, x.cast<float>(), forward);
+  EXPECT_LT((forward.cast<double>() - a * x).norm(), 1e-5 * (a * x).norm());
+  dense::TransposedProduct(single, z.cast<float>(), back);
+  EXPECT_LT((back.cast<double>() - a.transpose() * z).norm(), 1e-5 * (a.transpose() * z).norm());
+  dense::Product(Eigen::MatrixXf(kRows, 0), Eigen::VectorXf(0), forward);
+  EXPECT_TRUE(forward.isZero());
+}
+
 TEST_F(Dense, AddProductIsEigensOnBlocksToo) {
   const Eigen::MatrixXd a = Eigen::MatrixXd::Random(9, 13), b = Eigen::MatrixXd::Random(13, 5);
   const Eigen::MatrixXd before = Eigen::MatrixXd::Random(20, 11);
