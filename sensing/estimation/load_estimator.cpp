@@ -47,14 +47,15 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
                             const MarkerObservations& observed, const PressurePrior& prior,
                             const Eigen::VectorXd& local_n) {
   const int markers = mechanics_.marker_count();
-  covariance_.Write(skin, inflated, local_n, covariance_mm2_);
   pressure_sigma_ = prior.sigma_mpa;
   by_pressure_ = prior.sigma_mpa * skin.by_pressure();
-  Eigen::MatrixXd common = Eigen::MatrixXd::Zero(by_pressure_.size(), 2);
-  common.col(0) = by_pressure_;
-  if (prior.baseline_mm_per_mpa.size() == common.rows())
-    common.col(1) = prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa;
-  dense::AddOuter(common, covariance_mm2_);
+  covariance_.WriteDirect(skin, inflated, covariance_mm2_);
+  if (prior.baseline_mm_per_mpa.size() == by_pressure_.size())
+    dense::AddOuter(prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa, covariance_mm2_);
+  direct_mm2_ = covariance_mm2_.cast<float>();
+  direct_mm2_.triangularView<Eigen::StrictlyUpper>() = direct_mm2_.transpose();
+  covariance_.AddStray(skin, local_n, covariance_mm2_);
+  dense::AddOuter(by_pressure_, covariance_mm2_);
   noise_mm2_.resize(static_cast<size_t>(markers));
   model_covariance_.resize(noise_mm2_.size());
   for (int m = 0; m < markers; ++m) {

@@ -33,8 +33,11 @@ struct LoadEstimate {
   std::vector<EstimatedLoad> loads;
   Linearization::SiteLoads at_sites;  ///< all of them and the stray forces
   Eigen::VectorXd contact_sizes_n;    ///< by site, of the contacts alone
-  double pressure_error_mpa = 0;      ///< true less told
-  double pressure_sigma_mpa = 0;      ///< of the corrected pressure
+  /// Where the markers are beside the equilibrium, by what they say and by how wrong the model may be; mm,
+  /// stacked. Empty: nothing was fitted.
+  Eigen::VectorXd beside_mm;
+  double pressure_error_mpa = 0;  ///< true less told
+  double pressure_sigma_mpa = 0;  ///< of the corrected pressure
   double chi2_per_dof = 0;
   double region_chi2_per_dof = 0;  ///< the largest of 3 x 3 markers
   bool converged = true;
@@ -125,6 +128,7 @@ class LoadEstimator {
   // Since Prepare. Whitened: in units of independent standard deviations.
   std::vector<Mat3> noise_mm2_, model_covariance_;
   Eigen::MatrixXd covariance_mm2_, factor_;
+  Eigen::MatrixXf direct_mm2_;   // of it, what no force and no pressure of the estimate explains
   Eigen::VectorXd by_pressure_;  // stacked, of one standard deviation
   Eigen::MatrixXd whitened_pressure_;
   double pressure_sigma_ = 0;
@@ -147,7 +151,8 @@ class LoadEstimator {
   Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
   std::vector<char> is_shown_;  // by row
   Solution solution_;
-  std::vector<TangentialGain> left_out_;             // by hill: of those that were not let in
+  Eigen::VectorXd pulls_per_mm_;          // of the residual, on each marker: covariance^-1 times it
+  std::vector<TangentialGain> left_out_;  // by hill: of those that were not let in
   std::vector<Eigen::MatrixXd> tangential_columns_;  // by hill
   std::vector<size_t> hill_of_load_;                 // by load of the estimate
 };

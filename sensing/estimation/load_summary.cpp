@@ -49,6 +49,9 @@ void LoadEstimator::Finish(Linearization& skin, const std::vector<HillFinder::Hi
 
 void LoadEstimator::Conclude(const Linearization& skin, LoadEstimate& estimate) {
   WriteCovariances(skin, estimate);
+  Eigen::VectorXf beside(pulls_per_mm_.size());
+  dense::Product(direct_mm2_, pulls_per_mm_.cast<float>(), beside);
+  estimate.beside_mm = beside.cast<double>();
   estimate.chi2_per_dof =
       solution_.residual.squaredNorm() /
       std::max<double>(1, static_cast<double>(std::count(is_shown_.begin(), is_shown_.end(), 1)));
@@ -76,11 +79,10 @@ void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill&
 }
 
 void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
-  // Of the whitened residual, what it pulls at each marker.
   Eigen::MatrixXd pulls = solution_.residual;
   dense::SolveLowerTransposed(factor_, pulls);
-  const Eigen::VectorXd stacked = pulls.col(0);
-  const std::array<Eigen::VectorXd, 3> pulled = skin.PulledAtSites(stacked);
+  pulls_per_mm_ = pulls.col(0);
+  const std::array<Eigen::VectorXd, 3> pulled = skin.PulledAtSites(pulls_per_mm_);
   std::array<Eigen::VectorXd, 3> contacts;
   std::array<Eigen::VectorXd, 2> couples;
   for (auto& part : contacts) part.setZero(mechanics_.site_count());
@@ -102,7 +104,7 @@ void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
     all.forces_n[k] = mechanics_.spread() * contacts[k];
     all.forces_n[k].array() += covariance_.stray_sigmas_n()[k].array().square() * pulled[k].array();
   }
-  estimate.pressure_error_mpa = pressure_sigma_ * by_pressure_.dot(stacked);
+  estimate.pressure_error_mpa = pressure_sigma_ * by_pressure_.dot(pulls_per_mm_);
 }
 
 // Of three columns a contact for its force, two for its place, and the pressure's: the posterior of those

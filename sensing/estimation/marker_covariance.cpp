@@ -19,8 +19,8 @@ constexpr double kStrayN = 1e-3, kNormalShare = 0.01, kTangentialShare = 0.003;
 MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics, const Neighborhoods& near)
     : mechanics_(mechanics), near_(near) {}
 
-void MarkerCovariance::Write(const Linearization& skin, const InflatedSkin& inflated,
-                             const Eigen::VectorXd& local_n, Eigen::MatrixXd& covariance_mm2) {
+void MarkerCovariance::WriteDirect(const Linearization& skin, const InflatedSkin& inflated,
+                                   Eigen::MatrixXd& covariance_mm2) const {
   const int markers = mechanics_.marker_count();
   Eigen::VectorXd moved(markers), grown(markers);
   for (int m = 0; m < markers; ++m) {
@@ -43,8 +43,12 @@ void MarkerCovariance::Write(const Linearization& skin, const InflatedSkin& infl
       covariance_mm2.block<3, 3>(3 * i, 3 * j) = block;
     }
   }
+}
+
+void MarkerCovariance::AddStray(const Linearization& skin, const Eigen::VectorXd& local_n,
+                                Eigen::MatrixXd& covariance_mm2) {
   const double unit = mechanics_.force_unit();
-  const int sites = mechanics_.site_count();
+  const int sites = mechanics_.site_count(), markers = mechanics_.marker_count();
   Eigen::MatrixXf scaled(3 * markers, 3 * sites);
   for (size_t k = 0; k < 3; ++k) {
     const double share = k == 0 ? kNormalShare : kTangentialShare;

@@ -20,10 +20,13 @@ class MarkerCovariance {
   /// Both are referred to.
   MarkerCovariance(const SkinMechanics& mechanics, const Neighborhoods& near);
 
-  /// `local_n`: force in the neighborhood of each site. Sets `covariance_mm2` (lower half, stacked markers)
-  /// and the stray forces' standard deviations by direction and site.
-  void Write(const Linearization& skin, const InflatedSkin& inflated, const Eigen::VectorXd& local_n,
-             Eigen::MatrixXd& covariance_mm2);
+  /// Of displacements that no force explains: a floor, and shares of the motion and of the inflation. Lower
+  /// half, stacked markers.
+  void WriteDirect(const Linearization& skin, const InflatedSkin& inflated,
+                   Eigen::MatrixXd& covariance_mm2) const;
+  /// Adds that of stray forces. `local_n`: force in the neighborhood of each site. Sets the stray forces'
+  /// standard deviations by direction and site.
+  void AddStray(const Linearization& skin, const Eigen::VectorXd& local_n, Eigen::MatrixXd& covariance_mm2);
   const std::array<Eigen::VectorXd, 3>& stray_sigmas_n() const { return stray_n_; }
 
   /// Forces on sites, or on markers, smoothed over the neighborhood in which they count as local.

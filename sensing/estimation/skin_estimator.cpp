@@ -347,6 +347,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
     used_->skin.FirstOrderMarkers(estimate.displacements_mm);
   else
     mechanics_.markers().Displacements(estimate.state, estimate.displacements_mm);
+  estimate.displacements_mm += estimate.loads.beside_mm;
   estimate.pressure_mpa = pressure_mpa + estimate.loads.pressure_error_mpa;
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
                      : estimate.loads.converged ? EstimateFailure::kNone

@@ -38,9 +38,11 @@ struct SkinEstimate {
   bool has_shape = false;
   ForceModel model = ForceModel::kNonlinear;  ///< the approximation that was good enough
   ShellState state;
-  Eigen::VectorXd displacements_mm;  ///< of the markers from the slack skin, stacked
-  Eigen::VectorXd baseline_mm;       ///< of the model's markers in the baseline, likewise
-  Eigen::VectorXd inflated_mm;       ///< of the model's markers under this pressure without loads
+  /// Of the markers from the slack skin, stacked: where `state` has them and, where they disagree by more
+  /// than noise, between that and what is seen (posterior of the model's error).
+  Eigen::VectorXd displacements_mm;
+  Eigen::VectorXd baseline_mm;  ///< of the model's markers in the baseline, likewise
+  Eigen::VectorXd inflated_mm;  ///< of the model's markers under this pressure without loads
   LoadEstimate loads;
   double pressure_mpa = 0;  ///< with the estimated error taken off
   /// The longest way of a point of the skin under this pressure, without loads, from where a first-order

@@ -9,8 +9,7 @@
 #include <map>
 #include <random>
 
-#include "sensing/contact/contact_finder.h"
-#include "sensing/estimation/skin_estimator.h"
+#include "sensing/pipeline/marker_solve.h"
 #include "tests/accuracy/solid_judge.h"
 #include "tests/accuracy/solid_scenes.h"
 
@@ -30,23 +29,28 @@ unsigned SeedOf(const SolidScene& scene, const How& how) {
   return seed;
 }
 
-SkinObservation Observe(const SolidScene& scene, const How& how) {
+struct Shown {
+  SkinShape shape;
+  PressurePair pressure;
+};
+
+Shown Show(const SolidScene& scene, const How& how) {
   std::mt19937 random(SeedOf(scene, how));
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> lot(0, 1);
   const double sigma_mm = std::max(how.noise_mm, 0.02);
-  SkinObservation observation;
+  Shown shown;
   for (size_t m = 0; m < scene.markers_mm.size(); ++m) {
     Vec3 at = scene.markers_mm[m] - scene.baseline_mm[m];
     for (int c = 0; c < 3; ++c) at[c] += how.noise_mm * normal(random);
     const bool seen = lot(random) >= how.missing;
-    observation.markers.displacement_mm.push_back(seen ? at : Vec3::Zero());
-    observation.markers.information.push_back(seen ? Mat3(Mat3::Identity() / (sigma_mm * sigma_mm))
-                                                   : Mat3::Zero());
+    shown.shape.measured.push_back(seen ? MeasuredDisplacement{at, Mat3::Identity() / (sigma_mm * sigma_mm)}
+                                        : MeasuredDisplacement{});
+    shown.shape.sources.push_back(seen ? MarkerSource::kBoth : MarkerSource::kInferred);
   }
-  observation.pressure = {scene.pressure_kpa * 1e-3 + how.pressure_off_pa * 1e-6, kPressureSigmaMpa};
-  observation.baseline_pressure = {scene.baseline_kpa * 1e-3, scene.baseline_kpa > 0 ? kPressureSigmaMpa : 0};
-  return observation;
+  shown.pressure.now = {scene.pressure_kpa * 1e-3 + how.pressure_off_pa * 1e-6, kPressureSigmaMpa};
+  shown.pressure.baseline = {scene.baseline_kpa * 1e-3, scene.baseline_kpa > 0 ? kPressureSigmaMpa : 0};
+  return shown;
 }
 
 struct Score {
@@ -58,11 +62,11 @@ struct Score {
 };
 using Scores = std::map<std::string, Score>;
 
-void AddShape(const SolidScene& scene, const SkinEstimate& estimate, Score& score) {
+// From the baseline, as displacements are told and published.
+void AddShape(const SolidScene& scene, const SkinShape& shape, Score& score) {
   double sum = 0;
   for (size_t m = 0; m < scene.markers_mm.size(); ++m) {
-    const double off =
-        (estimate.displacements_mm.segment<3>(3 * static_cast<Eigen::Index>(m)) - scene.markers_mm[m]).norm();
+    const double off = (shape.displacements_mm[m] - (scene.markers_mm[m] - scene.baseline_mm[m])).norm();
     sum += off * off;
     score.worst_mm = std::max(score.worst_mm, off);
   }
@@ -90,40 +94,30 @@ double MedianOf(std::vector<double>& values) {
 }
 
 Scores ScoreAll(const How& how) {
-  SkinEstimator estimator(SolidSkin());
-  ContactFinder finder(estimator.mechanics().model());
+  const LinkModel model = SolidSkin();
+  StateEstimator estimator(model, {});
   const char* only = std::getenv("TACLINK_SOLIDS");
   Scores scores;
   for (const SolidScene& scene : ReadSolidScenes()) {
     if (only != nullptr && !scene.name.starts_with(only)) continue;
-    SkinEstimate estimate;
-    std::vector<Contact> found;
-    std::string fault = "no answer";
-    estimator.Estimate(Observe(scene, how), estimate);
-    const bool answered = estimate.failure == EstimateFailure::kNone;
-    if (answered) {
-      finder.Find(estimator, estimate, found);
-      fault = FaultOf(scene, found);
-    }
-    // As Judge has it.
-    const bool said =
-        !answered || estimate.loads.region_chi2_per_dof > 5 || estimate.loads.chi2_per_dof > 1.44 ||
-        std::any_of(found.begin(), found.end(),
-                    [](const Contact& c) { return c.center_mm.z() < 16 || c.center_mm.z() > 182; });
+    const Shown shown = Show(scene, how);
+    const LinkState state = SolveMarkers(model, estimator, shown.pressure, shown.shape);
+    const std::string fault = state.forces.converged ? FaultOf(scene, state.contacts) : "no answer";
+    const bool said = state.status != LinkStatus::kOk;
     for (const std::string& key :
          {std::string("all"), scene.family, std::string(scene.held_out ? "held out" : "not held out")}) {
       Score& score = scores[key];
       ++score.all;
       score.held += fault.empty();
       score.said += !fault.empty() && said;
-      if (answered && !said) AddShape(scene, estimate, score);
-      AddSigmas(scene, found, score);
+      if (!said) AddShape(scene, state.shape, score);
+      AddSigmas(scene, state.contacts, score);
     }
     if (!fault.empty() || only != nullptr)
-      std::printf("  %s%s %s: %s; chi2 %.2f, region %.1f, %.0f Pa off\n", scene.name.c_str(),
+      std::printf("  %s%s %s: %s; %s, residual %.2f, region %.1f, %.0f Pa off\n", scene.name.c_str(),
                   scene.held_out ? " (held out)" : "", how.name, fault.empty() ? "holds" : fault.c_str(),
-                  estimate.loads.chi2_per_dof, estimate.loads.region_chi2_per_dof,
-                  1e6 * estimate.loads.pressure_error_mpa);
+                  said ? state.status_reason.c_str() : "ok", state.forces.residual,
+                  state.forces.region_residual, 1e6 * estimator.estimate().loads.pressure_error_mpa);
   }
   for (auto& [name, s] : scores)
     std::printf(
@@ -160,26 +154,25 @@ TEST(SolidsTest, ColdIsWarm) {
   const std::vector<SolidScene> scenes = ReadSolidScenes();
   ASSERT_FALSE(scenes.empty());
   std::mt19937 random(7);
-  SkinEstimator warm(SolidSkin()), cold(SolidSkin());
+  const LinkModel model = SolidSkin();
+  StateEstimator warm(model, {}), cold(model, {});
   int compared = 0, alike = 0;
   for (int frame = 0; frame < 60; ++frame) {
     const SolidScene& scene = scenes[random() % scenes.size()];
     const bool blind = frame % 3 == 1;
-    const SkinObservation observation = Observe(scene, {"walk", 0.1, blind ? 0.7 : 0.0});
-    SkinEstimate with, without;
-    warm.Estimate(observation, with);
+    const Shown shown = Show(scene, {"walk", 0.1, blind ? 0.7 : 0.0});
+    const LinkState with = SolveMarkers(model, warm, shown.pressure, shown.shape);
     if (blind) continue;
     cold.Restart();
-    cold.Estimate(observation, without);
-    if (without.failure != EstimateFailure::kNone) continue;
+    const LinkState without = SolveMarkers(model, cold, shown.pressure, shown.shape);
+    if (!without.forces.converged) continue;
     ++compared;
-    bool same = with.failure == without.failure && with.loads.loads.size() == without.loads.loads.size();
-    for (size_t i = 0; same && i < with.loads.loads.size(); ++i) {
+    bool same = with.forces.converged && with.contacts.size() == without.contacts.size();
+    for (size_t i = 0; same && i < with.contacts.size(); ++i) {
       double nearest = 1e9;
-      const EstimatedLoad& a = with.loads.loads[i];
-      for (const EstimatedLoad& b : without.loads.loads)
-        nearest = std::min(nearest, (a.force_n - b.force_n).norm());
-      same = nearest < 0.2 * std::sqrt(a.force_covariance_n2.trace());
+      const Contact& a = with.contacts[i];
+      for (const Contact& b : without.contacts) nearest = std::min(nearest, (a.force_n - b.force_n).norm());
+      same = a.force_covariance_n2 && nearest < 0.2 * std::sqrt(a.force_covariance_n2->trace());
     }
     alike += same;
     if (!same) std::printf("  %s differs from what was before\n", scene.name.c_str());
