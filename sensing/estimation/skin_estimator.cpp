@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace taclink {
 namespace {
@@ -15,8 +16,8 @@ constexpr double kLongestStepMm = 5, kUnlimitedMm = 1e9;
 constexpr double kStillReachMm = 0.4;    // from the inflated skin: its tangent is good enough
 constexpr double kTouchedReachMm = 2.5;  // likewise from where the touched one was made
 constexpr double kAssimilateMm = 2.5;    // farther off, a marker is pulled to its place first
-constexpr double kSameLocal = 0.5;       // of the local forces: the model's errors are still the same
-constexpr double kLittleLocalN = 0.05;
+constexpr int kFirstLag = 3;             // frames that making a tangent takes, before it is known
+constexpr double kAheadShare = 0.75;     // of a tangent's reach: so far ahead of a moving contact it is made
 constexpr double kModelPressureShare = 0.01;  // of the pressure: what the model's inflation is wrong by
 constexpr double kNoiseDeviations = 2;        // of a spring's pull, that noise alone makes
 // Below what any load has to explain (kHillGain of LoadEstimator): 3 x 3 markers show two thirds of a load.
@@ -33,34 +34,18 @@ double LongestOff(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return std::sqrt(longest2);
 }
 
+// To where the way from `before` to `state` leads, so many times as far again.
+void Extrapolate(const ShellState& before, double times, ShellState& state) {
+  for (size_t i = 0; i < state.mids_mm.size(); ++i) {
+    state.mids_mm[i] += times * (state.mids_mm[i] - before.mids_mm[i]);
+    Vec3& director = state.directors[i];
+    director = (director + times * (director - before.directors[i])).normalized();
+    Vec3& tangent = state.tangents[i];
+    tangent = (tangent - tangent.dot(director) * director).normalized();
+  }
+}
+
 }  // namespace
-
-struct SkinEstimator::Tangent {
-  Tangent(const SkinMechanics& mechanics, const Neighborhoods& near, double reach)
-      : reach_mm(reach * mechanics.length_unit()), skin(mechanics), loads(mechanics, near) {}
-  double reach_mm;  // from where it was made: it is good enough
-  Linearization skin;
-  LoadEstimator loads;
-  bool is_prepared = false;
-  Eigen::VectorXd local_n;
-
-  double DistanceMm(const ShellState& state) const {
-    return LongestOff(skin.tangent_state().mids_mm, state.mids_mm);
-  }
-  bool IsNear(const ShellState& state) const { return skin.is_made() && DistanceMm(state) < reach_mm; }
-  bool HasLocal(const Eigen::VectorXd& now, double unit) const {
-    return (now - local_n).cwiseAbs().maxCoeff() <
-           kSameLocal * std::max(now.maxCoeff(), local_n.maxCoeff()) + kLittleLocalN * unit;
-  }
-};
-
-// Of one frame.
-struct SkinEstimator::Problem {
-  MarkerObservations observed = {};  // from the slack skin
-  InflatedSkin inflated = {};
-  double pressure_mpa = 0;
-  PressurePrior prior = {};
-};
 
 SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions& options)
     : mechanics_(model, options.refinement),
@@ -70,15 +55,21 @@ SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions&
       still_(std::make_unique<Tangent>(mechanics_, near_, kStillReachMm)),
       touched_(std::make_unique<Tangent>(mechanics_, near_, kTouchedReachMm)),
       used_(still_.get()),
+      usual_lag_(kFirstLag),
       radial_pull_(mechanics_.marker_count()),
-      radial_weight_(mechanics_.marker_count()) {}
+      radial_weight_(mechanics_.marker_count()) {
+  if (options.is_live && !IsFirstOrder())
+    maker_ = std::make_unique<TangentMaker>(std::make_unique<Tangent>(mechanics_, near_, kTouchedReachMm));
+}
 SkinEstimator::~SkinEstimator() = default;
 
 void SkinEstimator::Restart() {
   has_last_ = false;
-  for (Tangent* tangent : {still_.get(), touched_.get()}) {
-    tangent->is_prepared = false;
-    tangent->local_n.resize(0);
+  still_->Forget();
+  touched_->Forget();
+  if (maker_) {
+    maker_->Wait();
+    maker_->spare()->Forget();
   }
 }
 const Linearization& SkinEstimator::linearization() const {
@@ -118,7 +109,7 @@ double SkinEstimator::FurthestOff(const ShellState& state, const MarkerObservati
 }
 
 // A state near the markers: the inflated skin, the last frame's, or where springs pull either.
-bool SkinEstimator::Start(const Problem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n) {
+bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n) {
   const double unit = mechanics_.length_unit();
   estimate.state = problem.inflated.state;
   double off_mm = FurthestOff(estimate.state, problem.observed);
@@ -150,19 +141,53 @@ bool SkinEstimator::Start(const Problem& problem, SkinEstimate& estimate, Eigen:
   return FurthestOff(estimate.state, problem.observed) < kLongestStepMm * unit;
 }
 
-bool SkinEstimator::Remake(Tangent& tangent, const Problem& problem, const ShellState& state,
+bool SkinEstimator::Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
                            const Eigen::VectorXd& local_n, SkinEstimate& estimate) {
   ++estimate.tangents;
-  // What is near keeps its columns: only what the loads are weighed with is made again.
-  const bool is_kept = tangent.is_prepared && tangent.IsNear(state);
-  tangent.local_n = local_n;
-  tangent.is_prepared =
-      (is_kept || tangent.skin.At(state, problem.pressure_mpa)) &&
-      tangent.loads.Prepare(tangent.skin, problem.inflated, problem.observed, problem.prior, local_n);
-  return tangent.is_prepared;
+  return tangent.Make(problem, state, local_n);
 }
 
-bool SkinEstimator::StepOnce(Tangent& tangent, const Problem& problem, SkinEstimate& estimate,
+// The touched skin's next tangent, if it was made ahead and is better than the one at hand. It is not waited
+// for: on a busy machine its thread may be the last to go on.
+void SkinEstimator::TakeNext(const SkinProblem& problem, const ShellState& state,
+                             const Eigen::VectorXd& local_n) {
+  if (!maker_ || maker_->is_working()) return;
+  const auto is_good = [&](const Tangent& tangent) {
+    return tangent.IsGoodFor(problem, state) && (local_n.size() == 0 || tangent.HasLocal(local_n));
+  };
+  Tangent& next = *maker_->spare();
+  if (is_good(next) && (!is_good(*touched_) || next.DistanceMm(ahead_) < touched_->DistanceMm(ahead_)))
+    std::swap(touched_, maker_->spare());
+}
+
+// After a frame with loads, while `last_` is still the frame before: begins with the tangent that
+// will be asked for when it is made, if the motion goes on.
+void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate,
+                              const Eigen::VectorXd& local_n) {
+  if (!maker_) return;
+  if (maker_->is_working()) {
+    ++lag_;
+    return;
+  }
+  if (lag_ > 0) usual_lag_ = lag_;
+  lag_ = 0;
+  ahead_ = estimate.state;
+  Eigen::VectorXd ahead_n = local_n;
+  if (has_last_) {
+    const double moved_mm = LongestOff(last_.mids_mm, ahead_.mids_mm);
+    const double share =
+        std::min(1.0 + usual_lag_, kAheadShare * touched_->reach_mm / std::max(moved_mm, 1e-9));
+    Extrapolate(last_, share, ahead_);
+    if (local_before_n_.size() == local_n.size())
+      ahead_n = (local_n + share * (local_n - local_before_n_)).cwiseMax(0.5 * local_n).cwiseMin(2 * local_n);
+  }
+  const auto is_good = [&](const Tangent& tangent) {
+    return tangent.IsGoodFor(problem, ahead_) && tangent.HasLocal(ahead_n);
+  };
+  if (!is_good(*touched_) && !is_good(*maker_->spare())) maker_->Begin(problem, ahead_, ahead_n);
+}
+
+bool SkinEstimator::StepOnce(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate,
                              double& step_mm) {
   used_ = &tangent;
   ++estimate.steps;
@@ -176,14 +201,13 @@ bool SkinEstimator::StepOnce(Tangent& tangent, const Problem& problem, SkinEstim
 }
 
 // About the skin without loads. True: that is all there is to do.
-bool SkinEstimator::SolveSmall(Tangent& tangent, const Problem& problem, SkinEstimate& estimate) {
+bool SkinEstimator::SolveSmall(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate) {
   const bool linear = options_.model == ForceModel::kLinear;
   const ShellState about = linear ? mechanics_.shell().Rest() : problem.inflated.state;
   const double unit = mechanics_.length_unit();
-  if (!tangent.is_prepared || !tangent.IsNear(about) ||
-      !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
+  if (!tangent.IsGoodFor(problem, about)) {
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
-    Problem mine = problem;
+    SkinProblem mine = problem;
     if (linear) mine.pressure_mpa = 0;
     if (!Remake(tangent, mine, about, none, estimate)) return false;
   }
@@ -203,39 +227,39 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const Problem& problem, SkinEst
   return options_.model != ForceModel::kNonlinear && step_mm < kStillReachMm * unit;
 }
 
-bool SkinEstimator::SolveLarge(const Problem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n) {
-  Tangent& tangent = *touched_;
+bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n) {
   estimate.model = ForceModel::kNonlinear;
   const double unit = mechanics_.length_unit();
+  TakeNext(problem, estimate.state, local_n);
   // A first guess: what the loads turn out to be decides whether all is made again.
   if (local_n.size() == 0) {
     if (estimate.loads.contact_sizes_n.size() > 0)
-      local_n = tangent.loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
-    else if (tangent.local_n.size() > 0)
-      local_n = tangent.local_n;
+      local_n = touched_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
+    else if (touched_->local_n.size() > 0)
+      local_n = touched_->local_n;
     else
       local_n = Eigen::VectorXd::Zero(mechanics_.site_count());
   }
-  if (!tangent.is_prepared || !tangent.IsNear(estimate.state) ||
-      !tangent.loads.IsPreparedFor(problem.observed, problem.prior)) {
-    if (!Remake(tangent, problem, estimate.state, local_n, estimate)) return false;
-  }
+  if (!touched_->IsGoodFor(problem, estimate.state) &&
+      !Remake(*touched_, problem, estimate.state, local_n, estimate))
+    return false;
   double before_mm = 1e9;
   for (int step = 0; step < kMostSteps; ++step) {
     double step_mm = 0;
-    if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
-    local_n = tangent.loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
-    const double distance_mm = tangent.DistanceMm(estimate.state);
-    const bool is_far = distance_mm > tangent.reach_mm;
-    const bool has_local = tangent.HasLocal(local_n, mechanics_.force_unit());
+    if (!StepOnce(*touched_, problem, estimate, step_mm)) return false;
+    local_n = touched_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
+    const double distance_mm = touched_->DistanceMm(estimate.state);
+    const bool is_off = distance_mm > touched_->reach_mm || !touched_->HasLocal(local_n);
     const bool is_slow = step > 0 && step_mm > kShrinks * before_mm;
     const bool is_settled =
         step_mm * std::min(1.0, kTangentErrorPerMm * distance_mm / unit) < kSettledMm * unit;
-    if (is_settled && !is_far && has_local) return true;
+    if (is_settled && !is_off) return true;
     before_mm = step_mm;
-    if ((is_far || !has_local || is_slow) && estimate.tangents < kMostTangents) {
-      if (is_slow) tangent.is_prepared = false;
-      if (!Remake(tangent, problem, estimate.state, local_n, estimate)) return false;
+    if ((is_off || is_slow) && estimate.tangents < kMostTangents) {
+      if (is_slow) touched_->is_prepared = false;
+      TakeNext(problem, estimate.state, local_n);
+      const bool is_good = touched_->IsGoodFor(problem, estimate.state) && touched_->HasLocal(local_n);
+      if (!is_good && !Remake(*touched_, problem, estimate.state, local_n, estimate)) return false;
       before_mm = 1e9;
     } else if (is_settled) {
       return true;
@@ -333,7 +357,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
 
   estimate.loads = {};
   estimate.failure = EstimateFailure::kNotConverged;
-  const Problem problem = MakeProblem(observation, *inflated, std::move(prior), estimate.baseline_mm);
+  const SkinProblem problem = MakeProblem(observation, *inflated, std::move(prior), estimate.baseline_mm);
   start_ = problem.inflated.state;
   if (!Solve(problem, estimate)) {
     has_last_ = false;
@@ -352,23 +376,29 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
                      : estimate.loads.converged ? EstimateFailure::kNone
                                                 : EstimateFailure::kNotConverged;
-  has_last_ = !estimate.loads.loads.empty() && estimate.failure == EstimateFailure::kNone;
-  if (has_last_) last_ = estimate.state;
+  if (estimate.loads.loads.empty() || estimate.failure != EstimateFailure::kNone) {
+    has_last_ = false;
+    return;
+  }
+  const Eigen::VectorXd local_n = used_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
+  MakeAhead(problem, estimate, local_n);
+  last_ = estimate.state;
+  local_before_n_ = local_n;
+  has_last_ = true;
 }
 
-SkinEstimator::Problem SkinEstimator::MakeProblem(const SkinObservation& observation,
-                                                  const InflatedSkin& inflated, PressurePrior prior,
-                                                  const Eigen::VectorXd& baseline_mm) const {
-  Problem problem{.observed = observation.markers,
-                  .inflated = inflated,
-                  .pressure_mpa = observation.pressure.mpa,
-                  .prior = std::move(prior)};
+SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
+                                       PressurePrior prior, const Eigen::VectorXd& baseline_mm) const {
+  SkinProblem problem{.observed = observation.markers,
+                      .inflated = inflated,
+                      .pressure_mpa = observation.pressure.mpa,
+                      .prior = std::move(prior)};
   for (int m = 0; m < mechanics_.marker_count(); ++m)
     problem.observed.displacement_mm[static_cast<size_t>(m)] += baseline_mm.segment<3>(3 * m);
   return problem;
 }
 
-bool SkinEstimator::Solve(const Problem& problem, SkinEstimate& estimate) {
+bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   const bool is_small = IsFirstOrder() || FurthestOff(problem.inflated.state, problem.observed) <
                                               2 * kStillReachMm * mechanics_.length_unit();
   if (is_small && SolveSmall(*still_, problem, estimate)) return true;

@@ -8,6 +8,7 @@
 #include "sensing/estimation/assimilation.h"
 #include "sensing/estimation/load_estimator.h"
 #include "sensing/estimation/skin_mechanics.h"
+#include "sensing/estimation/tangent_maker.h"
 
 namespace taclink {
 
@@ -55,6 +56,9 @@ struct SkinEstimatorOptions {
   /// None: the cheapest whose error is small enough, frame by frame. kLiteral is no model of this estimator.
   std::optional<ForceModel> model;
   int refinement = 0;  ///< elements per interval of the marker grid; 0: as many as the skin's dents ask for
+  /// Tangents are made ahead in a second thread, so that a moving contact's frames need not wait for them.
+  /// Answers then depend on timing, by less than steps settle to.
+  bool is_live = false;
 };
 
 /// From labeled markers and a pressure to loads, pressure and the nonlinear equilibrium shape together; see
@@ -76,22 +80,21 @@ class SkinEstimator {
   const LoadEstimator& loads() const;
 
  private:
-  struct Tangent;
-  struct Problem;
-
   bool IsStill(const SkinObservation& observation, const InflatedSkin& inflated, const PressurePrior& prior,
                SkinEstimate& estimate);
   bool AreNeighborsStill() const;
   double FurthestOff(const ShellState& state, const MarkerObservations& observed);
-  bool Start(const Problem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n);
-  bool Remake(Tangent& tangent, const Problem& problem, const ShellState& state,
+  bool Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n);
+  bool Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
               const Eigen::VectorXd& local_n, SkinEstimate& estimate);
-  bool StepOnce(Tangent& tangent, const Problem& problem, SkinEstimate& estimate, double& step_mm);
-  bool SolveSmall(Tangent& tangent, const Problem& problem, SkinEstimate& estimate);
-  bool SolveLarge(const Problem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
-  Problem MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated, PressurePrior prior,
-                      const Eigen::VectorXd& baseline_mm) const;
-  bool Solve(const Problem& problem, SkinEstimate& estimate);
+  void TakeNext(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n);
+  void MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate, const Eigen::VectorXd& local_n);
+  bool StepOnce(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate, double& step_mm);
+  bool SolveSmall(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate);
+  bool SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
+  SkinProblem MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
+                          PressurePrior prior, const Eigen::VectorXd& baseline_mm) const;
+  bool Solve(const SkinProblem& problem, SkinEstimate& estimate);
   bool IsPossible(const SkinEstimate& estimate) const;
   /// One step from the slack or the inflated skin, whatever is asked of it.
   bool IsFirstOrder() const;
@@ -102,7 +105,11 @@ class SkinEstimator {
   Assimilation assimilation_;
   std::unique_ptr<Tangent> still_, touched_;  // of the skin without loads, and of the touched one
   Tangent* used_ = nullptr;
-  ShellState last_, start_;  // of the frame before; that this one's loads were sought from
+  std::unique_ptr<TangentMaker> maker_;  // of the touched skin's next one; null: none is made ahead
+  ShellState ahead_;                     // where that one is thought to be asked for
+  Eigen::VectorXd local_before_n_;       // of the frame of last_
+  int lag_ = 0, usual_lag_;              // frames since the maker has begun; that it took the last time
+  ShellState last_, start_;              // of the frame before; that this one's loads were sought from
   bool has_last_ = false;
   Eigen::VectorXd markers_mm_;
   Eigen::VectorXd radial_pull_, radial_weight_;  // of the frame in work

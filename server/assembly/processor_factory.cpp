@@ -94,6 +94,7 @@ PipelineOptions ToPipelineOptions(const LinkConfig& link) {
   PipelineOptions options;
   options.force.model = link.force_model;
   options.force.refinement = link.force_refinement;
+  options.force.is_live = true;
   options.drift = link.drift;
   if (link.pressure) {
     if (const auto* constant = std::get_if<ConstantPressureConfig>(&link.pressure->source))

@@ -112,6 +112,27 @@ TEST_F(SkinEstimatorTest, PressureThatIsToldWrongIsNoForce) {
   EXPECT_NEAR(estimate_.pressure_mpa, 1e-3, 2e-5);
 }
 
+TEST_F(SkinEstimatorTest, TheShapeFollowsMarkersThatTheModelIsWrongAbout) {
+  const Pushed inflated = Push(model_, 1.0, 1.3, 95, 0, 4);
+  ASSERT_TRUE(inflated.ok);
+  // No pressure does this.
+  Eigen::VectorXd truth = inflated.markers_mm;
+  for (int m = 0; m < 240; ++m)
+    truth.segment<3>(3 * m) *= 1 + 0.03 * std::sin(2 * kPi * model_.RestMarker(m).z() / model_.length_mm);
+  SkinObservation observation = Observe(truth, 1.0, 0.02);
+  observation.pressure.sigma_mpa = 1e-6;
+  // Every fifth is not seen, and follows its neighbors.
+  for (size_t m = 0; m < 240; m += 5) observation.markers.information[m].setZero();
+  estimator_.Estimate(observation, estimate_);
+  ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+  EXPECT_TRUE(estimate_.loads.loads.empty());
+  Eigen::VectorXd equilibrium;
+  estimator_.mechanics().markers().Displacements(estimate_.state, equilibrium);
+  const double equilibrium_off_mm = (equilibrium - truth).cwiseAbs().maxCoeff();
+  EXPECT_GT(equilibrium_off_mm, 0.05);
+  EXPECT_LT((estimate_.displacements_mm - truth).cwiseAbs().maxCoeff(), 0.5 * equilibrium_off_mm);
+}
+
 TEST_F(SkinEstimatorTest, ABaselineUnderPressureIsNoForce) {
   const Pushed before = Push(model_, 1.0, 1.3, 95, 0, 4), now = Push(model_, 0.8, 1.3, 95, 0.4, 4);
   ASSERT_TRUE(before.ok && now.ok);
@@ -156,6 +177,32 @@ TEST_F(SkinEstimatorTest, NonsenseIsRefusedAndForgotten) {
   fresh.Estimate(good, estimate_);
   ASSERT_EQ(estimate_.loads.loads.size(), 1u);
   EXPECT_LT((estimate_.loads.loads[0].force_n - warm).norm(), 0.2 * sigma);
+}
+
+// In and out, while tangents are made ahead: each frame's answer is that of an estimator that saw only it.
+TEST_F(SkinEstimatorTest, WhatIsMadeAheadChangesNoAnswer) {
+  std::vector<SkinObservation> stages;
+  for (const double force_n : {0.1, 0.25, 0.4, 0.5, 0.6}) {
+    const Pushed pushed = Push(model_, 1.0, 1.3, 95, force_n, 4);
+    ASSERT_TRUE(pushed.ok);
+    stages.push_back(Observe(pushed.markers_mm, 1.0, 0.02));
+  }
+  SkinEstimator live(model_, {.model = {}, .refinement = 0, .is_live = true});
+  for (int frame = 0; frame < 24; ++frame) {
+    const int back = frame % 8;
+    const SkinObservation& seen = stages[static_cast<size_t>(back < 5 ? back : 8 - back)];
+    SkinEstimate with;
+    live.Estimate(seen, with);
+    estimator_.Restart();
+    estimator_.Estimate(seen, estimate_);
+    ASSERT_EQ(with.failure, EstimateFailure::kNone);
+    ASSERT_EQ(with.loads.loads.size(), 1u);
+    ASSERT_EQ(estimate_.loads.loads.size(), 1u);
+    const EstimatedLoad& cold = estimate_.loads.loads[0];
+    EXPECT_LT((with.loads.loads[0].force_n - cold.force_n).norm(),
+              0.2 * std::sqrt(cold.force_covariance_n2.trace()));
+    EXPECT_LT((with.displacements_mm - estimate_.displacements_mm).cwiseAbs().maxCoeff(), 0.05);
+  }
 }
 
 }  // namespace

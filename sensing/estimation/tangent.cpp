@@ -1,0 +1,56 @@
+#include "sensing/estimation/tangent.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace taclink {
+namespace {
+
+constexpr double kSameLocal = 0.5;  // of the local forces: the model's errors are still the same
+constexpr double kLittleLocalN = 0.05;
+
+}  // namespace
+
+Tangent::Tangent(const SkinMechanics& mechanics, const Neighborhoods& near, double reach)
+    : reach_mm(reach * mechanics.length_unit()),
+      force_unit(mechanics.force_unit()),
+      skin(mechanics),
+      loads(mechanics, near) {}
+
+double Tangent::DistanceMm(const ShellState& state) const {
+  const std::vector<Vec3>&a = skin.tangent_state().mids_mm, &b = state.mids_mm;
+  if (a.size() != b.size()) return std::numeric_limits<double>::max();
+  double longest2 = 0;
+  for (size_t i = 0; i < a.size(); ++i) longest2 = std::max(longest2, (a[i] - b[i]).squaredNorm());
+  return std::sqrt(longest2);
+}
+
+bool Tangent::IsNear(const ShellState& state) const {
+  return skin.is_made() && DistanceMm(state) < reach_mm;
+}
+
+bool Tangent::HasLocal(const Eigen::VectorXd& now, double share) const {
+  return local_n.size() == now.size() &&
+         (now - local_n).cwiseAbs().maxCoeff() <
+             share * (kSameLocal * std::max(now.maxCoeff(), local_n.maxCoeff()) + kLittleLocalN * force_unit);
+}
+
+bool Tangent::IsGoodFor(const SkinProblem& problem, const ShellState& state) const {
+  return is_prepared && IsNear(state) && loads.IsPreparedFor(problem.observed, problem.prior);
+}
+
+bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local) {
+  const bool is_kept = is_prepared && IsNear(state);
+  local_n = local;
+  is_prepared = (is_kept || skin.At(state, problem.pressure_mpa)) &&
+                loads.Prepare(skin, problem.inflated, problem.observed, problem.prior, local);
+  return is_prepared;
+}
+
+void Tangent::Forget() {
+  is_prepared = false;
+  local_n.resize(0);
+}
+
+}  // namespace taclink

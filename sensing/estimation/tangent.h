@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "sensing/estimation/assimilation.h"
+#include "sensing/estimation/linearization.h"
+#include "sensing/estimation/load_estimator.h"
+#include "sensing/estimation/skin_mechanics.h"
+
+namespace taclink {
+
+/// What one frame asks.
+struct SkinProblem {
+  MarkerObservations observed = {};  ///< from the slack skin
+  InflatedSkin inflated = {};
+  double pressure_mpa = 0;
+  PressurePrior prior = {};
+};
+
+/// A linearized skin with all that its loads are weighed with. It is made of one frame and good for others
+/// that are near. One thread at a time.
+struct Tangent {
+  /// Good enough within `reach` of where it was made, in SkinMechanics' units. Both are referred to.
+  Tangent(const SkinMechanics& mechanics, const Neighborhoods& near, double reach);
+
+  double DistanceMm(const ShellState& state) const;
+  bool IsNear(const ShellState& state) const;
+  /// The model's errors are still about the same where `now` acts: force in the neighborhood of each site.
+  /// `share`: of what is allowed.
+  bool HasLocal(const Eigen::VectorXd& now, double share = 1) const;
+  /// Both, and the cameras see as much.
+  bool IsGoodFor(const SkinProblem& problem, const ShellState& state) const;
+  /// What is near keeps its columns: only what the loads are weighed with is made again.
+  bool Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local);
+  void Forget();
+
+  const double reach_mm, force_unit;
+  Linearization skin;
+  LoadEstimator loads;
+  bool is_prepared = false;
+  Eigen::VectorXd local_n;
+};
+
+}  // namespace taclink

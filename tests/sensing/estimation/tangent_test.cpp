@@ -1,0 +1,83 @@
+#include "sensing/estimation/tangent.h"
+
+#include <gtest/gtest.h>
+
+#include "sensing/estimation/tangent_maker.h"
+#include "sensing/model/model_file.h"
+
+namespace taclink {
+namespace {
+
+constexpr double kReach = 2.5, kSigmaMm = 0.05;
+
+class TangentTest : public ::testing::Test {
+ protected:
+  TangentTest() {
+    problem_.inflated = *mechanics_.Inflated(0);
+    problem_.prior.sigma_mpa = 3e-5;
+    problem_.observed.displacement_mm.assign(kMarkers, Vec3::Zero());
+    problem_.observed.information.assign(kMarkers, Mat3::Identity() / (kSigmaMm * kSigmaMm));
+  }
+  ShellState Dented(double mm) const {
+    ShellState state = problem_.inflated.state;
+    state.mids_mm[state.mids_mm.size() / 2].z() += mm;
+    return state;
+  }
+
+  static constexpr size_t kMarkers = 240;
+  SkinMechanics mechanics_{LoadLinkModel("cylinder").value()};
+  const Neighborhoods near_{mechanics_};
+  SkinProblem problem_;
+  const Eigen::VectorXd none_ = Eigen::VectorXd::Zero(mechanics_.site_count());
+};
+
+TEST_F(TangentTest, IsGoodNearWhereItWasMade) {
+  Tangent tangent(mechanics_, near_, kReach);
+  EXPECT_FALSE(tangent.IsGoodFor(problem_, Dented(0)));
+  ASSERT_TRUE(tangent.Make(problem_, Dented(0), none_));
+  EXPECT_TRUE(tangent.IsGoodFor(problem_, Dented(2.4)));
+  EXPECT_FALSE(tangent.IsGoodFor(problem_, Dented(2.6)));
+  EXPECT_NEAR(tangent.DistanceMm(Dented(2)), 2, 1e-9);
+  SkinProblem sharper = problem_;
+  for (Mat3& information : sharper.observed.information) information *= 9;
+  EXPECT_FALSE(tangent.IsGoodFor(sharper, Dented(0)));
+  tangent.Forget();
+  EXPECT_FALSE(tangent.IsGoodFor(problem_, Dented(0)));
+}
+
+TEST_F(TangentTest, IsGoodForForcesOfItsSize) {
+  Tangent tangent(mechanics_, near_, kReach);
+  EXPECT_FALSE(tangent.HasLocal(none_));
+  Eigen::VectorXd local = none_;
+  local[300] = 1;
+  ASSERT_TRUE(tangent.Make(problem_, Dented(0), local));
+  EXPECT_TRUE(tangent.HasLocal(1.5 * local));
+  EXPECT_FALSE(tangent.HasLocal(1.5 * local, 0.5));
+  EXPECT_FALSE(tangent.HasLocal(3 * local));
+  EXPECT_FALSE(tangent.HasLocal(none_));
+}
+
+TEST_F(TangentTest, TheMakersIsTheSame) {
+  Tangent own(mechanics_, near_, kReach);
+  ASSERT_TRUE(own.Make(problem_, Dented(1), none_));
+  TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach));
+  EXPECT_FALSE(maker.is_working());
+  for (const double mm : {4.0, 1.0}) {
+    maker.Begin(problem_, Dented(mm), none_);
+    maker.Wait();
+    EXPECT_FALSE(maker.is_working());
+  }
+  const Tangent& made = *maker.spare();
+  EXPECT_TRUE(made.IsGoodFor(problem_, Dented(1)));
+  EXPECT_EQ(made.DistanceMm(Dented(1)), 0);
+  for (size_t k = 0; k < 3; ++k) EXPECT_TRUE(made.skin.columns()[k] == own.skin.columns()[k]);
+}
+
+// Destroyed at work: it ends first.
+TEST_F(TangentTest, AMakerEndsAtWork) {
+  TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach));
+  maker.Begin(problem_, Dented(0), none_);
+}
+
+}  // namespace
+}  // namespace taclink
