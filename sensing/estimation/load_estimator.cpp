@@ -21,7 +21,7 @@ constexpr double kEndNorm = 1.0;  // of the median: beyond the markers loads har
 constexpr double kLeastHillN = 0.01;
 constexpr size_t kMostHills = 24;  // no scene that was ever compared with the truth has a third of it
 constexpr double kLeastOfPeak = 0.03;
-constexpr double kHillGain = 20, kTangentialGain = 60;  // of chi^2
+constexpr double kHillGain = 20;  // of chi^2
 constexpr double kRefitSparsity = 0.1, kRefitEndSparsity = 1.0;
 constexpr double kRidge = 1e-9;
 constexpr double kUnseenMm = 30;  // standard deviation of a direction that is not seen, in units of length
@@ -278,36 +278,6 @@ void LoadEstimator::Eliminate(std::vector<HillFinder::Hill>& hills) {
   }
 }
 
-// Of a force of 1 N that the hill's sites share as they share the load, around and along, and of couples.
-Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, const HillFinder::Hill& hill) {
-  double sum = 0;
-  for (const int site : hill) sum += loads_[site];
-  Eigen::VectorXd shares = Eigen::VectorXd::Zero(mechanics_.site_count());
-  for (const int site : hill) shares[site] = loads_[site] / sum;
-  const Eigen::VectorXd spread = mechanics_.spread() * shares;
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(factor_.rows(), kTangential);
-  columns.rightCols<2>() = skin.CoupleColumns(spread);
-  for (int k = 0; k < 2; ++k) {
-    for (Eigen::Index site = 0; site < spread.size(); ++site) {
-      if (spread[site] != 0)
-        columns.col(k) += spread[site] * skin.columns()[static_cast<size_t>(k + 1)].col(site).cast<double>();
-    }
-  }
-  dense::SolveLower(factor_, columns);
-  if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
-  return columns;
-}
-
-// Information that is there before the data, by column.
-Eigen::VectorXd LoadEstimator::TangentialPrior(Eigen::Index columns) const {
-  const double force = kTangentialN * mechanics_.force_unit(),
-               couple = kCoupleNmm * mechanics_.force_unit() * mechanics_.length_unit();
-  Eigen::VectorXd prior(columns);
-  for (Eigen::Index k = 0; k < columns; ++k)
-    prior[k] = k % kTangential < 2 ? 1 / (force * force) : 1 / (couple * couple);
-  return prior;
-}
-
 // Loads of the chosen sites almost without penalty, for that makes all of them too small; tangential forces
 // are eliminated from the problem.
 LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
@@ -355,69 +325,6 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
   }
   solution.chi2 = solution.residual.squaredNorm() + prior.dot(solution.tangential.cwiseAbs2());
   return solution;
-}
-
-// What each hill's tangential force would explain beside the loads that act and the tangential forces that
-// were let in, if no load had to stay above zero.
-std::vector<LoadEstimator::TangentialGain> LoadEstimator::TangentialGains(
-    const std::vector<int>& sites, const std::vector<Eigen::MatrixXd>& columns,
-    const Eigen::MatrixXd& tangential, const Solution& solution) const {
-  std::vector<int> acting;
-  for (size_t i = 0; i < sites.size(); ++i) {
-    if (solution.loads[static_cast<Eigen::Index>(i)] > 0) acting.push_back(sites[i]);
-  }
-  const auto loads = static_cast<Eigen::Index>(acting.size());
-  Eigen::MatrixXd basis(data_.size(), loads + tangential.cols());
-  basis << columns_(Eigen::all, acting), tangential;
-  if (hidden_.cols() > 0) basis -= hidden_ * (hidden_.transpose() * basis);
-  Eigen::MatrixXd information;
-  dense::TransposedProduct(basis, basis, information);
-  if (loads > 0)
-    information.diagonal().head(loads).array() += kRidge * information.diagonal().head(loads).mean();
-  information.diagonal().tail(tangential.cols()) += TangentialPrior(tangential.cols());
-  const Eigen::LLT<Eigen::MatrixXd> factor(information);
-  std::vector<TangentialGain> gains;
-  for (const Eigen::MatrixXd& own : columns) {
-    Eigen::MatrixXd cross;
-    dense::TransposedProduct(basis, own, cross);
-    Eigen::MatrixXd left = own.transpose() * own - cross.transpose() * factor.solve(cross);
-    left.diagonal() += TangentialPrior(own.cols());
-    const Eigen::VectorXd pull = own.transpose() * solution.residual;
-    const Eigen::VectorXd force = left.ldlt().solve(pull);
-    gains.push_back({pull.dot(force), force.head<2>()});
-  }
-  return gains;
-}
-
-// One after the other, the hill first whose tangential force explains most; none that explains little: what a
-// shell gets wrong of a solid looks like a tangential force of the normal one's size.
-void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
-                            std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution) {
-  std::vector<int> sites;
-  for (const auto& hill : hills) sites.insert(sites.end(), hill.begin(), hill.end());
-  slipping.clear();
-  tangential.resize(data_.size(), 0);
-  solution = Refit(sites, tangential);
-  std::vector<Eigen::MatrixXd>& columns = tangential_columns_;
-  columns.clear();
-  for (const auto& hill : hills) columns.push_back(TangentialColumns(skin, hill));
-  left_out_.assign(hills.size(), {});
-  while (slipping.size() < hills.size()) {
-    left_out_ = TangentialGains(sites, columns, tangential, solution);
-    for (const int hill : slipping) left_out_[static_cast<size_t>(hill)] = {};
-    const auto best = std::max_element(left_out_.begin(), left_out_.end(),
-                                       [](const auto& a, const auto& b) { return a.chi2 < b.chi2; }) -
-                      left_out_.begin();
-    if (!(left_out_[static_cast<size_t>(best)].chi2 > kTangentialGain)) return;
-    Eigen::MatrixXd more(data_.size(), tangential.cols() + kTangential);
-    more << tangential, columns[static_cast<size_t>(best)];
-    Solution with = Refit(sites, more);
-    if (!(solution.chi2 - with.chi2 > kTangentialGain)) return;
-    slipping.push_back(static_cast<int>(best));
-    left_out_[static_cast<size_t>(best)] = {};
-    tangential = std::move(more);
-    solution = std::move(with);
-  }
 }
 
 void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed, LoadEstimate& estimate) {

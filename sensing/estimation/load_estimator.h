@@ -24,7 +24,10 @@ struct EstimatedLoad {
   Vec2 left_out_n = Vec2::Zero();    ///< a tangential force that may be there, but explains too little
   Vec3 force_n = Vec3::Zero();       ///< link frame
   double normal_force_n = 0;         ///< sum of the inward loads
-  Vec2 center = Vec2::Zero();        ///< column (not wrapped) and row of the site grid: centroid of the load
+  /// Column (not wrapped) and row of the site grid: centroid of the inward loads and, as far as there is one,
+  /// of where the tangential force acts.
+  Vec2 center = Vec2::Zero();
+  Vec2 tangential_center = Vec2::Zero();  ///< likewise, of `shares`
   Mat3 force_covariance_n2 = Mat3::Zero();
   Mat2 center_covariance = Mat2::Zero();  ///< of `center`
 };
@@ -111,6 +114,15 @@ class LoadEstimator {
                                               const std::vector<Eigen::MatrixXd>& columns,
                                               const Eigen::MatrixXd& tangential,
                                               const Solution& solution) const;
+  /// Columns with what they say of themselves.
+  struct FitColumns {
+    Eigen::MatrixXd columns;
+    Eigen::LLT<Eigen::MatrixXd> factor;
+  };
+  FitColumns ColumnsOf(const std::vector<int>& acting, const Eigen::MatrixXd& tangential) const;
+  Eigen::MatrixXd InformationBeside(const FitColumns& fit, const Eigen::MatrixXd& own) const;
+  Eigen::MatrixXd ShiftColumns(const Linearization& skin, const EstimatedLoad& load) const;
+  void MoveCenters(const Linearization& skin, LoadEstimate& estimate) const;
   void ProjectOut(const Eigen::MatrixXd& tangential);
   void Finish(Linearization& skin, const std::vector<HillFinder::Hill>& hills,
               const std::vector<int>& slipping, LoadEstimate& estimate);

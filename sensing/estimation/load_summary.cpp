@@ -49,6 +49,7 @@ void LoadEstimator::Finish(Linearization& skin, const std::vector<HillFinder::Hi
 
 void LoadEstimator::Conclude(const Linearization& skin, LoadEstimate& estimate) {
   WriteCovariances(skin, estimate);
+  MoveCenters(skin, estimate);
   Eigen::VectorXf beside(pulls_per_mm_.size());
   dense::Product(direct_mm2_, pulls_per_mm_.cast<float>(), beside);
   estimate.beside_mm = beside.cast<double>();
@@ -63,11 +64,13 @@ void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill&
   const int columns = mechanics_.columns();
   const auto top = std::max_element(load.inward_n.begin(), load.inward_n.end()) - load.inward_n.begin();
   const int origin = hill[static_cast<size_t>(top)] % columns;
-  Vec2 center = Vec2::Zero();
+  Vec2 center = Vec2::Zero(), tangential_center = Vec2::Zero();
   for (size_t k = 0; k < hill.size(); ++k) {
     const int site = hill[k];
     const int across = (site % columns - origin + columns + columns / 2) % columns - columns / 2;
-    center += load.inward_n[k] * Vec2(across, site / columns);
+    const Vec2 from_origin(across, site / columns);
+    center += load.inward_n[k] * from_origin;
+    tangential_center += load.shares[k] * from_origin;
     // A load spreads over neighbors whose normals differ.
     for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), site); it; ++it) {
       const Mat3& frame = skin.frames()[static_cast<size_t>(it.row())];
@@ -76,6 +79,7 @@ void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill&
     }
   }
   load.center = Vec2(origin, 0) + center / load.normal_force_n;
+  load.tangential_center = Vec2(origin, 0) + tangential_center;
 }
 
 void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {

@@ -1,0 +1,184 @@
+// Forces along the wall, and where they act: the part of LoadEstimator that is about them.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "sensing/estimation/load_estimator.h"
+#include "sensing/mechanics/dense.h"
+
+namespace taclink {
+namespace {
+
+constexpr double kTangentialGain = 60;  // of chi^2
+constexpr double kRidge = 1e-9;
+constexpr double kShiftSites = 2;  // standard deviation of where a tangential force acts about its hill
+
+}  // namespace
+
+// Of a force of 1 N that the hill's sites share as they share the load, around and along, and of couples.
+Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, const HillFinder::Hill& hill) {
+  double sum = 0;
+  for (const int site : hill) sum += loads_[site];
+  Eigen::VectorXd shares = Eigen::VectorXd::Zero(mechanics_.site_count());
+  for (const int site : hill) shares[site] = loads_[site] / sum;
+  const Eigen::VectorXd spread = mechanics_.spread() * shares;
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(factor_.rows(), kTangential);
+  columns.rightCols<2>() = skin.CoupleColumns(spread);
+  for (int k = 0; k < 2; ++k) {
+    for (Eigen::Index site = 0; site < spread.size(); ++site) {
+      if (spread[site] != 0)
+        columns.col(k) += spread[site] * skin.columns()[static_cast<size_t>(k + 1)].col(site).cast<double>();
+    }
+  }
+  dense::SolveLower(factor_, columns);
+  if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
+  return columns;
+}
+
+// Information that is there before the data, by column.
+Eigen::VectorXd LoadEstimator::TangentialPrior(Eigen::Index columns) const {
+  const double force = kTangentialN * mechanics_.force_unit(),
+               couple = kCoupleNmm * mechanics_.force_unit() * mechanics_.length_unit();
+  Eigen::VectorXd prior(columns);
+  for (Eigen::Index k = 0; k < columns; ++k)
+    prior[k] = k % kTangential < 2 ? 1 / (force * force) : 1 / (couple * couple);
+  return prior;
+}
+
+// Whitened, of loads that act and tangential forces that were let in.
+LoadEstimator::FitColumns LoadEstimator::ColumnsOf(const std::vector<int>& acting,
+                                                   const Eigen::MatrixXd& tangential) const {
+  const auto loads = static_cast<Eigen::Index>(acting.size());
+  FitColumns fit;
+  fit.columns.resize(data_.size(), loads + tangential.cols());
+  fit.columns << columns_(Eigen::all, acting), tangential;
+  if (hidden_.cols() > 0) fit.columns -= hidden_ * (hidden_.transpose() * fit.columns);
+  Eigen::MatrixXd information;
+  dense::TransposedProduct(fit.columns, fit.columns, information);
+  if (loads > 0)
+    information.diagonal().head(loads).array() += kRidge * information.diagonal().head(loads).mean();
+  information.diagonal().tail(tangential.cols()) += TangentialPrior(tangential.cols());
+  fit.factor.compute(information);
+  return fit;
+}
+
+// What the data say of more columns, if those of the fit are free.
+Eigen::MatrixXd LoadEstimator::InformationBeside(const FitColumns& fit, const Eigen::MatrixXd& own) const {
+  Eigen::MatrixXd cross;
+  dense::TransposedProduct(fit.columns, own, cross);
+  return own.transpose() * own - cross.transpose() * fit.factor.solve(cross);
+}
+
+// What each hill's tangential force would explain beside the loads that act and the tangential forces that
+// were let in, if no load had to stay above zero.
+std::vector<LoadEstimator::TangentialGain> LoadEstimator::TangentialGains(
+    const std::vector<int>& sites, const std::vector<Eigen::MatrixXd>& columns,
+    const Eigen::MatrixXd& tangential, const Solution& solution) const {
+  std::vector<int> acting;
+  for (size_t i = 0; i < sites.size(); ++i) {
+    if (solution.loads[static_cast<Eigen::Index>(i)] > 0) acting.push_back(sites[i]);
+  }
+  const FitColumns fit = ColumnsOf(acting, tangential);
+  std::vector<TangentialGain> gains;
+  for (const Eigen::MatrixXd& own : columns) {
+    Eigen::MatrixXd left = InformationBeside(fit, own);
+    left.diagonal() += TangentialPrior(own.cols());
+    const Eigen::VectorXd pull = own.transpose() * solution.residual;
+    const Eigen::VectorXd force = left.ldlt().solve(pull);
+    gains.push_back({pull.dot(force), force.head<2>()});
+  }
+  return gains;
+}
+
+// One after the other, the hill first whose tangential force explains most; none that explains little: what a
+// shell gets wrong of a solid looks like a tangential force of the normal one's size.
+void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
+                            std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution) {
+  std::vector<int> sites;
+  for (const auto& hill : hills) sites.insert(sites.end(), hill.begin(), hill.end());
+  slipping.clear();
+  tangential.resize(data_.size(), 0);
+  solution = Refit(sites, tangential);
+  std::vector<Eigen::MatrixXd>& columns = tangential_columns_;
+  columns.clear();
+  for (const auto& hill : hills) columns.push_back(TangentialColumns(skin, hill));
+  left_out_.assign(hills.size(), {});
+  while (slipping.size() < hills.size()) {
+    left_out_ = TangentialGains(sites, columns, tangential, solution);
+    for (const int hill : slipping) left_out_[static_cast<size_t>(hill)] = {};
+    const auto best = std::max_element(left_out_.begin(), left_out_.end(),
+                                       [](const auto& a, const auto& b) { return a.chi2 < b.chi2; }) -
+                      left_out_.begin();
+    if (!(left_out_[static_cast<size_t>(best)].chi2 > kTangentialGain)) return;
+    Eigen::MatrixXd more(data_.size(), tangential.cols() + kTangential);
+    more << tangential, columns[static_cast<size_t>(best)];
+    Solution with = Refit(sites, more);
+    if (!(solution.chi2 - with.chi2 > kTangentialGain)) return;
+    slipping.push_back(static_cast<int>(best));
+    left_out_[static_cast<size_t>(best)] = {};
+    tangential = std::move(more);
+    solution = std::move(with);
+  }
+}
+
+// What a tangential force moves by, if it acts a site farther around, or along: columns are linear in the
+// shares.
+Eigen::MatrixXd LoadEstimator::ShiftColumns(const Linearization& skin, const EstimatedLoad& load) const {
+  const int columns = mechanics_.columns(), rows = mechanics_.site_rows();
+  Eigen::MatrixXd shift = Eigen::MatrixXd::Zero(data_.size(), 2);
+  for (int axis = 0; axis < 2; ++axis) {
+    Eigen::VectorXd change = Eigen::VectorXd::Zero(mechanics_.site_count());
+    for (size_t k = 0; k < load.sites.size(); ++k) {
+      const int row = load.sites[k] / columns, column = load.sites[k] % columns;
+      for (const int by : {-1, 1}) {
+        const int r = axis == 1 ? std::clamp(row + by, 0, rows - 1) : row;
+        const int c = axis == 0 ? (column + by + columns) % columns : column;
+        change[r * columns + c] += 0.5 * by * load.shares[k];
+      }
+    }
+    const Eigen::VectorXd spread = mechanics_.spread() * change;
+    for (Eigen::Index site = 0; site < spread.size(); ++site) {
+      if (spread[site] == 0) continue;
+      shift.col(axis) +=
+          spread[site] * (skin.columns()[1].col(site) * static_cast<float>(load.tangential_n.x()) +
+                          skin.columns()[2].col(site) * static_cast<float>(load.tangential_n.y()))
+                             .cast<double>();
+    }
+  }
+  dense::SolveLower(factor_, shift);
+  if (hidden_.cols() > 0) shift -= hidden_ * (hidden_.transpose() * shift);
+  return shift;
+}
+
+// A body that drags the skin presses its front and lifts its rear: inward loads tell little of where it is,
+// and the first guess of where the tangential force acts was made from them. To first order the data tell
+// where it does; the center is that of all forces.
+void LoadEstimator::MoveCenters(const Linearization& skin, LoadEstimate& estimate) const {
+  std::vector<int> acting;
+  Eigen::MatrixXd tangential(data_.size(), 0);
+  for (size_t i = 0; i < estimate.loads.size(); ++i) {
+    const EstimatedLoad& load = estimate.loads[i];
+    for (size_t k = 0; k < load.sites.size(); ++k) {
+      if (load.inward_n[k] > 0) acting.push_back(load.sites[k]);
+    }
+    if (!load.has_tangential) continue;
+    tangential.conservativeResize(Eigen::NoChange, tangential.cols() + kTangential);
+    tangential.rightCols(kTangential) = tangential_columns_[hill_of_load_[i]];
+  }
+  if (tangential.cols() == 0) return;
+  const FitColumns fit = ColumnsOf(acting, tangential);
+  for (EstimatedLoad& load : estimate.loads) {
+    if (!load.has_tangential) continue;
+    const Eigen::MatrixXd own = ShiftColumns(skin, load);
+    Mat2 left = InformationBeside(fit, own);
+    left.diagonal().array() += 1 / (kShiftSites * kShiftSites);
+    const Mat2 covariance = left.inverse();
+    const Vec2 shift = covariance * (own.transpose() * solution_.residual);
+    const double tangential_n = load.tangential_n.norm(),
+                 weight = tangential_n / (tangential_n + load.normal_force_n);
+    load.center += weight * (load.tangential_center + shift - load.center);
+    load.center_covariance += weight * weight * covariance;
+  }
+}
+
+}  // namespace taclink
