@@ -26,6 +26,8 @@ const char* Name(ReasonId id) {
       return "too_deep";
     case ReasonId::kBeyondMarkers:
       return "beyond_markers";
+    case ReasonId::kEncircled:
+      return "encircled";
     case ReasonId::kSparseMarkers:
       return "sparse_markers";
     case ReasonId::kForceModel:

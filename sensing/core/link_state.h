@@ -35,6 +35,7 @@ enum class ReasonId : uint8_t {
   kLabels,            ///< markers of one region were left out as contradicting
   kTooDeep,           ///< pressed in deeper than forces were compared with the truth
   kBeyondMarkers,     ///< a load between a clamp and the first ring: how much of it is seen is not sure
+  kEncircled,         ///< bodies all around bend the skin in waves that are hardly resolved
   kSparseMarkers,     ///< a load on this skin may hide between markers
   kForceModel,        ///< the force model that was asked for does not hold here
   kDrift,             ///< the baseline has drifted

@@ -1,0 +1,92 @@
+#include "sensing/pipeline/judge.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sensing/model/model_file.h"
+
+namespace taclink {
+namespace {
+
+class JudgeTest : public ::testing::Test {
+ protected:
+  JudgeTest() {
+    const auto markers = static_cast<size_t>(model_.markers.count());
+    state_.shape.sources.assign(markers, MarkerSource::kBoth);
+    state_.forces.converged = true;
+    estimate_.displacements_mm = estimate_.inflated_mm =
+        Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(markers));
+  }
+  void Touch(double deg, double z_mm) {
+    Contact contact;
+    contact.center_mm = model_.PointAtDepth(deg * kPi / 180, z_mm, 0);
+    state_.contacts.push_back(contact);
+  }
+  std::vector<ReasonId> Reasons() {
+    Judge({.model = model_, .camera_trouble = "", .drift_advice = "", .told = told_, .estimate = estimate_},
+          state_);
+    std::vector<ReasonId> ids;
+    for (const Reason& reason : state_.reasons) ids.push_back(reason.id);
+    return ids;
+  }
+
+  const LinkModel model_ = LoadLinkModel("cylinder").value();
+  LinkState state_;
+  SkinEstimate estimate_;
+  PressureReading told_{.mpa = 1e-3, .sigma_mpa = 5e-5};
+};
+
+TEST_F(JudgeTest, WhatIsWellIsOk) {
+  Touch(20, 90);
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_EQ(state_.status, LinkStatus::kOk);
+}
+
+TEST_F(JudgeTest, BodiesAllAroundAreTold) {
+  for (int body = 0; body < 6; ++body) Touch(60 * body - 170, body % 2 == 0 ? 85 : 105);
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kEncircled));
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  // A gap.
+  state_.contacts.pop_back();
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+}
+
+TEST_F(JudgeTest, BodiesAlongTheLinkAreNotAround) {
+  for (int body = 0; body < 6; ++body) Touch(60 * body, 30 * (body + 1) - 5);
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+}
+
+TEST_F(JudgeTest, APressureThatDoesNotFitIsTold) {
+  state_.pressure_estimate = {.mpa = 1.14e-3, .sigma_mpa = 1e-6};
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  state_.pressure_estimate->mpa = 1.16e-3;
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kPressureMismatch));
+  EXPECT_THAT(state_.status_reason, testing::HasSubstr("1.160 kPa, the sensor 1.000 kPa"));
+}
+
+TEST_F(JudgeTest, MarkersThatContradictAreTold) {
+  state_.forces.region_residual = 5.1;
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kResidual));
+  state_.forces.region_residual = 1;
+  state_.forces.residual = 1.3;
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kResidual));
+}
+
+TEST_F(JudgeTest, WhatHasNoAnswerHasNoForces) {
+  estimate_.failure = EstimateFailure::kNotConverged;
+  state_.forces.converged = false;
+  Touch(20, 90);
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kNotConverged));
+  EXPECT_THAT(state_.contacts, testing::IsEmpty());
+}
+
+TEST_F(JudgeTest, FewMarkersAreALostLink) {
+  for (size_t m = 0; m < 150; ++m) state_.shape.sources[m] = MarkerSource::kInferred;
+  EXPECT_THAT(Reasons(), testing::Contains(ReasonId::kFewMarkers));
+  EXPECT_EQ(state_.status, LinkStatus::kLost);
+}
+
+}  // namespace
+}  // namespace taclink
