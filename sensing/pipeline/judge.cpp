@@ -84,11 +84,12 @@ int MostLeftOut(const LinkModel& model, const SkinShape& shape) {
   return most;
 }
 
+// Or on the last ring: of a body there, half is beyond.
 bool IsBeyondMarkers(const LinkModel& model, const std::vector<Contact>& contacts) {
   const auto& rings = model.markers.rings_z_mm;
   const double margin = 0.1 * (rings[1] - rings[0]);
   return std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
-    return contact.center_mm.z() < rings.front() - margin || contact.center_mm.z() > rings.back() + margin;
+    return contact.center_mm.z() < rings.front() + margin || contact.center_mm.z() > rings.back() - margin;
   });
 }
 
@@ -159,8 +160,8 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
   if (IsBeyondMarkers(evidence.model, state.contacts))
     state.reasons.push_back(
         {ReasonId::kBeyondMarkers,
-         "a contact lies between a clamped end and the first ring of markers: how strong it is "
-         "and where, the markers hardly show"});
+         "a contact lies on the first ring of markers or between it and the clamped end: what presses there "
+         "hardly shows, and may be stronger"});
   if (IsEncircled(state.contacts, kBeltMm * LengthUnit(evidence.model)))
     state.reasons.push_back({ReasonId::kEncircled,
                              "contacts follow each other closely all around the skin: the sum of their "
