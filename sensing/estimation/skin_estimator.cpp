@@ -16,7 +16,7 @@ constexpr double kLongestStepMm = 5, kUnlimitedMm = 1e9;
 constexpr double kStillReachMm = 0.4;    // from the inflated skin: its tangent is good enough
 constexpr double kTouchedReachMm = 2.5;  // likewise from where the touched one was made
 constexpr double kAssimilateMm = 2.5;    // farther off, a marker is pulled to its place first
-constexpr int kFirstLag = 3;             // frames that making a tangent takes, before it is known
+constexpr int kFramesAhead = 2;          // that making a tangent may take
 constexpr double kAheadShare = 0.75;     // of a tangent's reach: so far ahead of a moving contact it is made
 constexpr double kModelPressureShare = 0.01;  // of the pressure: what the model's inflation is wrong by
 constexpr double kNoiseDeviations = 2;        // of a spring's pull, that noise alone makes
@@ -55,11 +55,11 @@ SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions&
       still_(std::make_unique<Tangent>(mechanics_, near_, kStillReachMm)),
       touched_(std::make_unique<Tangent>(mechanics_, near_, kTouchedReachMm)),
       used_(still_.get()),
-      usual_lag_(kFirstLag),
       radial_pull_(mechanics_.marker_count()),
       radial_weight_(mechanics_.marker_count()) {
-  if (options.is_live && !IsFirstOrder())
-    maker_ = std::make_unique<TangentMaker>(std::make_unique<Tangent>(mechanics_, near_, kTouchedReachMm));
+  if (!IsFirstOrder())
+    maker_ = std::make_unique<TangentMaker>(std::make_unique<Tangent>(mechanics_, near_, kTouchedReachMm),
+                                            options.background);
 }
 SkinEstimator::~SkinEstimator() = default;
 
@@ -67,10 +67,9 @@ void SkinEstimator::Restart() {
   has_last_ = false;
   still_->Forget();
   touched_->Forget();
-  if (maker_) {
-    maker_->Wait();
-    maker_->spare()->Forget();
-  }
+  if (!maker_) return;
+  maker_->Finish();
+  maker_->spare()->Forget();
 }
 const Linearization& SkinEstimator::linearization() const {
   return used_->skin;
@@ -147,11 +146,12 @@ bool SkinEstimator::Remake(Tangent& tangent, const SkinProblem& problem, const S
   return tangent.Make(problem, state, local_n);
 }
 
-// The touched skin's next tangent, if it was made ahead and is better than the one at hand. It is not waited
-// for: on a busy machine its thread may be the last to go on.
+// The touched skin's next tangent, if one made ahead is due and is better than the one at hand. It is due
+// after a number of frames, not when it is ready: so the answer to the same frames is always the same.
 void SkinEstimator::TakeNext(const SkinProblem& problem, const ShellState& state,
                              const Eigen::VectorXd& local_n) {
-  if (!maker_ || maker_->is_working()) return;
+  if (maker_->is_begun() && frames_since_begun_ < kFramesAhead) return;
+  maker_->Finish();
   const auto is_good = [&](const Tangent& tangent) {
     return tangent.IsGoodFor(problem, state) && (local_n.size() == 0 || tangent.HasLocal(local_n));
   };
@@ -161,30 +161,27 @@ void SkinEstimator::TakeNext(const SkinProblem& problem, const ShellState& state
 }
 
 // After a frame with loads, while `last_` is still the frame before: begins with the tangent that
-// will be asked for when it is made, if the motion goes on.
+// will be asked for when it is due, if the motion goes on.
 void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate,
                               const Eigen::VectorXd& local_n) {
-  if (!maker_) return;
-  if (maker_->is_working()) {
-    ++lag_;
+  if (maker_->is_begun()) {
+    ++frames_since_begun_;
     return;
   }
-  if (lag_ > 0) usual_lag_ = lag_;
-  lag_ = 0;
+  if (!has_last_) return;
   ahead_ = estimate.state;
-  Eigen::VectorXd ahead_n = local_n;
-  if (has_last_) {
-    const double moved_mm = LongestOff(last_.mids_mm, ahead_.mids_mm);
-    const double share =
-        std::min(1.0 + usual_lag_, kAheadShare * touched_->reach_mm / std::max(moved_mm, 1e-9));
-    Extrapolate(last_, share, ahead_);
-    if (local_before_n_.size() == local_n.size())
-      ahead_n = (local_n + share * (local_n - local_before_n_)).cwiseMax(0.5 * local_n).cwiseMin(2 * local_n);
-  }
+  const double moved_mm = LongestOff(last_.mids_mm, ahead_.mids_mm);
+  const double share =
+      std::min<double>(kFramesAhead, kAheadShare * touched_->reach_mm / std::max(moved_mm, 1e-9));
+  Extrapolate(last_, share, ahead_);
+  const Eigen::VectorXd ahead_n =
+      (local_n + share * (local_n - local_before_n_)).cwiseMax(0.5 * local_n).cwiseMin(2 * local_n);
   const auto is_good = [&](const Tangent& tangent) {
     return tangent.IsGoodFor(problem, ahead_) && tangent.HasLocal(ahead_n);
   };
-  if (!is_good(*touched_) && !is_good(*maker_->spare())) maker_->Begin(problem, ahead_, ahead_n);
+  if (is_good(*touched_) || is_good(*maker_->spare())) return;
+  maker_->Begin(problem, ahead_, ahead_n);
+  frames_since_begun_ = 1;
 }
 
 bool SkinEstimator::StepOnce(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate,
@@ -381,7 +378,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
     return;
   }
   const Eigen::VectorXd local_n = used_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
-  MakeAhead(problem, estimate, local_n);
+  if (maker_) MakeAhead(problem, estimate, local_n);
   last_ = estimate.state;
   local_before_n_ = local_n;
   has_last_ = true;

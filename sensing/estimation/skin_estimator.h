@@ -56,14 +56,14 @@ struct SkinEstimatorOptions {
   /// None: the cheapest whose error is small enough, frame by frame. kLiteral is no model of this estimator.
   std::optional<ForceModel> model;
   int refinement = 0;  ///< elements per interval of the marker grid; 0: as many as the skin's dents ask for
-  /// Tangents are made ahead in a second thread, so that a moving contact's frames need not wait for them.
-  /// Answers then depend on timing, by less than steps settle to.
-  bool is_live = false;
+  /// Where tangents are made ahead, so that a moving contact's frames need not wait for them. None: in the
+  /// caller's thread, when they are due. The answers are the same.
+  BackgroundRunner background = {};
 };
 
 /// From labeled markers and a pressure to loads, pressure and the nonlinear equilibrium shape together; see
 /// estimation.md. The answer follows from the observation alone: the frames before only make it faster, as a
-/// place to start from and as a tangent that is still good. `linear` and `pressurised` are the same problem
+/// place to start from and as tangents that are still good. `linear` and `pressurised` are the same problem
 /// with the tangent at the slack or the inflated skin and one step. One thread.
 class SkinEstimator {
  public:
@@ -105,10 +105,10 @@ class SkinEstimator {
   Assimilation assimilation_;
   std::unique_ptr<Tangent> still_, touched_;  // of the skin without loads, and of the touched one
   Tangent* used_ = nullptr;
-  std::unique_ptr<TangentMaker> maker_;  // of the touched skin's next one; null: none is made ahead
+  std::unique_ptr<TangentMaker> maker_;  // of the touched skin's next one; null: first order asks for none
   ShellState ahead_;                     // where that one is thought to be asked for
   Eigen::VectorXd local_before_n_;       // of the frame of last_
-  int lag_ = 0, usual_lag_;              // frames since the maker has begun; that it took the last time
+  int frames_since_begun_ = 0;           // by the next frame with loads
   ShellState last_, start_;              // of the frame before; that this one's loads were sought from
   bool has_last_ = false;
   Eigen::VectorXd markers_mm_;

@@ -1,42 +1,47 @@
 #pragma once
 
-#include <condition_variable>
+#include <functional>
 #include <memory>
-#include <mutex>
-#include <thread>
 
 #include "sensing/estimation/tangent.h"
 
 namespace taclink {
 
-/// Makes a tangent in a thread of its own, which gives way to all others, while frames go on with the one at
-/// hand. One caller; the spare tangent is the thread's while it works and the caller's otherwise.
+/// Runs a job once, later, in another thread: one that gives way to others, for who comes to need the job
+/// before it has begun does it himself.
+using BackgroundRunner = std::function<void(std::function<void()>)>;
+
+/// Makes a tangent in the background, while frames go on with the one at hand. One caller; the spare tangent
+/// is the background's between Begin and Finish and the caller's otherwise. Without a background it is
+/// made by Finish.
 class TangentMaker {
  public:
-  explicit TangentMaker(std::unique_ptr<Tangent> spare);
+  explicit TangentMaker(std::unique_ptr<Tangent> spare, BackgroundRunner background = {});
   ~TangentMaker();
   TangentMaker(const TangentMaker&) = delete;
   TangentMaker& operator=(const TangentMaker&) = delete;
 
-  bool is_working() const;
-  /// While it is not working: begins with copies of these.
+  /// Between Begin and Finish.
+  bool is_begun() const { return work_ != nullptr; }
+  /// With copies of these. The one before must be finished.
   void Begin(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n);
-  void Wait();
-  /// While it is not working: what was made last, to be looked at and exchanged.
+  /// Waits for the background or, if that has not come to it, makes the tangent here.
+  void Finish();
+  /// What was made last, to be looked at and exchanged.
   std::unique_ptr<Tangent>& spare() { return spare_; }
 
  private:
-  void Work();
+  struct Work;
+
+  void Make() { spare_->Make(problem_, state_, local_n_); }
 
   std::unique_ptr<Tangent> spare_;
+  const BackgroundRunner background_;
   SkinProblem problem_;
   ShellState state_;
   Eigen::VectorXd local_n_;
-
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  bool is_working_ = false, is_ending_ = false;  // by mutex_
-  std::thread thread_;
+  // Shared with the job: one that comes after Finish has taken its work finds neither this nor more to do.
+  std::shared_ptr<Work> work_;
 };
 
 }  // namespace taclink

@@ -19,7 +19,7 @@ SkinEstimatorOptions SkinOptions(const ForceOptions& options) {
   SkinEstimatorOptions skin;
   if (options.model != ForceModel::kLiteral) skin.model = options.model;
   skin.refinement = options.refinement;
-  skin.is_live = options.is_live && options.model != ForceModel::kLiteral;
+  if (options.model != ForceModel::kLiteral) skin.background = options.background;
   return skin;
 }
 

@@ -18,8 +18,8 @@ struct ForceOptions {
   std::optional<ForceModel> model;
   /// Elements per interval of the marker grid; 0: as many as the skin's dents ask for.
   int refinement = 0;
-  /// A second thread works ahead while a contact moves (SkinEstimatorOptions).
-  bool is_live = false;
+  /// Where to work ahead while a contact moves (SkinEstimatorOptions).
+  BackgroundRunner background = {};
 };
 
 /// Gauge pressures: of the moment, and under which the baseline was taken.

@@ -13,6 +13,7 @@
 #include "server/assembly/pressure_factory.h"
 #include "server/assembly/processor_factory.h"
 #include "server/assembly/source_factory.h"
+#include "server/background_thread.h"
 
 namespace taclink::server {
 namespace {
@@ -37,19 +38,22 @@ class ChosenForceModel {
   std::optional<ForceModel> model_;  // guarded by mutex_; none: by tolerance, frame by frame
 };
 
-Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
+Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock, const BackgroundRunner& background) {
   auto model = LoadLinkModel(link.model);
   if (!model) return model.error();
   if (const auto good = CheckRules(link.rules, model->markers); !good) return good.error();
   const auto chosen = std::make_shared<ChosenForceModel>(link.force_model);
   const LinkFactories factories = {
       .source = [link, model = *model, &clock] { return MakeSource(link, model, clock); },
-      .processor = [link, model = *model, chosen] { return MakeProcessor(chosen->In(link), model); },
+      .processor = [link, model = *model, chosen,
+                    background] { return MakeProcessor(chosen->In(link), model, background); },
       .estimator =
-          [link, model = *model](std::optional<ForceModel> force_model) {
+          [link, model = *model, background](std::optional<ForceModel> force_model) {
             LinkConfig changed = link;
             changed.force_model = force_model;
-            return MakeStateEstimator(model, ToPipelineOptions(changed).force);
+            ForceOptions options = ToPipelineOptions(changed).force;
+            options.background = background;
+            return MakeStateEstimator(model, options);
           },
       .choose = [chosen](std::optional<ForceModel> force_model) { chosen->Set(force_model); }};
   auto source = factories.source();
@@ -96,10 +100,14 @@ Result<std::unique_ptr<ArmPoses>> MakePoses(const Config& config,
 }
 
 std::vector<Result<LinkParts>> BuildLinks(const Config& config, Clock& clock) {
+  // One for all links: on a machine that is too slow for all of them, frames only wait as without it.
+  const auto thread = std::make_shared<BackgroundThread>();
+  const BackgroundRunner background = [thread](std::function<void()> job) { thread->Post(std::move(job)); };
   // Simulated links solve their scenes first.
   std::vector<std::future<Result<LinkParts>>> built;
   for (const LinkConfig& link : config.links)
-    built.push_back(std::async(std::launch::async, [&link, &clock] { return BuildLink(link, clock); }));
+    built.push_back(std::async(std::launch::async,
+                               [&link, &clock, &background] { return BuildLink(link, clock, background); }));
   std::vector<Result<LinkParts>> links;
   for (size_t i = 0; i < built.size(); ++i) {
     links.push_back(built[i].get());

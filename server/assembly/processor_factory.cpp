@@ -94,7 +94,6 @@ PipelineOptions ToPipelineOptions(const LinkConfig& link) {
   PipelineOptions options;
   options.force.model = link.force_model;
   options.force.refinement = link.force_refinement;
-  options.force.is_live = true;
   options.drift = link.drift;
   if (link.pressure) {
     if (const auto* constant = std::get_if<ConstantPressureConfig>(&link.pressure->source))
@@ -104,8 +103,10 @@ PipelineOptions ToPipelineOptions(const LinkConfig& link) {
   return options;
 }
 
-Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model) {
+Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model,
+                                                     const BackgroundRunner& background) {
   PipelineOptions options = ToPipelineOptions(link);
+  options.force.background = background;
   if (link.calibration && IsMissing(*link.calibration)) {
     spdlog::warn(
         "link {}: {} does not exist yet; the first pictures calibrate the cameras instead. "

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <thread>
 
 #include "sensing/contact/contact_finder.h"
 #include "sensing/mechanics/element_load.h"
@@ -179,7 +180,8 @@ TEST_F(SkinEstimatorTest, NonsenseIsRefusedAndForgotten) {
   EXPECT_LT((estimate_.loads.loads[0].force_n - warm).norm(), 0.2 * sigma);
 }
 
-// In and out, while tangents are made ahead: each frame's answer is that of an estimator that saw only it.
+// In and out, while tangents are made ahead: each frame's answer is that of an estimator that saw only it,
+// and to the last bit that of one that has no second thread.
 TEST_F(SkinEstimatorTest, WhatIsMadeAheadChangesNoAnswer) {
   std::vector<SkinObservation> stages;
   for (const double force_n : {0.1, 0.25, 0.4, 0.5, 0.6}) {
@@ -187,12 +189,16 @@ TEST_F(SkinEstimatorTest, WhatIsMadeAheadChangesNoAnswer) {
     ASSERT_TRUE(pushed.ok);
     stages.push_back(Observe(pushed.markers_mm, 1.0, 0.02));
   }
-  SkinEstimator live(model_, {.model = {}, .refinement = 0, .is_live = true});
+  SkinEstimatorOptions options;
+  options.background = [](const std::function<void()>& job) { std::thread(job).detach(); };
+  SkinEstimator live(model_, options), alone(model_);
   for (int frame = 0; frame < 24; ++frame) {
     const int back = frame % 8;
     const SkinObservation& seen = stages[static_cast<size_t>(back < 5 ? back : 8 - back)];
-    SkinEstimate with;
+    SkinEstimate with, without;
     live.Estimate(seen, with);
+    alone.Estimate(seen, without);
+    EXPECT_TRUE(with.displacements_mm == without.displacements_mm) << frame;
     estimator_.Restart();
     estimator_.Estimate(seen, estimate_);
     ASSERT_EQ(with.failure, EstimateFailure::kNone);

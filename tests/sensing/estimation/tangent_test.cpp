@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <thread>
+
 #include "sensing/estimation/tangent_maker.h"
 #include "sensing/model/model_file.h"
 
@@ -9,6 +11,10 @@ namespace taclink {
 namespace {
 
 constexpr double kReach = 2.5, kSigmaMm = 0.05;
+
+void InAThread(const std::function<void()>& job) {
+  std::thread(job).detach();
+}
 
 class TangentTest : public ::testing::Test {
  protected:
@@ -60,22 +66,45 @@ TEST_F(TangentTest, IsGoodForForcesOfItsSize) {
 TEST_F(TangentTest, TheMakersIsTheSame) {
   Tangent own(mechanics_, near_, kReach);
   ASSERT_TRUE(own.Make(problem_, Dented(1), none_));
-  TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach));
-  EXPECT_FALSE(maker.is_working());
-  for (const double mm : {4.0, 1.0}) {
-    maker.Begin(problem_, Dented(mm), none_);
-    maker.Wait();
-    EXPECT_FALSE(maker.is_working());
+  for (const BackgroundRunner& background : {BackgroundRunner{}, BackgroundRunner{InAThread}}) {
+    TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach), background);
+    EXPECT_FALSE(maker.is_begun());
+    for (const double mm : {4.0, 1.0}) {
+      maker.Begin(problem_, Dented(mm), none_);
+      EXPECT_TRUE(maker.is_begun());
+      maker.Finish();
+      EXPECT_FALSE(maker.is_begun());
+    }
+    const Tangent& made = *maker.spare();
+    EXPECT_TRUE(made.IsGoodFor(problem_, Dented(1)));
+    EXPECT_EQ(made.DistanceMm(Dented(1)), 0);
+    for (size_t k = 0; k < 3; ++k) EXPECT_TRUE(made.skin.columns()[k] == own.skin.columns()[k]);
   }
-  const Tangent& made = *maker.spare();
-  EXPECT_TRUE(made.IsGoodFor(problem_, Dented(1)));
-  EXPECT_EQ(made.DistanceMm(Dented(1)), 0);
-  for (size_t k = 0; k < 3; ++k) EXPECT_TRUE(made.skin.columns()[k] == own.skin.columns()[k]);
+}
+
+// A background that is too busy: who needs the tangent makes it, and the job that comes later does nothing,
+// even when the maker is gone.
+TEST_F(TangentTest, AMakerDoesNotWaitForWhatHasNotBegun) {
+  std::vector<std::function<void()>> jobs;
+  {
+    TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach),
+                       [&](std::function<void()> job) { jobs.push_back(std::move(job)); });
+    maker.Begin(problem_, Dented(1), none_);
+    maker.Finish();
+    EXPECT_TRUE(maker.spare()->IsGoodFor(problem_, Dented(1)));
+    maker.spare()->Forget();
+    ASSERT_EQ(jobs.size(), 1u);
+    jobs[0]();
+    EXPECT_FALSE(maker.spare()->IsGoodFor(problem_, Dented(1)));
+    maker.Begin(problem_, Dented(1), none_);
+  }
+  ASSERT_EQ(jobs.size(), 2u);
+  jobs[1]();
 }
 
 // Destroyed at work: it ends first.
 TEST_F(TangentTest, AMakerEndsAtWork) {
-  TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach));
+  TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach), InAThread);
   maker.Begin(problem_, Dented(0), none_);
 }
 
