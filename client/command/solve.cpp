@@ -65,6 +65,22 @@ Json ValidityJson(const LinkState& state) {
   return {{"status", status}, {"reasons", reasons}};
 }
 
+// Both cameras' of one marker are one.
+std::vector<int> RejectedMarkers(const SkinShape& shape) {
+  std::vector<int> markers;
+  for (const RejectedMarker& rejected : shape.rejected) {
+    if (markers.empty() || markers.back() != rejected.marker) markers.push_back(rejected.marker);
+  }
+  return markers;
+}
+
+Json RejectedJson(const LinkModel& model, const SkinShape& shape) {
+  Json rejected = Json::array();
+  for (const int marker : RejectedMarkers(shape))
+    rejected.push_back({{"path", model.PathOf(marker) + 1}, {"ring", model.RingOf(marker) + 1}});
+  return rejected;
+}
+
 Json PressureJson(const LinkState& state) {
   if (!state.pressure_estimate) return nullptr;
   return Json::array({1e3 * state.pressure_estimate->mpa, 1e3 * state.pressure_estimate->sigma_mpa});
@@ -74,23 +90,25 @@ void PrintJson(const LinkModel& model, const LinkState& state) {
   Json contacts = Json::array();
   for (const auto& contact : state.contacts) contacts.push_back(ContactJson(contact));
   const StageTimes& t = state.stage_ms;
-  const Json out = {
-      {"model", model.name},
-      {"force_model", Name(state.forces.model)},
-      {"markers", {{"seen", state.shape.seen()}, {"inferred", state.shape.CountOf(MarkerSource::kInferred)}}},
-      {"validity", ValidityJson(state)},
-      {"converged", state.forces.converged},
-      {"residual_chi2_per_dof", state.forces.residual * state.forces.residual},
-      {"pressure_estimate_kpa", PressureJson(state)},
-      {"contacts", contacts},
-      {"total_force_n", ToJson(state.total_force_n)},
-      {"positions_mm", ToJson(state.shape.positions_mm)},
-      {"nodal_forces_n", ToJson(state.forces.forces_n)},
-      {"time_ms",
-       {{"detect", t.decode + t.detect},
-        {"register", t.register_},
-        {"reconstruct", t.reconstruct},
-        {"force", t.force}}}};
+  const Json out = {{"model", model.name},
+                    {"force_model", Name(state.forces.model)},
+                    {"markers",
+                     {{"seen", state.shape.seen()},
+                      {"inferred", state.shape.CountOf(MarkerSource::kInferred)},
+                      {"rejected", RejectedJson(model, state.shape)}}},
+                    {"validity", ValidityJson(state)},
+                    {"converged", state.forces.converged},
+                    {"residual_chi2_per_dof", state.forces.residual * state.forces.residual},
+                    {"pressure_estimate_kpa", PressureJson(state)},
+                    {"contacts", contacts},
+                    {"total_force_n", ToJson(state.total_force_n)},
+                    {"positions_mm", ToJson(state.shape.positions_mm)},
+                    {"nodal_forces_n", ToJson(state.forces.forces_n)},
+                    {"time_ms",
+                     {{"detect", t.decode + t.detect},
+                      {"register", t.register_},
+                      {"reconstruct", t.reconstruct},
+                      {"force", t.force}}}};
   std::puts(out.dump().c_str());
 }
 
@@ -146,6 +164,9 @@ Result<void> Solve(const SolveOptions& options) {
       std::fprintf(stderr, "taclink: worse than it could be: %s (%s)\n", reason.text.c_str(),
                    Name(reason.id));
   }
+  for (const int marker : RejectedMarkers(state->shape))
+    std::fprintf(stderr, "taclink: marker of path %d, ring %d left out: it contradicts the others\n",
+                 model->PathOf(marker) + 1, model->RingOf(marker) + 1);
   if (options.json) {
     PrintJson(*model, *state);
   } else if (!invalid) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sensing/estimation/isolated_markers.h"
+
 namespace taclink {
 namespace {
 
@@ -352,11 +354,17 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
       kModelPressureShare * std::abs(pressure_mpa);
   if (IsStill(observation, *inflated, prior, estimate)) return;
 
-  estimate.loads = {};
   estimate.failure = EstimateFailure::kNotConverged;
-  const SkinProblem problem = MakeProblem(observation, *inflated, std::move(prior), estimate.baseline_mm);
-  start_ = problem.inflated.state;
-  if (!Solve(problem, estimate)) {
+  SkinProblem problem = MakeProblem(observation, *inflated, std::move(prior), estimate.baseline_mm);
+  bool is_solved = Solve(problem, estimate);
+  // A marker that is somewhere else must not cost the frame.
+  for (const double most : {kSurelyIsolated, kPerhapsIsolated}) {
+    if (is_solved) break;
+    const int hidden = HideIsolated(mechanics_.model(), inflated->markers_mm, most, mechanics_.length_unit(),
+                                    problem.observed);
+    if (hidden > 0) is_solved = Solve(problem, estimate);
+  }
+  if (!is_solved) {
     has_last_ = false;
     estimate.state = start_;
     mechanics_.markers().Displacements(start_, estimate.displacements_mm);
@@ -396,6 +404,9 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
 }
 
 bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
+  estimate.loads = {};
+  estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
+  start_ = problem.inflated.state;
   const bool is_small = IsFirstOrder() || FurthestOff(problem.inflated.state, problem.observed) <
                                               2 * kStillReachMm * mechanics_.length_unit();
   if (is_small && SolveSmall(*still_, problem, estimate)) return true;

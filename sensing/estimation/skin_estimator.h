@@ -73,6 +73,8 @@ class SkinEstimator {
   void Estimate(const SkinObservation& observation, SkinEstimate& estimate);
   /// Forgets the frames before.
   void Restart();
+  /// Does not begin from the last frame's shape.
+  void ForgetShape() { has_last_ = false; }
 
   SkinMechanics& mechanics() { return mechanics_; }
   /// What the last estimate was made with.

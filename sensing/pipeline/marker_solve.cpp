@@ -5,15 +5,49 @@
 #include "sensing/pipeline/judge.h"
 
 namespace taclink {
+namespace {
+
+constexpr int kMostPasses = 4;
+constexpr double kOutlierSigmas = 6;  // as CameraEvidenceOptions has it
+
+// Markers that contradict the estimate. True: there was one more.
+bool LeaveOutliersOut(SkinShape& shape) {
+  bool changed = false;
+  for (size_t m = 0; m < shape.measured.size(); ++m) {
+    MeasuredDisplacement& measured = shape.measured[m];
+    const Mat3& information = measured.information_per_mm2;
+    if (!(information.trace() > 0)) continue;
+    // From the posterior, which has moved towards what neighbors agree on, by noise alone: no more than chi^2
+    // of the error from what the others say.
+    const Vec3 error = measured.displacement_mm - shape.displacements_mm[m];
+    if (error.dot(information * error) < kOutlierSigmas * kOutlierSigmas) continue;
+    for (const CameraId id : kBothCameras) {
+      const bool is_other =
+          shape.sources[m] == (id == CameraId::kTop ? MarkerSource::kBottom : MarkerSource::kTop);
+      if (!is_other) shape.rejected.push_back({id, static_cast<int>(m)});
+    }
+    measured = {};
+    shape.sources[m] = MarkerSource::kInferred;
+    changed = true;
+  }
+  return changed;
+}
+
+}  // namespace
 
 LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, const PressurePair& pressure,
                        SkinShape shape) {
   LinkState state;
   state.shape = std::move(shape);
   ContactFinder finder(model);
-  estimator.Estimate(pressure, finder, state.shape, state.forces, state.contacts);
-  for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   const SkinEstimate& estimate = estimator.estimate();
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    estimator.Estimate(pressure, finder, state.shape, state.forces, state.contacts);
+    if (estimate.failure != EstimateFailure::kNone || !LeaveOutliersOut(state.shape)) break;
+    // An equilibrium that a wrong marker led to may hold without it.
+    estimator.skin().ForgetShape();
+  }
+  for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   if (state.forces.converged)
     state.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
   Judge(
