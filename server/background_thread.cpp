@@ -1,19 +1,10 @@
 #include "server/background_thread.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <utility>
 
 #include "server/thread_setup.h"
 
 namespace taclink::server {
-namespace {
-
-constexpr int kNiceness = 10;  // of Linux' 19
-
-}  // namespace
-
 BackgroundThread::BackgroundThread() : thread_([this] { Run(); }) {}
 
 BackgroundThread::~BackgroundThread() {
@@ -35,8 +26,6 @@ void BackgroundThread::Post(std::function<void()> job) {
 
 void BackgroundThread::Run() {
   SetUpThread("background", {});
-  // A thread's own on Linux. A system that refuses it shares the processor evenly.
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNiceness);
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [this] { return !jobs_.empty() || is_ending_; });

@@ -8,8 +8,9 @@
 
 namespace taclink::server {
 
-/// One thread for work that nothing waits for, in the order in which it comes. It gives way to the links'
-/// workers. All jobs that were posted are done before it ends.
+/// One thread for work that is asked for before it is needed, in the order in which it comes. Of no lower
+/// priority than the links' workers: on a busy machine it would hardly run, and they would wait for it. All
+/// jobs that were posted are done before it ends.
 class BackgroundThread {
  public:
   BackgroundThread();

@@ -7,8 +7,8 @@
 
 namespace taclink {
 
-/// Runs a job once, later, in another thread: one that gives way to others, for who comes to need the job
-/// before it has begun does it himself.
+/// Runs a job once, later, in another thread, or never: who comes to need a job that has not begun does it
+/// himself.
 using BackgroundRunner = std::function<void(std::function<void()>)>;
 
 /// Makes a tangent in the background, while frames go on with the one at hand. One caller; the spare tangent
