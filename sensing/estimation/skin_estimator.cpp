@@ -73,6 +73,10 @@ void SkinEstimator::Restart() {
   maker_->Finish();
   maker_->spare()->Forget();
 }
+void SkinEstimator::BeginAgain() {
+  has_last_ = had_last_;
+  if (has_last_) last_ = before_;
+}
 const Linearization& SkinEstimator::linearization() const {
   return used_->skin;
 }
@@ -331,6 +335,8 @@ bool SkinEstimator::AreNeighborsStill() const {
 }
 
 void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& estimate) {
+  had_last_ = has_last_;
+  if (has_last_) before_ = last_;
   estimate.failure = EstimateFailure::kNoEquilibrium;
   estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
   estimate.first_order_mm = 0;

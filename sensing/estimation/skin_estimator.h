@@ -73,8 +73,9 @@ class SkinEstimator {
   void Estimate(const SkinObservation& observation, SkinEstimate& estimate);
   /// Forgets the frames before.
   void Restart();
-  /// Does not begin from the last frame's shape.
-  void ForgetShape() { has_last_ = false; }
+  /// The next call is of the same frame, without markers that were wrong: it begins from where the last call
+  /// began, for a kink that a wrong marker has made may be an equilibrium without it.
+  void BeginAgain();
 
   SkinMechanics& mechanics() { return mechanics_; }
   /// What the last estimate was made with.
@@ -112,7 +113,8 @@ class SkinEstimator {
   Eigen::VectorXd local_before_n_;       // of the frame of last_
   int frames_since_begun_ = 0;           // by the next frame with loads
   ShellState last_, start_;              // of the frame before; that this one's loads were sought from
-  bool has_last_ = false;
+  ShellState before_;                    // last_ when the last call began
+  bool has_last_ = false, had_last_ = false;
   Eigen::VectorXd markers_mm_;
   Eigen::VectorXd radial_pull_, radial_weight_;  // of the frame in work
 };

@@ -44,8 +44,7 @@ LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, const 
   for (int pass = 0; pass < kMostPasses; ++pass) {
     estimator.Estimate(pressure, finder, state.shape, state.forces, state.contacts);
     if (estimate.failure != EstimateFailure::kNone || !LeaveOutliersOut(state.shape)) break;
-    // An equilibrium that a wrong marker led to may hold without it.
-    estimator.skin().ForgetShape();
+    estimator.skin().BeginAgain();
   }
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   if (state.forces.converged)

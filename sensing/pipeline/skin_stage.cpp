@@ -89,8 +89,7 @@ void SkinStage::Run(const LabelledMarkers& markers, const std::optional<Pressure
     }
     about_mm_ = now;
     const bool reconsidered = evidence_.Reconsider(now, model_covariances_);
-    // An equilibrium that a wrong marker led to may hold without it.
-    if (reconsidered) estimator.skin().ForgetShape();
+    if (reconsidered) estimator.skin().BeginAgain();
     const bool looks_otherwise = evidence_.UpdateLooks(now) > kSameLookMm;
     if (!reconsidered && !looks_otherwise && moved_mm < kSamePlaceMm) break;
   }
