@@ -33,11 +33,11 @@ class ServerTest : public ScratchFolder {
     ASSERT_NE(address_, "");
   }
 
-  void StartSteadyArm(const std::string& more = "") {
+  void StartSteadyArm(const std::string& of_links = "", const std::string& sections = "") {
     Write("steady.yaml", kScene);
-    const std::string settings = "model: cylinder, source: simulated, scene: steady.yaml" + more;
-    StartServer("taclink_config: 1\narm:\n  name: test\n  links:\n    - {name: a, " + settings +
-                "}\n    - {name: b, " + settings + "}\n");
+    const std::string settings = "model: cylinder, source: simulated, scene: steady.yaml" + of_links;
+    StartServer("taclink_config: 1\n" + sections + "arm:\n  name: test\n  links:\n    - {name: a, " +
+                settings + "}\n    - {name: b, " + settings + "}\n");
   }
 
   std::vector<std::string> Watch(std::vector<std::string> more) const {
@@ -180,8 +180,9 @@ TEST_F(ServerTest, MissingCameraIsAStatusAndNoOtherLinkMinds) {
 
 // A client that stops reading costs the server nothing and no other client anything; its gap is counted.
 TEST_F(ServerTest, StoppedClientHarmsNobody) {
-  // Without the nonlinear skin, which takes its memory when a dent first asks for it.
-  StartSteadyArm(", force_model: linear");
+  // Without the nonlinear skin, which takes its memory when a dent first asks for it, and with a queue that
+  // keeps 2 MB of frames: what waits for a client without a bound would be 35 MB and more at the end.
+  StartSteadyArm(", force_model: linear", "limits: {queue_messages: 32}\n");
   Process slow(Watch({"--detail", "full", "--every"}));
   ASSERT_TRUE(slow.ReadLine(seconds(60)).has_value());
   Process other(Watch({}));
