@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/command/csv.h"
+#include "client/command/marker_noise.h"
 
 namespace taclink::command {
 namespace {
@@ -51,9 +52,19 @@ Result<Row> ParseRow(const std::string& line, const LinkModel& model) {
   return row;
 }
 
+void SetNoise(const MarkerNoise& noise, SkinShape& shape) {
+  const Vec3 variances = Vec3(noise.xy_mm, noise.xy_mm, noise.z_mm).cwiseAbs2();
+  for (size_t m = 0; m < shape.sources.size(); ++m) {
+    if (shape.sources[m] != MarkerSource::kBoth) continue;
+    shape.covariances_mm2[m] = variances.asDiagonal();
+    shape.measured[m] = {shape.displacements_mm[m], variances.cwiseInverse().asDiagonal()};
+  }
+}
+
 }  // namespace
 
-Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model, double sigma_mm) {
+Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
+                                std::optional<double> sigma_mm) {
   std::ifstream in(path);
   if (!in || std::filesystem::is_directory(path))
     return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
@@ -71,7 +82,6 @@ Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
   const auto fail = [&](const std::string& what) {
     return Error{ErrorCode::kInvalidArgument, path + ":" + std::to_string(number) + ": " + what};
   };
-  const Vec3 variances = sigma_mm * sigma_mm * Vec3(1, 1, 9);
   while (std::getline(in, line)) {
     ++number;
     if (IsEmptyCsvLine(line)) continue;
@@ -91,11 +101,10 @@ Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
     if (!row->seen) continue;
     shape.displacements_mm[m] = row->displacement_mm;
     shape.positions_mm[m] += row->displacement_mm;
-    shape.covariances_mm2[m] = variances.asDiagonal();
     shape.sources[m] = MarkerSource::kBoth;
-    shape.measured[m] = {row->displacement_mm, variances.cwiseInverse().asDiagonal()};
   }
   if (shape.seen() < 3) return Error{ErrorCode::kInvalidArgument, path + ": holds fewer than 3 markers"};
+  SetNoise(sigma_mm ? MarkerNoise{*sigma_mm, 3 * *sigma_mm} : NoiseOf(model, shape), shape);
   return shape;
 }
 

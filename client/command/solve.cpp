@@ -20,7 +20,7 @@ struct SolveOptions {
   std::string calibration;
   double pressure_kpa = 0, baseline_pressure_kpa = 0;
   std::optional<double> pressure_sigma_pa;
-  double sigma_mm = 0.05;
+  std::optional<double> sigma_mm;
   std::string force_model = "auto";
   int force_refinement = 0;
   bool json = false;
@@ -206,8 +206,9 @@ void AddSolve(const Arguments& app, Selected& selected) {
                  "Standard deviation of these pressures; 50 Pa if not given")
       .Must(Within(0.01, 1e5));
   command
-      .AddOption("--sigma-mm", options->sigma_mm,
-                 "With --markers: their standard deviation in x and y; z: 3 times")
+      .AddOption(
+          "--sigma-mm", options->sigma_mm,
+          "With --markers: their standard deviation in x and y; z: 3 times; told by themselves if not given")
       .Must(Within(1e-4, 10));
   command.AddOption("--force-model", options->force_model, "auto: the cheapest that is good enough")
       .Must(OneOf({"auto", "literal", "linear", "pressurised", "nonlinear"}));

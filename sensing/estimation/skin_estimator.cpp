@@ -383,7 +383,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   else
     mechanics_.markers().Displacements(estimate.state, estimate.displacements_mm);
   estimate.displacements_mm += estimate.loads.beside_mm;
-  estimate.pressure_mpa = pressure_mpa + estimate.loads.pressure_error_mpa;
+  estimate.pressure_mpa = problem.pressure_mpa + estimate.loads.pressure_error_mpa;
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
                      : estimate.loads.converged ? EstimateFailure::kNone
                                                 : EstimateFailure::kNotConverged;
@@ -402,7 +402,7 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
                                        PressurePrior prior, const Eigen::VectorXd& baseline_mm) const {
   SkinProblem problem{.observed = observation.markers,
                       .inflated = inflated,
-                      .pressure_mpa = observation.pressure.mpa,
+                      .pressure_mpa = inflated.pressure_mpa,
                       .prior = std::move(prior)};
   for (int m = 0; m < mechanics_.marker_count(); ++m)
     problem.observed.displacement_mm[static_cast<size_t>(m)] += baseline_mm.segment<3>(3 * m);

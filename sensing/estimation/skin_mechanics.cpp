@@ -16,6 +16,8 @@ constexpr double kSpreadMm = 3.2;         // standard deviation of a load's spre
 constexpr double kLeastShare = 0.02;      // of the largest; less is left out of a spread
 constexpr double kInflationStep = 0.011;  // of PressureScale
 constexpr int kMostSteps = 400;
+constexpr int kParts = 8;          // of a step, where the skin does not stand at its far end
+constexpr int kForgivenSteps = 2;  // that a pressure may be beyond what the skin stands
 constexpr double kUnitLengthMm = 11.5704,
                  kUnitForceN = 1.225;  // sqrt(R t) and E t^2 of the cylinder with 0.1 MPa
 
@@ -123,33 +125,48 @@ bool SkinMechanics::Solve(InflatedSkin& skin) {
   return true;
 }
 
-const InflatedSkin* SkinMechanics::Solved(int step) {
-  if (std::abs(step) > kMostSteps) return nullptr;
-  if (const auto found = solved_.find(step); found != solved_.end()) return found->second.get();
+// Whole steps are solved from the step before, parts of a step from its near end.
+const InflatedSkin* SkinMechanics::Solved(int part) {
+  if (std::abs(part) > kMostSteps * kParts) return nullptr;
+  if (const auto found = solved_.find(part); found != solved_.end()) return found->second.get();
   auto skin = std::make_unique<InflatedSkin>();
-  skin->pressure_mpa = step * pressure_step_mpa_;
-  if (step == 0) {
+  skin->pressure_mpa = part * (pressure_step_mpa_ / kParts);
+  if (part == 0) {
     skin->state = shell_.Rest();
   } else {
-    const InflatedSkin* before = Solved(step > 0 ? step - 1 : step + 1);
-    if (before == nullptr) return solved_.emplace(step, nullptr).first->second.get();
+    const int nearer = part > 0 ? part - 1 : part + 1;
+    const InflatedSkin* before = Solved(nearer / kParts * kParts);
+    if (before == nullptr) return solved_.emplace(part, nullptr).first->second.get();
     skin->state = before->state;
   }
   if (!Solve(*skin)) skin = nullptr;
-  return solved_.emplace(step, std::move(skin)).first->second.get();
+  return solved_.emplace(part, std::move(skin)).first->second.get();
 }
 
 const InflatedSkin* SkinMechanics::Inflated(double pressure_mpa) {
-  const double at = pressure_mpa / pressure_step_mpa_;
-  if (!(std::abs(at) < kMostSteps)) return nullptr;
+  const double part_mpa = pressure_step_mpa_ / kParts;
+  if (!(std::abs(pressure_mpa) < (kMostSteps - 1) * pressure_step_mpa_)) return nullptr;
+  if (const InflatedSkin* skin = Between(pressure_mpa, kParts)) return skin;
+  if (const InflatedSkin* skin = Between(pressure_mpa, 1)) return skin;
+  const int toward = pressure_mpa > 0 ? -1 : 1;
+  auto part = static_cast<int>(std::trunc(pressure_mpa / part_mpa));
+  for (int i = 0; i <= kForgivenSteps * kParts; ++i, part += toward) {
+    if (const InflatedSkin* skin = Solved(part)) return skin;
+  }
+  return nullptr;
+}
+
+// Between the multiples of `parts` on both sides.
+const InflatedSkin* SkinMechanics::Between(double pressure_mpa, int parts) {
+  const double h = pressure_step_mpa_ * parts / kParts, at = pressure_mpa / h;
   const int step = static_cast<int>(std::floor(at));
-  const InflatedSkin* a = Solved(step);
+  const InflatedSkin* a = Solved(step * parts);
   const double x = at - step;
   if (x == 0) return a;
-  const InflatedSkin* b = Solved(step + 1);
+  const InflatedSkin* b = Solved((step + 1) * parts);
   if (a == nullptr || b == nullptr) return nullptr;
   // Hermite's cubic.
-  const double rise = x * x * (3 - 2 * x), h = pressure_step_mpa_;
+  const double rise = x * x * (3 - 2 * x);
   const double slope_a = h * x * (1 - x) * (1 - x), slope_b = h * x * x * (x - 1);
   const auto mix = [&](const Vec3& va, const Vec3& vb, const Vec3& da, const Vec3& db) -> Vec3 {
     return (1 - rise) * va + rise * vb + slope_a * da + slope_b * db;

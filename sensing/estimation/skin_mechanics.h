@@ -59,12 +59,15 @@ class SkinMechanics {
   /// Pressures that are solved are multiples of this, MPa.
   double pressure_step() const { return pressure_step_mpa_; }
 
-  /// Null: there is no stable equilibrium that smaller pressures lead to. Interpolated between pressures that
-  /// were solved (cubic, a ten-thousandth of the growth); valid until the next call.
+  /// At the pressure, or at the nearest at which the skin stands: a reading scatters about zero, where a
+  /// little suction buckles it. Null: two steps nearer to zero there is no stable equilibrium that smaller
+  /// pressures lead to. Interpolated between pressures that were solved (cubic, a ten-thousandth of the
+  /// growth); valid until the next call.
   const InflatedSkin* Inflated(double pressure_mpa);
 
  private:
-  const InflatedSkin* Solved(int step);
+  const InflatedSkin* Solved(int part);
+  const InflatedSkin* Between(double pressure_mpa, int parts);
   bool Solve(InflatedSkin& skin);
   void MakeSpread();
 
@@ -75,7 +78,7 @@ class SkinMechanics {
   Eigen::SparseMatrix<double> spread_;
   double length_unit_ = 1, force_unit_ = 1, pressure_step_mpa_ = 0;
   EquilibriumSolver equilibrium_;
-  std::map<int, std::unique_ptr<InflatedSkin>> solved_;  // by pressure in steps; null: none
+  std::map<int, std::unique_ptr<InflatedSkin>> solved_;  // by pressure in parts of a step; null: none
   InflatedSkin between_;
 };
 

@@ -58,7 +58,7 @@ double StateEstimator::PressureFromShape(const MarkerObservations& observed, con
     }
     if (asked.empty()) return pressure.now.mpa;
     const double by = Median(asked);
-    mpa += by;
+    mpa = skin->pressure_mpa + by;
     if (std::abs(by) < 1e-6) break;
   }
   return mpa;

@@ -180,6 +180,29 @@ TEST_F(SkinEstimatorTest, NonsenseIsRefusedAndForgotten) {
   EXPECT_LT((estimate_.loads.loads[0].force_n - warm).norm(), 0.2 * sigma);
 }
 
+// A sensor scatters about zero, and a little suction buckles this skin: no reading that is true within its
+// deviation costs the frame, and what is told beyond what the skin stands does not change the force.
+TEST_F(SkinEstimatorTest, ReadingsBelowZeroAreNoSuction) {
+  const Pushed pushed = Push(model_, 0, 1.3, 95, 0.2, 4);
+  ASSERT_TRUE(pushed.ok);
+  for (const double kpa : {0.0, -0.002, -0.02, -0.05, -0.08, -0.12}) {
+    SkinObservation observation = Observe(pushed.markers_mm, kpa, 0.05);
+    observation.pressure.sigma_mpa = 5e-5;
+    estimator_.Estimate(observation, estimate_);
+    ASSERT_EQ(estimate_.failure, EstimateFailure::kNone) << kpa;
+    ASSERT_EQ(estimate_.loads.loads.size(), 1u) << kpa;
+    EXPECT_NEAR(estimate_.loads.loads[0].force_n.norm(), 0.2, 0.01) << kpa;
+    EXPECT_NEAR(estimate_.pressure_mpa, 0, 1e-5) << kpa;
+    // Untouched, with a baseline whose reading was off likewise.
+    observation = Observe(Eigen::VectorXd::Zero(pushed.markers_mm.size()), -kpa, 0.05);
+    observation.baseline_pressure = {1e-3 * kpa, 5e-5};
+    observation.pressure.sigma_mpa = 5e-5;
+    estimator_.Estimate(observation, estimate_);
+    ASSERT_EQ(estimate_.failure, EstimateFailure::kNone) << kpa;
+    EXPECT_TRUE(estimate_.loads.loads.empty()) << kpa;
+  }
+}
+
 // In and out, while tangents are made ahead: each frame's answer is that of an estimator that saw only it,
 // and to the last bit that of one that has no second thread.
 TEST_F(SkinEstimatorTest, WhatIsMadeAheadChangesNoAnswer) {
