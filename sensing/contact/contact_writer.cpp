@@ -96,6 +96,8 @@ void ContactWriter::WriteShape(const EstimatedLoad& load, Contact& contact) {
   Eigen::Matrix<double, 3, 2> pitch;
   pitch << around, along;
   contact.center_covariance_mm2 = pitch * load.center_covariance * pitch.transpose();
+  // A node's load is spread over its cell, which is one pitch wide.
+  const Mat2 of_cell = Vec2(around.squaredNorm(), along.squaredNorm()).asDiagonal() * (1.0 / 12);
   Mat2 second = Mat2::Zero();
   double sum = 0;
   const double middle = load.center.x() - origin_;
@@ -104,7 +106,7 @@ void ContactWriter::WriteShape(const EstimatedLoad& load, Contact& contact) {
     const double area = mechanics_.mesh().areas_mm2[static_cast<size_t>(mechanics_.NodeOfSite(at.site))];
     const Vec2 off(FromOrigin(at.site) - middle, at.site / mechanics_.columns() - load.center.y());
     const Vec2 off_mm(off.x() * around.norm(), off.y() * along.norm());
-    second += at.inward_n * off_mm * off_mm.transpose();
+    second += at.inward_n * (off_mm * off_mm.transpose() + of_cell);
     sum += at.inward_n;
     if (at.inward_n > kLoaded * peak_mpa_ * area) contact.area_mm2 += area;
   }
