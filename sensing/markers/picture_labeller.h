@@ -80,6 +80,7 @@ class PictureLabeller {
   bool SizeFits(const Detection& d, int ring) const;
   void LearnAreas();
   Error Refusal(const std::string& why) const;
+  bool IsResolved(int ring) const;
   Result<void> CheckComplete();
   PictureLabels Labels();
 

@@ -15,6 +15,7 @@ constexpr int kMaxRounds = 12;
 constexpr double kMaxAreaRatio = 2.2;  // of a marker against others of its ring
 constexpr double kMinOfRing = 0.15;    // part of a ring's or a path's markers without which it is none
 constexpr double kMinSeen = 0.5;       // of all markers
+constexpr double kResolvedPx = 4;      // between rings; closer, their spots run into one another
 
 }  // namespace
 
@@ -93,6 +94,16 @@ Error PictureLabeller::Refusal(const std::string& why) const {
               "; check the light, the link model and that little touches the skin"};
 }
 
+// Far rings of a skin that widens away from the camera are not.
+bool PictureLabeller::IsResolved(int ring) const {
+  const auto& radii = grid_.ring_log_radii();
+  const auto radius_px = [&](int j) { return std::exp(radii[static_cast<size_t>(j)]); };
+  for (const int next : {ring - 1, ring + 1}) {
+    if (next >= 0 && next < rings_ && std::abs(radius_px(next) - radius_px(ring)) < kResolvedPx) return false;
+  }
+  return true;
+}
+
 Result<void> PictureLabeller::CheckComplete() {
   int all = 0;
   for (int j = 0; j < rings_; ++j) {
@@ -103,7 +114,7 @@ Result<void> PictureLabeller::CheckComplete() {
       inside += Inside(grid_.PixelOf(l, 0, grid_.ring_log_radii()[static_cast<size_t>(j)]), size) ? 1 : 0;
     }
     all += seen;
-    if (seen < kMinOfRing * inside)
+    if (seen < kMinOfRing * inside && IsResolved(j))
       return Refusal("of ring " + std::to_string(model_.RingOf(MarkerAt(0, j)) + 1) +
                      " hardly a marker is seen, the link may have fewer rings than the model");
   }

@@ -123,6 +123,28 @@ TEST_P(RestLabelsTest, WrongModelsAreRefused) {
 
 INSTANTIATE_TEST_SUITE_P(ShippedModels, RestLabelsTest, testing::Values("cylinder", "barrel"));
 
+// From the narrow end of a cone its far rings are 3 px apart and run into one another: they cost nothing but
+// their own markers.
+TEST(RestLabels, ConeWhoseFarRingsRunTogether) {
+  const LinkModel model = LoadLinkModel("cone").value();
+  const Renderer renderer(model, model.nominal_rig, {}, 5);
+  const SkinTruth truth = RestTruth(model);
+  MarkerDetector detector;
+  for (const CameraId id : kBothCameras) {
+    cv::Mat gray;
+    Detections found;
+    renderer.Render(truth, id, gray);
+    detector.Detect(gray, found);
+    const auto labels = LabelPicture(model, id, found, gray);
+    ASSERT_TRUE(labels.ok()) << labels.error().message;
+    EXPECT_GE(labels->markers.size(), id == CameraId::kTop ? 235u : 180u);
+    const Projector projector(model.nominal_rig[id]);
+    for (const PictureMarker& m : labels->markers)
+      EXPECT_LT((m.detection.center_px - projector.Project(model.RestMarker(m.marker)).value()).norm(), 1.5)
+          << m.marker;
+  }
+}
+
 TEST(RestLabels, RealPicture) {
   const LinkModel model = LoadLinkModel("barrel").value();
   MarkerDetector detector;
