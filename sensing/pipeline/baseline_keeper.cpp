@@ -92,7 +92,7 @@ void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state
 void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& state,
                                    const LabelledMarkers& labels, SkinStage& skin, StateEstimator& estimator,
                                    const Clock& clock) {
-  const Result<bool> complete = tare_->Add(state, labels, off_mm_);
+  const Result<bool> complete = tare_->Add(state, labels, off_mm_, frame_pressure_);
   if (complete && !*complete) return;
   if (!complete) {
     tare_end_ = complete.error();
@@ -101,11 +101,11 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
                             .forced = tare_->forced(),
                             .shift_mm = tare_->shift_mm(),
                             .previous_age_s = AgeS(times, clock)};
-    // The pressure was good enough for this frame's estimate.
-    const auto inflation = estimator.InflationAt(frame_pressure_.mpa);
-    skin.Tare(tare_->markers(), frame_pressure_, inflation.value_or(estimator.estimate().baseline_mm));
-    Take(tare_->forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, frame_pressure_.mpa, times,
-         clock);
+    // The pressures were good enough for their frames' estimates.
+    const PressureReading pressure = tare_->pressure();
+    const auto inflation = estimator.InflationAt(pressure.mpa);
+    skin.Tare(tare_->markers(), pressure, inflation.value_or(estimator.estimate().baseline_mm));
+    Take(tare_->forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, pressure.mpa, times, clock);
   }
   tare_.reset();
 }

@@ -13,6 +13,7 @@
 #include "sensing/markers/path_tracker.h"
 #include "sensing/pipeline/baseline_keeper.h"
 #include "sensing/pipeline/judge.h"
+#include "sensing/pipeline/mean_pressure.h"
 #include "sensing/pipeline/rest_pose.h"
 #include "sensing/pipeline/skin_stage.h"
 
@@ -55,6 +56,7 @@ struct LinkPipeline::Stages {
   MarkerDetector detector;
   std::array<Detections, kCameraCount> detections;
   std::optional<RestPose> rest;  // while rest pairs are taken
+  MeanPressure rest_pressure;    // of these
   RestProgress rest_progress;
   BaselineOrigin rest_origin = BaselineOrigin::kNone;  // of what is being taken
   int64_t refused_ns = 0, wait_ns = 0;  // exposure of the pair last refused; until the next is tried
@@ -142,6 +144,7 @@ struct LinkPipeline::Stages {
     keeper.AbortTare("the rest shape is being taken anew");
     rest_origin = origin;
     rest.emplace(model, rig, pairs);
+    rest_pressure.Clear();
     rest_progress = {.taken = 0, .wanted = pairs, .refusal = {}};
     wait_ns = 0;
   }
@@ -187,10 +190,18 @@ struct LinkPipeline::Stages {
           "no skin of this model is stable under the pressure that is told; check the pressure and "
           "the model's material");
     if (!camera_trouble.empty()) return SetStatus(state, LinkStatus::kCalibrating, camera_trouble);
+    rest_pressure.Add(pressure);
+    if (const std::string trouble = rest_pressure.Trouble(); !trouble.empty()) {
+      rest->StartAgain();
+      rest_pressure.Clear();
+      rest_progress.taken = 0;
+      return SetStatus(state, LinkStatus::kCalibrating, trouble);
+    }
     const auto complete = rest->Add(detections);
     rest_progress.taken = rest->taken();
     rest_progress.refusal = complete ? std::nullopt : std::optional(complete.error());
     if (!complete) {
+      rest_pressure.Clear();
       refused_ns = times.exposure_monotonic_ns;
       wait_ns = std::clamp(2 * wait_ns, kFirstWaitNs, kLongestWaitNs);
       return SetStatus(state, LinkStatus::kCalibrating, complete.error().message);
@@ -204,8 +215,9 @@ struct LinkPipeline::Stages {
     cameras.camera_sigma_px = std::max(cameras.camera_sigma_px, rest->noise_px());
     cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
     skin.emplace(model, *calibration, cameras);
-    skin->SetBaseline(rest->markers(), pressure, *inflation);
-    keeper.Take(rest_origin, pressure.mpa, times, clock);
+    const PressureReading mean = rest_pressure.mean();
+    skin->SetBaseline(rest->markers(), mean, estimator->InflationAt(mean.mpa).value_or(*inflation));
+    keeper.Take(rest_origin, mean.mpa, times, clock);
     predicted_mm.clear();
     rest.reset();
   }

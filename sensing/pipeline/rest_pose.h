@@ -23,6 +23,9 @@ class RestPose {
   /// reason; collecting starts again.
   Result<bool> Add(const std::array<Detections, kCameraCount>& detections);
 
+  /// Forgets the pairs so far.
+  void StartAgain();
+
   /// Pairs so far.
   int taken() const { return mean_.frames(); }
   /// Set once complete.
@@ -37,7 +40,6 @@ class RestPose {
   Result<void> Begin(const std::array<Detections, kCameraCount>& detections);
   Result<void> CheckCount() const;
   Result<bool> Finish();
-  void StartAgain();
 
   const LinkModel model_;
   const std::optional<StereoRig> rig_;

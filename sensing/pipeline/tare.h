@@ -10,6 +10,7 @@
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
 #include "sensing/pipeline/marker_mean.h"
+#include "sensing/pipeline/mean_pressure.h"
 
 namespace taclink {
 
@@ -20,11 +21,13 @@ class TareCollector {
 
   /// Takes a solved frame. `off_mm`: by marker, how far it is from where the old baseline was taken,
   /// pressure's part left out; empty where nothing is measured. True: complete. Errors: kFailedPrecondition
-  /// (nothing is measured; unless forced also touched, moved, too few markers).
-  Result<bool> Add(const LinkState& state, const LabelledMarkers& labels, std::span<const Vec3> off_mm);
+  /// (nothing is measured; unless forced also touched, moved, another pressure, too few markers).
+  Result<bool> Add(const LinkState& state, const LabelledMarkers& labels, std::span<const Vec3> off_mm,
+                   const PressureReading& pressure);
 
   /// Once complete: the mean, what it is off the old baseline, and whether it took force.
   const LabelledMarkers& markers() const { return mean_.markers(); }
+  PressureReading pressure() const { return pressure_.mean(); }
   double shift_mm() const;
   bool forced() const { return forced_; }
   int frames() const { return mean_.frames(); }
@@ -36,6 +39,7 @@ class TareCollector {
   const TareOptions options_;
   const int markers_;
   MarkerMean mean_;
+  MeanPressure pressure_;
   std::vector<Vec3> first_half_mm_, second_half_mm_;  // sums of what is off
   bool forced_ = false;
 };

@@ -87,6 +87,35 @@ TEST_F(LinkPipelineTest, AStalePressureIsStated) {
   EXPECT_NEAR(state_.contacts[0].normal_force_n, fresh_n, 0.3 * fresh_n);
 }
 
+// The baseline's pressure is that of its pictures: pictures of a skin that is being inflated are no baseline,
+// and what slowly changes meanwhile is the mean.
+TEST_F(LinkPipelineTest, ABaselineIsOfOnePressure) {
+  Scene scene = LoadScene("inflate").value();
+  scene.pressure = {{.time_s = 0, .kpa = 0}, {.time_s = 10, .kpa = 1}};
+  scene.contacts.clear();
+  skin_ = SimulatedSkin::Make(model_, scene).value();
+  LinkPipeline pipeline(model_, options_);
+  const auto process = [&](double time_s) {
+    StereoFrame frame = Frame(time_s);
+    frame.pressure = {.origin = PressureOrigin::kSimulated, .mpa = time_s * 1e-4, .age_ns = 0};
+    frame.pressure_mpa = time_s * 1e-4;
+    pipeline.Process(frame, state_);
+  };
+  for (const double time_s : {1.0, 2.0, 3.0}) process(time_s);
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_THAT(state_.status_reason, HasSubstr("the pressure changed from"));
+  process(4.5);
+  EXPECT_EQ(pipeline.rest_progress().taken, 1);
+  for (const double time_s : {4.7, 4.9, 5.1}) process(time_s);
+  ASSERT_TRUE(pipeline.calibration().has_value()) << state_.status_reason;
+  process(7);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  EXPECT_TRUE(state_.contacts.empty());
+  // With the last picture's pressure it would be 0.03 kPa less.
+  ASSERT_TRUE(state_.pressure_estimate.has_value());
+  EXPECT_NEAR(state_.pressure_estimate->mpa, 0.7e-3, 1e-5);
+}
+
 TEST_F(LinkPipelineTest, RestIsTakenAgainOnDemand) {
   LinkPipeline pipeline(model_, options_);
   TakeRest(pipeline);

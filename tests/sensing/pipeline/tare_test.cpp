@@ -234,9 +234,9 @@ class TareCollectorTest : public testing::Test {
       state_.cameras[c].labelled = model_.markers.count();
     }
   }
-  Result<bool> Take(TareCollector& tare, double off_mm) {
+  Result<bool> Take(TareCollector& tare, double off_mm, double kpa = 0) {
     off_mm_[5] = Vec3(0, off_mm, 0);
-    return tare.Add(state_, labels_, off_mm_);
+    return tare.Add(state_, labels_, off_mm_, {1e-3 * kpa, 2e-5});
   }
 
   const LinkModel model_ = LoadLinkModel("cylinder").value();
@@ -258,6 +258,25 @@ TEST_F(TareCollectorTest, AMovingSkinIsRefusedUnlessForced) {
       EXPECT_THAT(end.error().message, HasSubstr("moved by 0.40 mm"));
     }
   }
+}
+
+TEST_F(TareCollectorTest, APressureThatChangesIsRefusedUnlessForced) {
+  for (const bool force : {false, true}) {
+    TareCollector tare(model_, {.frames = 4, .force = force});
+    for (int k = 0; k < 3; ++k) ASSERT_FALSE(Take(tare, 0, 0.5 + 0.1 * k).value());
+    const auto end = Take(tare, 0, 0.8);
+    ASSERT_EQ(end.ok(), force);
+    EXPECT_EQ(tare.forced(), force);
+    if (!force) {
+      EXPECT_THAT(end.error().message, HasSubstr("changed from 0.500 to 0.800 kPa"));
+    }
+    EXPECT_NEAR(tare.pressure().mpa, 0.65e-3, 1e-11);
+  }
+  // What a sensor scatters is no change; the markers' mean belongs to the readings' mean.
+  TareCollector tare(model_, {.frames = 4});
+  for (const double kpa : {0.52, 0.48, 0.51}) ASSERT_FALSE(Take(tare, 0, kpa).value());
+  ASSERT_TRUE(Take(tare, 0, 0.47).value());
+  EXPECT_NEAR(tare.pressure().mpa, 0.495e-3, 1e-11);
 }
 
 TEST_F(TareCollectorTest, FewMarkersAreRefusedUnlessForced) {
