@@ -96,14 +96,17 @@ Result<void> Stability(const Options& options) {
       RunAll(chosen(SkinCases(*base)), options.jobs,
              [&](const SkinCase& skin) { return std::vector{RunSkinCase(skin, options.refinement)}; });
   const std::vector<StabilityRow> live = RunAll(chosen(LiveCases(*base)), options.jobs, RunLiveCase);
+  const std::vector<StabilityRow> pictures =
+      RunAll(chosen(PictureCases(*base)), options.jobs, RunPictureCase);
   std::vector<StabilityRow> inputs;
   if (options.only.empty()) inputs = RunInputCases(*base, Tell);
   std::string markdown = "Mesh of the forward solver of refinement " + std::to_string(options.refinement) +
                          ".\n\n" + Count(skins, "Forward solver") + "\n" + Count(live, "Live path") + "\n" +
-                         Count(inputs, "Input") + "\n";
+                         Count(pictures, "Whole way") + "\n" + Count(inputs, "Input") + "\n";
   std::printf("%s", markdown.c_str());
   for (const ReportTable& table :
        {SkinTable(skins), PlainTable("The live path: skins, pressures and bodies", live),
+        PlainTable("The whole way from pictures: labels, calibration, tracking, shape and force", pictures),
         PlainTable("The live path: numbers that are none, markers that are gone", inputs)}) {
     std::printf("%s\n", AlignedText(table).c_str());
     markdown += Markdown(table) + "\n";

@@ -85,6 +85,18 @@ double RadiusProfile::Slope(double z_mm) const {
          h / 6 * ((1 - 3 * a * a) * s.second_derivative[i] + (3 * b * b - 1) * s.second_derivative[i + 1]);
 }
 
+RadiusProfile RadiusProfile::Scaled(double scale) const {
+  if (const auto* constant = std::get_if<ConstantShape>(&shape_)) return Constant(scale * constant->radius);
+  if (const auto* arc = std::get_if<ArcShape>(&shape_))
+    return RadiusProfile(
+        ArcShape{scale * arc->center_z, scale * arc->center_r, scale * arc->arc_radius, arc->sign});
+  SplineShape spline = std::get<SplineShape>(shape_);
+  for (double& z : spline.z) z *= scale;
+  for (double& r : spline.r) r *= scale;
+  for (double& bend : spline.second_derivative) bend /= scale;
+  return RadiusProfile(std::move(spline));
+}
+
 Vec3 LinkModel::OutwardNormal(double angle_rad, double z_mm) const {
   const double slope = profile.Slope(z_mm);
   return Vec3(std::cos(angle_rad), std::sin(angle_rad), -slope).normalized();

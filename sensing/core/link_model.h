@@ -23,6 +23,8 @@ class RadiusProfile {
 
   double Radius(double z_mm) const;
   double Slope(double z_mm) const;  ///< dR/dz
+  /// Of a surface that is so many times as large in every direction.
+  RadiusProfile Scaled(double scale) const;
 
  private:
   struct ConstantShape {

@@ -79,14 +79,14 @@ Vec2 Linearization::Moment(int node, const Vec3& direction) const {
   return Turning(node, mechanics_.model().thickness_mm / 2 * d.cross(direction));
 }
 
-Eigen::MatrixXd Linearization::CoupleColumns(const Eigen::VectorXd& shares) const {
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(adjoint_.rows(), 2);
+Eigen::MatrixXf Linearization::CoupleColumns(const Eigen::VectorXd& shares) const {
+  Eigen::MatrixXf columns = Eigen::MatrixXf::Zero(adjoint_.rows(), 2);
   for (int site = 0; site < mechanics_.site_count(); ++site) {
     if (shares[site] == 0) continue;
     const int node = mechanics_.NodeOfSite(site), dof = mechanics_.shell().Dof(node, 0);
     for (int k = 0; k < 2; ++k) {
-      const Vec2 turning = Turning(node, frames_[static_cast<size_t>(site)].col(k + 1));
-      columns.col(k) += shares[site] * (adjoint_.middleCols<2>(dof + 3).cast<double>() * turning);
+      const Vec2 turning = shares[site] * Turning(node, frames_[static_cast<size_t>(site)].col(k + 1));
+      columns.col(k) += adjoint_.middleCols<2>(dof + 3).lazyProduct(turning.cast<float>());
     }
   }
   return columns;

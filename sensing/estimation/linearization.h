@@ -39,7 +39,7 @@ class Linearization {
 
   /// What couples of 1 N mm about the around and the along direction displace, that act on the sites in these
   /// shares; mm, stacked.
-  Eigen::MatrixXd CoupleColumns(const Eigen::VectorXd& shares) const;
+  Eigen::MatrixXf CoupleColumns(const Eigen::VectorXd& shares) const;
 
   /// The transposes of columns() times forces on the markers (3 each, stacked), in one solution instead of
   /// three large products.

@@ -38,6 +38,17 @@ Mat3 NoiseOf(const Mat3& information, double unseen_mm) {
          modes.eigenvectors().transpose();
 }
 
+// The trace of that, without the eigenvalues where all is seen: of the adjugate over the determinant.
+double NoiseTraceOf(const Mat3& information, double unseen_mm) {
+  const Mat3& a = information;
+  const double minors = a(1, 1) * a(2, 2) - a(1, 2) * a(2, 1) + a(0, 0) * a(2, 2) - a(0, 2) * a(2, 0) +
+                        a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0);
+  const double trace = minors / a.determinant();
+  // No variance is as large as that of what is not seen, then; false, too, where a number is none.
+  if (trace > 0 && trace < unseen_mm * unseen_mm && minors > 0) return trace;
+  return NoiseOf(information, unseen_mm).trace();
+}
+
 }  // namespace
 
 LoadEstimator::LoadEstimator(const SkinMechanics& mechanics, const Neighborhoods& near)
@@ -67,6 +78,7 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   }
   factor_ = covariance_mm2_;
   if (!dense::Cholesky(factor_)) return false;
+  single_factor_ = factor_.cast<float>();
   whitened_pressure_ = by_pressure_;
   dense::SolveLower(factor_, whitened_pressure_);
   SpreadColumns(skin.columns()[0]);
@@ -102,11 +114,17 @@ bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const Pres
   constexpr double kMost = kSameNoise * kSameNoise, kNewlySeenShare = 0.02;
   int worse = 0;
   for (size_t m = 0; m < noise_mm2_.size(); ++m) {
-    const double then = noise_mm2_[m].trace(), now = NoiseOf(observed.information[m], unseen).trace();
+    const double then = noise_mm2_[m].trace(), now = NoiseTraceOf(observed.information[m], unseen);
     if (now > 0.3 * unseen2) continue;  // in a direction at least, which is hidden
     if (then > 0.3 * unseen2 || now > kMost * then || then > kMost * now) ++worse;
   }
   return worse <= kNewlySeenShare * static_cast<double>(noise_mm2_.size());
+}
+
+void LoadEstimator::Whiten(Eigen::MatrixXd& columns) const {
+  Eigen::MatrixXf single = columns.cast<float>();
+  dense::SolveLower(single_factor_, single);
+  columns = single.cast<double>();
 }
 
 // What was seen when all was prepared and is not seen now is unknown: its unit vectors, whitened, are
@@ -144,7 +162,7 @@ void LoadEstimator::Hide(const MarkerObservations& observed) {
   hidden_.setZero(factor_.rows(), static_cast<Eigen::Index>(missing.size()));
   for (size_t k = 0; k < missing.size(); ++k)
     hidden_.block<3, 1>(missing[k].first, static_cast<Eigen::Index>(k)) = missing[k].second;
-  dense::SolveLower(factor_, hidden_);
+  Whiten(hidden_);
   if (hidden_.cols() > 0) {
     // Orthonormal by Cholesky of its Gram matrix, which is well conditioned.
     Eigen::MatrixXd gram;
@@ -213,9 +231,16 @@ std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
   }
   Eigen::VectorXd sparsity = kSparsity * norms_;
   sparsity.tail(mechanics_.site_rows()) *= kBandSparsity / kSparsity;
-  std::vector<int> chosen;
+  std::vector<int>& chosen = chosen_;
   weights_ = sparsity;
-  ShareBands(solver_.Solve(*frame_gram_, target_ - weights_, chosen), chosen);
+  const bool is_cold = chosen.empty();
+  const Eigen::VectorXd* found = &solver_.Solve(*frame_gram_, target_ - weights_, chosen);
+  // Those of the last step are a good guess; neither the minimum nor whether one is found may depend on it.
+  if (!solver_.converged() && !is_cold) {
+    chosen.clear();
+    found = &solver_.Solve(*frame_gram_, target_ - weights_, chosen);
+  }
+  ShareBands(*found, chosen);
   for (int pass = 0; pass < kReweightings && !chosen.empty(); ++pass) {
     Eigen::VectorXd near = Eigen::VectorXd::Zero(norms_.size());
     for (int site = 0; site < sites; ++site) {
@@ -226,6 +251,7 @@ std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
     weights_ = sparsity.array() / (1 + near.array() / (kHillN * unit));
     ShareBands(solver_.Solve(*frame_gram_, target_ - weights_, chosen), chosen);
   }
+  if (!solver_.converged()) chosen.clear();
   std::vector<int> support;
   for (int site = 0; site < sites; ++site) {
     if (loads_[site] > 0) support.push_back(site);
@@ -336,7 +362,7 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
     data.block<3, 1>(3 * m, 0).setZero();
     if (seen) data.block<3, 1>(3 * m, 0) = observed.displacement_mm[i] - skin.base_mm().segment<3>(3 * m);
   }
-  dense::SolveLower(factor_, data);
+  Whiten(data);
   data_ = data.col(0);
   Hide(observed);
   std::vector<HillFinder::Hill> hills;

@@ -88,6 +88,7 @@ class LoadEstimator {
   static constexpr double kCoupleNmm = 10;
 
   void SpreadColumns(const Eigen::MatrixXf& at_nodes);
+  void Whiten(Eigen::MatrixXd& columns) const;
   void Hide(const MarkerObservations& observed);
   void ShareBands(const Eigen::VectorXd& loads, const std::vector<int>& support);
   std::vector<HillFinder::Hill> Select(const Linearization& skin);
@@ -145,10 +146,11 @@ class LoadEstimator {
   Eigen::MatrixXd whitened_pressure_;
   double pressure_sigma_ = 0;
   Eigen::MatrixXd columns_, gram_;
-  Eigen::MatrixXf single_columns_;  // for what all of them pull at, which is bound by memory
+  // For what every frame does with all of them, which is bound by memory.
+  Eigen::MatrixXf single_columns_, single_factor_;
   struct Region {
     std::vector<int> rows;
-    Eigen::LLT<Eigen::MatrixXd> factor;
+    Eigen::LLT<Eigen::MatrixXf> factor;
   };
   std::vector<Region> regions_;
   double usual_norm_ = 0;
@@ -162,6 +164,7 @@ class LoadEstimator {
   const Eigen::MatrixXd* frame_gram_ = nullptr;  // gram_, where nothing is hidden
   Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
   std::vector<char> is_shown_;  // by row
+  std::vector<int> chosen_;     // loads above zero of the last selection
   Solution solution_;
   Eigen::VectorXd pulls_per_mm_;          // of the residual, on each marker: covariance^-1 times it
   std::vector<TangentialGain> left_out_;  // by hill: of those that were not let in

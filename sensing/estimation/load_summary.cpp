@@ -83,9 +83,9 @@ void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill&
 }
 
 void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
-  Eigen::MatrixXd pulls = solution_.residual;
-  dense::SolveLowerTransposed(factor_, pulls);
-  pulls_per_mm_ = pulls.col(0);
+  Eigen::MatrixXf pulls = solution_.residual.cast<float>();
+  dense::SolveLowerTransposed(single_factor_, pulls);
+  pulls_per_mm_ = pulls.col(0).cast<double>();
   const std::array<Eigen::VectorXd, 3> pulled = skin.PulledAtSites(pulls_per_mm_);
   std::array<Eigen::VectorXd, 3> contacts;
   std::array<Eigen::VectorXd, 2> couples;
@@ -187,18 +187,18 @@ double LoadEstimator::WorstRegion(const Eigen::VectorXd& residual) {
           for (int c = 0; c < 3; ++c) region.rows.push_back(3 * neighbor + c);
         }
       }
-      region.factor.compute(covariance_mm2_(region.rows, region.rows));
+      region.factor.compute(covariance_mm2_(region.rows, region.rows).cast<float>());
       regions_.push_back(std::move(region));
     }
   }
-  const Eigen::VectorXd left_mm = factor_.triangularView<Eigen::Lower>() * residual;
+  const Eigen::VectorXf left_mm = single_factor_.triangularView<Eigen::Lower>() * residual.cast<float>();
   double worst = 0;
   for (const Region& region : regions_) {
     int shown = 0;
     for (const int row : region.rows) shown += is_shown_[static_cast<size_t>(row)];
     if (shown < static_cast<int>(region.rows.size()) / 3) continue;
-    const Eigen::VectorXd part = region.factor.matrixL().solve(left_mm(region.rows));
-    worst = std::max(worst, part.squaredNorm() / shown);
+    const Eigen::VectorXf part = region.factor.matrixL().solve(left_mm(region.rows));
+    worst = std::max(worst, static_cast<double>(part.squaredNorm()) / shown);
   }
   return worst;
 }

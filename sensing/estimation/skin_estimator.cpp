@@ -66,7 +66,7 @@ SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions&
 SkinEstimator::~SkinEstimator() = default;
 
 void SkinEstimator::Restart() {
-  has_last_ = false;
+  Forget();
   still_->Forget();
   touched_->Forget();
   if (!maker_) return;
@@ -74,8 +74,10 @@ void SkinEstimator::Restart() {
   maker_->spare()->Forget();
 }
 void SkinEstimator::BeginAgain() {
-  has_last_ = had_last_;
-  if (has_last_) last_ = before_;
+  past_ = past_before_;
+}
+void SkinEstimator::Forget() {
+  past_.has_last = past_.has_next = false;
 }
 const Linearization& SkinEstimator::linearization() const {
   return used_->skin;
@@ -118,17 +120,20 @@ bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Ei
   const double unit = mechanics_.length_unit();
   estimate.state = problem.inflated.state;
   double off_mm = FurthestOff(estimate.state, problem.observed);
-  if (has_last_ && off_mm > kStillReachMm * unit) {
-    if (const double last_mm = FurthestOff(last_, problem.observed); last_mm < off_mm) {
-      off_mm = last_mm;
-      estimate.state = last_;
-    }
-  }
+  const auto consider = [&](bool is_there, const ShellState& state) {
+    if (!is_there || off_mm < kStillReachMm * unit) return;
+    const double mm = FurthestOff(state, problem.observed);
+    if (mm >= off_mm) return;
+    off_mm = mm;
+    estimate.state = state;
+  };
+  consider(past_.has_last, past_.last);
+  consider(past_.has_next, past_.next);
   local_n.resize(0);
   if (off_mm < kAssimilateMm * unit) return true;
   Eigen::VectorXd pulls;
   AssimilationSummary done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
-  if (!done.converged && has_last_) {
+  if (!done.converged && past_.has_last) {
     estimate.state = problem.inflated.state;
     done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
   }
@@ -166,7 +171,7 @@ void SkinEstimator::TakeNext(const SkinProblem& problem, const ShellState& state
     std::swap(touched_, maker_->spare());
 }
 
-// After a frame with loads, while `last_` is still the frame before: begins with the tangent that
+// After a frame with loads, while the past is still the frame before: begins with the tangent that
 // will be asked for when it is due, if the motion goes on.
 void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate,
                               const Eigen::VectorXd& local_n) {
@@ -174,12 +179,12 @@ void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& es
     ++frames_since_begun_;
     return;
   }
-  if (!has_last_) return;
+  if (!past_.has_last) return;
   ahead_ = estimate.state;
-  const double moved_mm = LongestOff(last_.mids_mm, ahead_.mids_mm);
+  const double moved_mm = LongestOff(past_.last.mids_mm, ahead_.mids_mm);
   const double share =
       std::min<double>(kFramesAhead, kAheadShare * touched_->reach_mm / std::max(moved_mm, 1e-9));
-  Extrapolate(last_, share, ahead_);
+  Extrapolate(past_.last, share, ahead_);
   const Eigen::VectorXd ahead_n =
       (local_n + share * (local_n - local_before_n_)).cwiseMax(0.5 * local_n).cwiseMin(2 * local_n);
   const auto is_good = [&](const Tangent& tangent) {
@@ -297,7 +302,7 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSk
   }
   if (!AreNeighborsStill()) return false;
   used_ = &tangent;
-  has_last_ = false;
+  Forget();
   estimate.loads.loads.clear();
   estimate.loads.chi2_per_dof = estimate.loads.region_chi2_per_dof = 0;
   estimate.loads.converged = true;
@@ -335,8 +340,10 @@ bool SkinEstimator::AreNeighborsStill() const {
 }
 
 void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& estimate) {
-  had_last_ = has_last_;
-  if (has_last_) before_ = last_;
+  if (past_.has_last)
+    past_before_ = past_;
+  else
+    past_before_.has_last = past_before_.has_next = false;
   estimate.failure = EstimateFailure::kNoEquilibrium;
   estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
   estimate.first_order_mm = 0;
@@ -371,7 +378,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
     if (hidden > 0) is_solved = Solve(problem, estimate);
   }
   if (!is_solved) {
-    has_last_ = false;
+    Forget();
     estimate.state = start_;
     mechanics_.markers().Displacements(start_, estimate.displacements_mm);
     estimate.has_shape = IsPossible(estimate);
@@ -388,14 +395,19 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
                      : estimate.loads.converged ? EstimateFailure::kNone
                                                 : EstimateFailure::kNotConverged;
   if (estimate.loads.loads.empty() || estimate.failure != EstimateFailure::kNone) {
-    has_last_ = false;
+    Forget();
     return;
   }
   const Eigen::VectorXd local_n = used_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
   if (maker_) MakeAhead(problem, estimate, local_n);
-  last_ = estimate.state;
+  past_.has_next = past_.has_last;
+  if (past_.has_next) {
+    past_.next = estimate.state;
+    Extrapolate(past_.last, 1, past_.next);
+  }
+  past_.last = estimate.state;
+  past_.has_last = true;
   local_before_n_ = local_n;
-  has_last_ = true;
 }
 
 SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,

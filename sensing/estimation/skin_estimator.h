@@ -83,6 +83,7 @@ class SkinEstimator {
   const LoadEstimator& loads() const;
 
  private:
+  void Forget();
   bool IsStill(const SkinObservation& observation, const InflatedSkin& inflated, const PressurePrior& prior,
                SkinEstimate& estimate);
   bool AreNeighborsStill() const;
@@ -110,11 +111,15 @@ class SkinEstimator {
   Tangent* used_ = nullptr;
   std::unique_ptr<TangentMaker> maker_;  // of the touched skin's next one; null: first order asks for none
   ShellState ahead_;                     // where that one is thought to be asked for
-  Eigen::VectorXd local_before_n_;       // of the frame of last_
+  Eigen::VectorXd local_before_n_;       // of the frame before
   int frames_since_begun_ = 0;           // by the next frame with loads
-  ShellState last_, start_;              // of the frame before; that this one's loads were sought from
-  ShellState before_;                    // last_ when the last call began
-  bool has_last_ = false, had_last_ = false;
+  ShellState start_;                     // that this frame's loads were sought from
+  // Where a frame may begin: the state of the frame before and, after two, where their motion leads to.
+  struct Past {
+    bool has_last = false, has_next = false;
+    ShellState last, next;
+  };
+  Past past_, past_before_;  // past_before_: when the last call began
   Eigen::VectorXd markers_mm_;
   Eigen::VectorXd radial_pull_, radial_weight_;  // of the frame in work
 };

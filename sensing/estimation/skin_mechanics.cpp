@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sensing/core/similar_skin.h"
 #include "sensing/mechanics/element_load.h"
 #include "sensing/mechanics/pressed_skin.h"
 #include "sensing/mechanics/sparse_cholesky.h"
@@ -18,15 +19,10 @@ constexpr double kInflationStep = 0.011;  // of PressureScale
 constexpr int kMostSteps = 400;
 constexpr int kParts = 8;          // of a step, where the skin does not stand at its far end
 constexpr int kForgivenSteps = 2;  // that a pressure may be beyond what the skin stands
-constexpr double kUnitLengthMm = 11.5704,
-                 kUnitForceN = 1.225;  // sqrt(R t) and E t^2 of the cylinder with 0.1 MPa
-
-double MiddleRadius(const LinkModel& model) {
-  return model.PointAtDepth(0, model.length_mm / 2, model.thickness_mm / 2).head<2>().norm();
-}
+constexpr double kUnitForceN = 1.225;  // E t^2 of the cylinder with 0.1 MPa
 
 MeshRefinement RefinementFor(const LinkModel& model) {
-  const double longest = kLongestElement * std::sqrt(MiddleRadius(model) * model.thickness_mm);
+  const double longest = kLongestElement * DecayLengthMm(model);
   double widest_interval = model.markers.rings_z_mm.front();
   for (size_t i = 1; i < model.markers.rings_z_mm.size(); ++i)
     widest_interval =
@@ -50,7 +46,7 @@ SkinMechanics::SkinMechanics(const LinkModel& model, int refinement)
       mesh_(refinement > 0 ? MakeShellMesh(model, refinement) : MakeShellMesh(model, RefinementFor(model))),
       shell_(SkinSurface(mesh_), model.material),
       markers_(model, mesh_),
-      length_unit_(std::sqrt(MiddleRadius(model) * model.thickness_mm) / kUnitLengthMm),
+      length_unit_(LengthUnit(model)),
       force_unit_(model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm / kUnitForceN),
       pressure_step_mpa_(kInflationStep * PressureScale(model)),
       equilibrium_(shell_, SolverOptions(model)) {

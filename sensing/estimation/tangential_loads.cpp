@@ -22,15 +22,17 @@ Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, cons
   Eigen::VectorXd shares = Eigen::VectorXd::Zero(mechanics_.site_count());
   for (const int site : hill) shares[site] = loads_[site] / sum;
   const Eigen::VectorXd spread = mechanics_.spread() * shares;
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(factor_.rows(), kTangential);
-  columns.rightCols<2>() = skin.CoupleColumns(spread);
+  Eigen::MatrixXf single = Eigen::MatrixXf::Zero(factor_.rows(), kTangential);
+  single.rightCols<2>() = skin.CoupleColumns(spread);
   for (int k = 0; k < 2; ++k) {
     for (Eigen::Index site = 0; site < spread.size(); ++site) {
       if (spread[site] != 0)
-        columns.col(k) += spread[site] * skin.columns()[static_cast<size_t>(k + 1)].col(site).cast<double>();
+        single.col(k) +=
+            static_cast<float>(spread[site]) * skin.columns()[static_cast<size_t>(k + 1)].col(site);
     }
   }
-  dense::SolveLower(factor_, columns);
+  dense::SolveLower(single_factor_, single);
+  Eigen::MatrixXd columns = single.cast<double>();
   if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
   return columns;
 }
@@ -145,7 +147,7 @@ Eigen::MatrixXd LoadEstimator::ShiftColumns(const Linearization& skin, const Est
                              .cast<double>();
     }
   }
-  dense::SolveLower(factor_, shift);
+  Whiten(shift);
   if (hidden_.cols() > 0) shift -= hidden_ * (hidden_.transpose() * shift);
   return shift;
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "sensing/core/similar_skin.h"
+
 namespace taclink {
 namespace {
 
@@ -123,11 +125,9 @@ const char* Name(PressKind kind) {
 }
 
 SkinUnits UnitsOf(const LinkModel& model) {
-  const double radius = model.PointAtDepth(0, model.length_mm / 2, model.thickness_mm / 2).x();
-  // Of the shipped cylinder.
-  constexpr double kLengthMm = 11.57, kForceMpaMm2 = 1.2275;
+  constexpr double kForceMpaMm2 = 1.2275;  // of the shipped cylinder
   return {
-      .length = std::sqrt(radius * model.thickness_mm) / kLengthMm,
+      .length = LengthUnit(model),
       .force = model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm / kForceMpaMm2};
 }
 

@@ -83,6 +83,25 @@ void AddShapesAndLoads(Cases& to, double slenderness) {
   to.Add(Label("E = 1e-4 MPa and t/R = %g", 0.2, law), to.Varied(1e-4, 0.2, law), 1, 5, 0.1);
 }
 
+void AddLive(const LinkModel& base, const std::string& name, const LinkModel& model, double kpa,
+             std::vector<SkinCase>& cases) {
+  constexpr double kSigmaKpa = 0.02;
+  char load[48];
+  std::snprintf(load, sizeof load, ", %g kPa", kpa);
+  cases.push_back({.name = name + load,
+                   .model = model,
+                   .pressure_mpa = ScaledPressureMpa(base, model, kpa),
+                   .pressure_sigma_mpa = ScaledPressureMpa(base, model, kSigmaKpa)});
+}
+
+void AddShipped(const LinkModel& base, std::vector<SkinCase>& cases) {
+  for (const std::string& name : ShippedModelNames()) {
+    const auto model = LoadLinkModel(name);
+    if (!model) continue;
+    for (const double kpa : {0.0, 0.5, 1.5}) AddLive(base, name, *model, kpa, cases);
+  }
+}
+
 }  // namespace
 
 const char* Name(Ending ending) {
@@ -126,33 +145,34 @@ std::vector<SkinCase> SkinCases(const LinkModel& base) {
 
 std::vector<SkinCase> LiveCases(const LinkModel& base) {
   std::vector<SkinCase> cases;
-  const auto add = [&](const std::string& name, const LinkModel& model, double kpa) {
-    char load[48];
-    std::snprintf(load, sizeof load, ", %g kPa", kpa);
-    constexpr double kSigmaKpa = 0.02;
-    cases.push_back({.name = name + load,
-                     .model = model,
-                     .pressure_mpa = ScaledPressureMpa(base, model, kpa),
-                     .pressure_sigma_mpa = ScaledPressureMpa(base, model, kSigmaKpa)});
-  };
-  for (const std::string& name : ShippedModelNames()) {
-    const auto model = LoadLinkModel(name);
-    if (!model) continue;
-    for (const double kpa : {0.0, 0.5, 1.5}) add(name, *model, kpa);
-  }
+  AddShipped(base, cases);
   const double slenderness = base.thickness_mm / MidRadius(base);
   for (const MaterialLaw law : kBothLaws) {
+    const auto add = [&](const std::string& name, double modulus, double ratio, double kpa) {
+      AddLive(base, name, VariedModel(base, modulus, ratio, PoissonOf(law), law), kpa, cases);
+    };
     for (const double modulus : {1e-4, 0.02, 1.0, 1e2})
-      add(Label("E = %g MPa", modulus, law), VariedModel(base, modulus, slenderness, PoissonOf(law), law), 1);
-    for (const double ratio : {0.01, 0.03, 0.2})
-      add(Label("t/R = %g", ratio, law), VariedModel(base, 0.1, ratio, PoissonOf(law), law), 1);
+      add(Label("E = %g MPa", modulus, law), modulus, slenderness, 1);
+    for (const double ratio : {0.01, 0.03, 0.2}) add(Label("t/R = %g", ratio, law), 0.1, ratio, 1);
     for (const double kpa : {-0.2, -0.1, 2.5})
-      add(Label("t/R = %g", slenderness, law), VariedModel(base, 0.1, slenderness, PoissonOf(law), law), kpa);
+      add(Label("t/R = %g", slenderness, law), 0.1, slenderness, kpa);
   }
   for (const double poisson : {0.0, 0.3}) {
     const auto law = MaterialLaw::kSaintVenantKirchhoff;
-    add(Label("nu = %g", poisson, law), VariedModel(base, 0.1, slenderness, poisson, law), 1);
+    AddLive(base, Label("nu = %g", poisson, law), VariedModel(base, 0.1, slenderness, poisson, law), 1,
+            cases);
   }
+  return cases;
+}
+
+std::vector<SkinCase> PictureCases(const LinkModel& base) {
+  std::vector<SkinCase> cases;
+  AddShipped(base, cases);
+  const double slenderness = base.thickness_mm / MidRadius(base);
+  const auto law = MaterialLaw::kNeoHookean;
+  for (const double modulus : {0.02, 1.0})
+    AddLive(base, Label("E = %g MPa", modulus, law),
+            VariedModel(base, modulus, slenderness, PoissonOf(law), law), 1, cases);
   return cases;
 }
 

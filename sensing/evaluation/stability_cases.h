@@ -50,6 +50,12 @@ std::vector<SkinCase> LiveCases(const LinkModel& base);
 /// large as the skin asks for, shown to the estimator by itself; what is not right must be told. A row for
 /// each body.
 std::vector<StabilityRow> RunLiveCase(const SkinCase& skin_case);
+/// Every shipped model, and the cylinder of a soft and of a stiff material.
+std::vector<SkinCase> PictureCases(const LinkModel& base);
+/// The whole way: pictures of such a skin that is inflated and pressed by a disc, good ones and poor ones by
+/// cameras that sit elsewhere than the model says, through a link's rest labels, calibration, tracker,
+/// estimator and judge. A row for each kind of pictures.
+std::vector<StabilityRow> RunPictureCase(const SkinCase& skin_case);
 /// `refinement` of the mesh.
 StabilityRow RunSkinCase(const SkinCase& skin_case, int refinement);
 

@@ -25,17 +25,18 @@ constexpr int kResidualStride = 32;  // each frame, every so many markers teach 
 
 }  // namespace
 
-MarkerTracker::MarkerTracker(const LinkModel& model, const StereoRig& rig, MarkerTrackerOptions options)
+MarkerTracker::MarkerTracker(const SimilarSkin& skin, MarkerTrackerOptions options)
     : options_(options),
-      paths_(model.markers.paths),
-      rings_(model.markers.rings()),
-      count_(model.markers.count()),
-      check_(model, rig, options.check),
-      rest_mm_(model.RestMarkers()),
+      scale_(skin.scale),
+      paths_(skin.model.markers.paths),
+      rings_(skin.model.markers.rings()),
+      count_(skin.model.markers.count()),
+      check_(skin.model, skin.rig, options.check),
+      rest_mm_(skin.model.RestMarkers()),
       pair_z_mm_(rest_mm_.size(), std::numeric_limits<double>::quiet_NaN()),
       predicted_mm_(rest_mm_) {
   for (const CameraId id : kBothCameras) {
-    PrepareCamera(model, id);
+    PrepareCamera(skin.model, id);
     doubtful_[Index(id)].assign(static_cast<size_t>(count_), 0);
     fresh_[Index(id)].assign(static_cast<size_t>(count_), 0);
     places_[Index(id)].resize(static_cast<size_t>(count_));
@@ -119,7 +120,8 @@ void MarkerTracker::Follow(const Pictures& gray, std::span<const Vec3> predicted
   followed_ = true;
   ++frame_;
   if (predicted_mm.size() == rest_mm_.size()) {
-    std::copy(predicted_mm.begin(), predicted_mm.end(), predicted_mm_.begin());
+    std::transform(predicted_mm.begin(), predicted_mm.end(), predicted_mm_.begin(),
+                   [&](const Vec3& p) -> Vec3 { return scale_ * p; });
   } else {
     predicted_mm_ = rest_mm_;
   }

@@ -8,6 +8,7 @@
 
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
+#include "sensing/core/similar_skin.h"
 #include "sensing/core/tracking_report.h"
 #include "sensing/markers/label_check.h"
 #include "sensing/markers/reference_patch.h"
@@ -50,13 +51,14 @@ struct MarkerTrackerOptions {
 ///    predicted. So are labels that the next markers of the path without a label would explain as well, or
 ///    share: those are taken to be anywhere on the other camera's ray near their ring, or on the way in.
 ///
-/// A centre means what it means for the detector that gave the labels. Allocates at construction only. One
-/// thread.
+/// A centre means what it means for the detector that gave the labels. Lengths in the options and inside are
+/// those of the SimilarSkin. Allocates at construction only. One thread.
 class MarkerTracker {
  public:
   using Pictures = std::array<cv::Mat, kCameraCount>;  ///< CV_8UC1; empty: none from that camera
 
-  MarkerTracker(const LinkModel& model, const StereoRig& rig, MarkerTrackerOptions options = {});
+  MarkerTracker(const LinkModel& model, const StereoRig& rig, MarkerTrackerOptions options = {})
+      : MarkerTracker(SimilarSkin(model, rig), options) {}
 
   /// Steps 1 to 3. `predicted_mm`: positions of all markers, link frame, as the frame before had them; empty:
   /// as at rest. To be followed by Check.
@@ -79,6 +81,7 @@ class MarkerTracker {
   int seen(CameraId id) const;
 
  private:
+  MarkerTracker(const SimilarSkin& skin, MarkerTrackerOptions options);
   struct Size {  // of a marker's spot
     double width_px = 0, height_px = 0, area_px2 = 0, contrast = 0;
   };
@@ -171,6 +174,7 @@ class MarkerTracker {
   void Take(Camera& camera, const cv::Mat& gray, int marker, const MarkerObservation& label);
 
   const MarkerTrackerOptions options_;
+  const double scale_;  // of the SimilarSkin
   int paths_, rings_, count_;
   LabelCheck check_;
   WindowMeasure measure_;

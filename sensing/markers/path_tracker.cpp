@@ -30,11 +30,11 @@ std::optional<double> AzimuthAtRadius(const SightRay& ray, double radius_mm) {
 
 }  // namespace
 
-PathTracker::PathTracker(const LinkModel& model, const StereoRig& rig, PathTrackerOptions options)
-    : model_(model), options_(options), numbering_(model, options.numbering) {
-  const auto paths = static_cast<size_t>(model.markers.paths);
+PathTracker::PathTracker(const SimilarSkin& skin, PathTrackerOptions options)
+    : model_(skin.model), options_(options), numbering_(model_, options.numbering) {
+  const auto paths = static_cast<size_t>(model_.markers.paths);
   for (const CameraId id : kBothCameras) {
-    views_.push_back({Projector(rig[id]), {}, {}, {}, {}});
+    views_.push_back({Projector(skin.rig[id]), {}, {}, {}, {}});
     FindEnds(id, views_.back());
     FindAreas(views_.back());
     chains_[Index(id)].resize(paths);
@@ -42,11 +42,11 @@ PathTracker::PathTracker(const LinkModel& model, const StereoRig& rig, PathTrack
     path_rays_[Index(id)].reserve(static_cast<size_t>(numbering_.max_chain()));
   }
   by_path_.resize(paths);
-  displacements_mm_.resize(static_cast<size_t>(model.markers.count()));
+  displacements_mm_.resize(static_cast<size_t>(model_.markers.count()));
   dropped_.reserve(displacements_mm_.size());
   tracings_.resize(paths);
-  for (int j = 0; j < model.markers.rings(); ++j) {
-    mean_radius_mm_ += model.RestMarker(model.MarkerIndex(0, j)).head<2>().norm() / model.markers.rings();
+  for (int j = 0; j < model_.markers.rings(); ++j) {
+    mean_radius_mm_ += model_.RestMarker(model_.MarkerIndex(0, j)).head<2>().norm() / model_.markers.rings();
   }
 }
 

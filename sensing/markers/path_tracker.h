@@ -6,6 +6,7 @@
 #include "sensing/camera/projection.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
+#include "sensing/core/similar_skin.h"
 #include "sensing/markers/ring_numbering.h"
 
 namespace taclink {
@@ -34,16 +35,19 @@ struct PathTrackerOptions {
 ///
 /// 3. Check. A label whose displacement does not suit those of the neighbouring paths is dropped.
 ///
-/// Constant after construction but for scratch memory: one thread.
+/// Lengths in the options and inside are those of the SimilarSkin. Constant after construction but for scratch
+/// memory: one thread.
 class PathTracker {
  public:
-  PathTracker(const LinkModel& model, const StereoRig& rig, PathTrackerOptions options = {});
+  PathTracker(const LinkModel& model, const StereoRig& rig, PathTrackerOptions options = {})
+      : PathTracker(SimilarSkin(model, rig), options) {}
 
   /// What can't be labelled safely is left unseen. Clipped detections are labelled too, with their large
   /// sigma.
   void Label(const std::array<Detections, kCameraCount>& detections, LabelledMarkers& out);
 
  private:
+  PathTracker(const SimilarSkin& skin, PathTrackerOptions options);
   struct Candidate {
     Vec2 pixel;
     int path = 0;       // the nearest

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "sensing/core/median.h"
+#include "sensing/core/similar_skin.h"
 #include "sensing/markers/picture_labeller.h"
 
 namespace taclink {
@@ -139,9 +140,10 @@ PictureLabels PictureLabeller::Labels() {
 
 Result<PictureLabels> LabelPicture(const LinkModel& model, CameraId id, const Detections& detections,
                                    const cv::Mat& gray) {
-  auto grid = PictureGrid::Fit(model, id, detections);
+  const SimilarSkin skin(model, model.nominal_rig);
+  auto grid = PictureGrid::Fit(skin.model, id, detections);
   if (!grid) return grid.error();
-  return PictureLabeller(model, id, detections, gray, *std::move(grid)).Run();
+  return PictureLabeller(skin.model, id, detections, gray, *std::move(grid)).Run();
 }
 
 }  // namespace taclink

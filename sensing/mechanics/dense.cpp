@@ -11,6 +11,10 @@ void dtrsm_(const char* side, const char* uplo, const char* trans, const char* d
             const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
 void dtrsv_(const char* uplo, const char* trans, const char* diag, const int* n, const double* a,
             const int* lda, double* x, const int* step);
+void strsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
+            const int* n, const float* alpha, const float* a, const int* lda, float* b, const int* ldb);
+void strsv_(const char* uplo, const char* trans, const char* diag, const int* n, const float* a,
+            const int* lda, float* x, const int* step);
 void sgemv_(const char* trans, const int* m, const int* n, const float* alpha, const float* a, const int* lda,
             const float* x, const int* x_step, const float* beta, float* y, const int* y_step);
 void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha,
@@ -48,6 +52,18 @@ void Solve(const char* transposed, const Eigen::MatrixXd& l, Eigen::Ref<Eigen::M
     dtrsm_("L", "L", transposed, "N", &m, &n, &one, l.data(), &lda, b.data(), &ldb);
 }
 
+void Solve(const char* transposed, const Eigen::MatrixXf& l, Eigen::Ref<Eigen::MatrixXf> b) {
+  assert(l.rows() == b.rows());
+  const OneThread one_thread;
+  const int m = Int(b.rows()), n = Int(b.cols()), lda = Int(l.outerStride()), ldb = Int(b.outerStride());
+  const float one = 1;
+  const int step = 1;
+  if (m > 0 && n == 1)
+    strsv_("L", transposed, "N", &m, l.data(), &lda, b.data(), &step);
+  else if (m > 0 && n > 0)
+    strsm_("L", "L", transposed, "N", &m, &n, &one, l.data(), &lda, b.data(), &ldb);
+}
+
 void Multiply(const char* transposed, const Eigen::MatrixXf& a, const Eigen::Ref<const Eigen::VectorXf>& x,
               Eigen::Ref<Eigen::VectorXf> y) {
   assert(*transposed == 'T' ? a.rows() == x.size() && a.cols() == y.size()
@@ -83,7 +99,10 @@ bool Cholesky(Eigen::MatrixXd& a) {
 void SolveLower(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b) {
   Solve("N", l, b);
 }
-void SolveLowerTransposed(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b) {
+void SolveLower(const Eigen::MatrixXf& l, Eigen::Ref<Eigen::MatrixXf> b) {
+  Solve("N", l, b);
+}
+void SolveLowerTransposed(const Eigen::MatrixXf& l, Eigen::Ref<Eigen::MatrixXf> b) {
   Solve("T", l, b);
 }
 

@@ -13,7 +13,8 @@ namespace taclink::dense {
 bool Cholesky(Eigen::MatrixXd& a);
 /// b := L^-1 b, or L^-T b.
 void SolveLower(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b);
-void SolveLowerTransposed(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b);
+void SolveLower(const Eigen::MatrixXf& l, Eigen::Ref<Eigen::MatrixXf> b);
+void SolveLowerTransposed(const Eigen::MatrixXf& l, Eigen::Ref<Eigen::MatrixXf> b);
 /// Lower half of c := c + a a^T.
 void AddOuter(const Eigen::MatrixXd& a, Eigen::MatrixXd& c);
 void AddOuter(const Eigen::MatrixXf& a, Eigen::MatrixXf& c);

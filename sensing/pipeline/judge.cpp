@@ -5,6 +5,8 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "sensing/core/similar_skin.h"
+
 namespace taclink {
 namespace {
 
@@ -12,7 +14,6 @@ namespace {
 constexpr double kDegradedFraction = 0.7, kLostFraction = 0.4;
 // Forces were compared with the truth down to dents of 15 mm on a link of sqrt(R t) = 11.6 mm.
 constexpr double kDeepestDentMm = 16;
-constexpr double kCylinderMm = 11.8;  // sqrt(R t) of the shipped cylinder, outside
 // Rings of markers so far apart, in sqrt(R t), over which a dent decays: on thinner skins forces were wrong.
 constexpr double kWidestRings = 3.5;
 // A tangent is wrong by a fifth a millimeter (estimation.md); likewise.
@@ -35,12 +36,6 @@ std::string Text(const char* format, ...) {
   std::vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
   return text;
-}
-
-// Of the skin's sqrt(R t) in that of the shipped cylinder.
-double LengthUnit(const LinkModel& model) {
-  const double radius = model.PointAtDepth(0, model.length_mm / 2, 0).head<2>().norm();
-  return std::sqrt(radius * model.thickness_mm) / kCylinderMm;
 }
 
 double WidestRingsMm(const LinkModel& model) {
@@ -168,7 +163,7 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
                              "forces may be a quarter too large, and each further "
                              "off"});
   if (const double apart_mm = WidestRingsMm(evidence.model),
-      decay_mm = kCylinderMm * LengthUnit(evidence.model);
+      decay_mm = DecayLengthMm(evidence.model);
       apart_mm > kWidestRings * decay_mm)
     state.reasons.push_back(
         {ReasonId::kSparseMarkers, Text("rings of markers are %.0f mm apart, but a dent on this skin decays "

@@ -21,10 +21,11 @@ class Dense : public testing::Test {
   static Eigen::MatrixXd AboveOf(const Eigen::MatrixXd& a) {
     return a.triangularView<Eigen::StrictlyUpper>();
   }
-  static void ExpectClose(const Eigen::MatrixXd& found, const Eigen::MatrixXd& expected) {
+  static void ExpectClose(const Eigen::MatrixXd& found, const Eigen::MatrixXd& expected,
+                          double tolerance = 1e-12) {
     ASSERT_EQ(found.rows(), expected.rows());
     ASSERT_EQ(found.cols(), expected.cols());
-    EXPECT_LT((found - expected).norm(), 1e-12 * expected.norm());
+    EXPECT_LT((found - expected).norm(), tolerance * expected.norm());
   }
 
   void SetUp() override { std::srand(5); }  // Eigen's Random draws from it.
@@ -51,31 +52,36 @@ TEST_F(Dense, CholeskySaysWhatIsNotPositiveDefinite) {
   EXPECT_FALSE(dense::Cholesky(a));
 }
 
+// One column and several take different routines.
 TEST_F(Dense, TriangularSolutionsAreEigens) {
   const Eigen::MatrixXd l = PositiveDefinite().llt().matrixL();
-  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(kRows, 7);
-  Eigen::MatrixXd forward = b, backward = b;
-  dense::SolveLower(l, forward);
-  dense::SolveLowerTransposed(l, backward);
-  ExpectClose(forward, l.triangularView<Eigen::Lower>().solve(b));
-  ExpectClose(backward, l.transpose().triangularView<Eigen::Upper>().solve(b));
+  const Eigen::MatrixXf single_l = l.cast<float>();
+  for (const Eigen::Index columns : {1, 7}) {
+    const Eigen::MatrixXd b = Eigen::MatrixXd::Random(kRows, columns);
+    Eigen::MatrixXd forward = b;
+    Eigen::MatrixXf single = b.cast<float>(), backward = single;
+    dense::SolveLower(l, forward);
+    dense::SolveLower(single_l, single);
+    dense::SolveLowerTransposed(single_l, backward);
+    ExpectClose(forward, l.triangularView<Eigen::Lower>().solve(b));
+    ExpectClose(single.cast<double>(), forward, 1e-5);
+    ExpectClose(backward.cast<double>(), l.transpose().triangularView<Eigen::Upper>().solve(b), 1e-5);
+  }
 }
 
 // A block of a larger matrix, whose columns are further apart than they are long; nothing else may change.
 TEST_F(Dense, TriangularSolutionsOfABlock) {
   const Eigen::MatrixXd l = PositiveDefinite().llt().matrixL();
   const Eigen::MatrixXd before = Eigen::MatrixXd::Random(kRows + 11, 9);
-  Eigen::MatrixXd forward = before, backward = before;
+  Eigen::MatrixXd forward = before;
+  Eigen::MatrixXf single = before.cast<float>();
   dense::SolveLower(l, forward.block(4, 2, kRows, 3));
-  dense::SolveLowerTransposed(l, backward.block(4, 2, kRows, 3));
+  dense::SolveLower(l.cast<float>(), single.block(4, 2, kRows, 3));
   Eigen::MatrixXd expected = before;
   expected.block(4, 2, kRows, 3) = l.triangularView<Eigen::Lower>().solve(before.block(4, 2, kRows, 3));
   ExpectClose(forward, expected);
   EXPECT_EQ(forward.topRows(4), before.topRows(4));
-  expected = before;
-  expected.block(4, 2, kRows, 3) =
-      l.transpose().triangularView<Eigen::Upper>().solve(before.block(4, 2, kRows, 3));
-  ExpectClose(backward, expected);
+  ExpectClose(single.cast<double>(), expected, 1e-5);
 }
 
 // What is above a factor's diagonal is left over from before the factorization and must not count.
@@ -84,10 +90,11 @@ TEST_F(Dense, TriangularSolutionsIgnoreTheUpperHalf) {
   const Eigen::VectorXd b = Eigen::VectorXd::Random(kRows);
   Eigen::MatrixXd l = a;
   ASSERT_TRUE(dense::Cholesky(l));
-  Eigen::MatrixXd x = b;
-  dense::SolveLower(l, x);
-  dense::SolveLowerTransposed(l, x);
-  ExpectClose(x, a.llt().solve(b));
+  const Eigen::MatrixXf single_l = l.cast<float>();
+  Eigen::MatrixXf x = b.cast<float>();
+  dense::SolveLower(single_l, x);
+  dense::SolveLowerTransposed(single_l, x);
+  ExpectClose(x.cast<double>(), a.llt().solve(b), 1e-4);
 }
 
 TEST_F(Dense, AddOuterAddsToTheLowerHalf) {
