@@ -35,8 +35,8 @@ struct PathTrackerOptions {
 ///
 /// 3. Check. A label whose displacement does not suit those of the neighbouring paths is dropped.
 ///
-/// Lengths in the options and inside are those of the SimilarSkin. Constant after construction but for scratch
-/// memory: one thread.
+/// Lengths in the options and inside are those of the SimilarSkin. Constant after construction but for
+/// scratch memory: one thread.
 class PathTracker {
  public:
   PathTracker(const LinkModel& model, const StereoRig& rig, PathTrackerOptions options = {})

@@ -16,7 +16,8 @@ constexpr int kMaxRounds = 12;
 constexpr double kMaxAreaRatio = 2.2;  // of a marker against others of its ring
 constexpr double kMinOfRing = 0.15;    // part of a ring's or a path's markers without which it is none
 constexpr double kMinSeen = 0.5;       // of all markers
-constexpr double kResolvedPx = 4;      // between rings; closer, their spots run into one another
+// Between rings, beside a spot's own width; closer, their spots run into one another.
+constexpr double kResolvedPx = 2;
 
 }  // namespace
 
@@ -99,8 +100,9 @@ Error PictureLabeller::Refusal(const std::string& why) const {
 bool PictureLabeller::IsResolved(int ring) const {
   const auto& radii = grid_.ring_log_radii();
   const auto radius_px = [&](int j) { return std::exp(radii[static_cast<size_t>(j)]); };
+  const double apart = std::exp(0.5 * log_areas_[static_cast<size_t>(ring)]) + kResolvedPx;
   for (const int next : {ring - 1, ring + 1}) {
-    if (next >= 0 && next < rings_ && std::abs(radius_px(next) - radius_px(ring)) < kResolvedPx) return false;
+    if (next >= 0 && next < rings_ && std::abs(radius_px(next) - radius_px(ring)) < apart) return false;
   }
   return true;
 }

@@ -18,7 +18,7 @@ struct PictureMarker {
 
 struct PictureLabels {
   std::vector<PictureMarker> markers;  ///< by rising index, each at most once
-  PictureGrid grid;  ///< lengths in it are those of the SimilarSkin
+  PictureGrid grid;                    ///< lengths in it are those of the SimilarSkin
 };
 
 /// Labels the markers of one picture of a camera that was never calibrated, also of a touched skin. A picture

@@ -162,8 +162,7 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
                              "contacts follow each other closely all around the skin: the sum of their "
                              "forces may be a quarter too large, and each further "
                              "off"});
-  if (const double apart_mm = WidestRingsMm(evidence.model),
-      decay_mm = DecayLengthMm(evidence.model);
+  if (const double apart_mm = WidestRingsMm(evidence.model), decay_mm = DecayLengthMm(evidence.model);
       apart_mm > kWidestRings * decay_mm)
     state.reasons.push_back(
         {ReasonId::kSparseMarkers, Text("rings of markers are %.0f mm apart, but a dent on this skin decays "
