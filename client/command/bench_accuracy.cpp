@@ -20,7 +20,7 @@ constexpr double kDetailNoiseMm = 0.05;
 struct Options {
   std::string model = "cylinder";
   std::vector<std::string> force_models;
-  std::vector<int> refinements = {1, 2, 3};
+  std::vector<int> refinements = {0, 1, 2};
   std::vector<double> noises_mm = {0, kDetailNoiseMm, 0.1};
   std::vector<double> pressures_kpa = {0, 0.5, 1, 1.5};
   std::vector<std::string> kinds;
@@ -226,9 +226,11 @@ void AddBenchAccuracy(const Arguments& bench, Selected& selected) {
       "accuracy", "From marker displacements to contact forces, against the nonlinear forward solver");
   AddScenes(accuracy, *options);
   accuracy.AddOption("--force-models", options->force_models, "Some of them, comma-separated").Delimiter(',');
-  accuracy.AddOption("--refinements", options->refinements, "Elements per interval of the marker grid")
+  accuracy
+      .AddOption("--refinements", options->refinements,
+                 "Elements per interval of the marker grid; 0: as links have")
       .Delimiter(',')
-      .Must(Between(1, 4))
+      .Must(Between(0, 4))
       .ShowDefault();
   accuracy.AddOption("--noise", options->noises_mm, "Standard deviations of the markers, mm; 0: exact")
       .Delimiter(',')

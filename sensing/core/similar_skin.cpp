@@ -5,7 +5,7 @@
 namespace taclink {
 namespace {
 
-constexpr double kUsualLengthMm = 11.5704;  // of the shipped cylinder
+constexpr double kUsualLengthMm = 11.5704, kUsualForceN = 1.225;  // of the shipped cylinder
 
 StereoRig Scaled(StereoRig rig, double scale) {
   for (CameraModel& camera : rig.cameras) camera.camera_from_link.translation *= scale;
@@ -34,6 +34,10 @@ double DecayLengthMm(const LinkModel& model) {
 
 double LengthUnit(const LinkModel& model) {
   return DecayLengthMm(model) / kUsualLengthMm;
+}
+
+double ForceUnit(const LinkModel& model) {
+  return model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm / kUsualForceN;
 }
 
 SimilarSkin::SimilarSkin(const LinkModel& real, const StereoRig& real_rig)

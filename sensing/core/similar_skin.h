@@ -12,6 +12,9 @@ double DecayLengthMm(const LinkModel& model);
 /// That in terms of the shipped cylinder's: what lengths that go with the skin's size are multiplied by.
 double LengthUnit(const LinkModel& model);
 
+/// E t^2 in terms of the shipped cylinder's with 0.1 MPa: likewise of forces.
+double ForceUnit(const LinkModel& model);
+
 /// Skins that differ in nothing but their size, cameras' places included, give the same pictures. What finds
 /// and follows labels therefore works on the similar skin of the shipped cylinder's size, with tolerances in
 /// mm of that, whatever the size of the real one.

@@ -19,7 +19,6 @@ constexpr double kInflationStep = 0.011;  // of PressureScale
 constexpr int kMostSteps = 400;
 constexpr int kParts = 8;          // of a step, where the skin does not stand at its far end
 constexpr int kForgivenSteps = 2;  // that a pressure may be beyond what the skin stands
-constexpr double kUnitForceN = 1.225;  // E t^2 of the cylinder with 0.1 MPa
 
 MeshRefinement RefinementFor(const LinkModel& model) {
   const double longest = kLongestElement * DecayLengthMm(model);
@@ -47,7 +46,7 @@ SkinMechanics::SkinMechanics(const LinkModel& model, int refinement)
       shell_(SkinSurface(mesh_), model.material),
       markers_(model, mesh_),
       length_unit_(LengthUnit(model)),
-      force_unit_(model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm / kUnitForceN),
+      force_unit_(ForceUnit(model)),
       pressure_step_mpa_(kInflationStep * PressureScale(model)),
       equilibrium_(shell_, SolverOptions(model)) {
   MakeSpread();

@@ -18,8 +18,9 @@ namespace taclink {
 /// A force model on a mesh. No model: the estimator chooses, frame by frame.
 struct AccuracyMethod {
   std::optional<ForceModel> model;
-  int refinement = 1;
+  int refinement = 0;  ///< 0: the mesh that links have
 
+  std::string mesh() const { return refinement == 0 ? "default" : std::to_string(refinement); }
   std::string name() const { return model ? Name(*model) : "auto"; }
 };
 

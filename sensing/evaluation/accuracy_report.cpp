@@ -34,7 +34,7 @@ std::string NoiseName(double noise_mm) {
 }
 
 Row MethodCells(const AccuracyOutcome& outcome) {
-  return {outcome.method.name(), outcome.model, std::to_string(outcome.method.refinement)};
+  return {outcome.method.name(), outcome.model, outcome.method.mesh()};
 }
 
 std::string TimeCell(const std::vector<float>& samples) {
@@ -232,7 +232,7 @@ std::string AccuracyPlot(const std::vector<AccuracyOutcome>& outcomes, double no
     if (std::find(series.begin(), series.end(), name) == series.end()) series.push_back(name);
     const auto index = std::find(series.begin(), series.end(), name) - series.begin();
     const double time = Percentile(outcome.cpu_ms, 0.5), error = Summarize(outcome).size_percent;
-    std::string label = name + " " + std::to_string(outcome.method.refinement);
+    std::string label = name + " " + outcome.method.mesh();
     if (models.size() > 1) label += ", " + outcome.model;
     if (time > 0 && error > 0) points.push_back({time, error, static_cast<size_t>(index), label});
   }

@@ -125,10 +125,7 @@ const char* Name(PressKind kind) {
 }
 
 SkinUnits UnitsOf(const LinkModel& model) {
-  constexpr double kForceMpaMm2 = 1.2275;  // of the shipped cylinder
-  return {
-      .length = LengthUnit(model),
-      .force = model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm / kForceMpaMm2};
+  return {.length = LengthUnit(model), .force = ForceUnit(model)};
 }
 
 PressPath MakePressPath(const LinkModel& model, PressKind kind, double pressure_mpa, double unit) {

@@ -1,11 +1,14 @@
 #include "sensing/pipeline/skin_stage.h"
 
+#include "sensing/core/similar_skin.h"
+
 namespace taclink {
 namespace {
 
 constexpr int kMostPasses = 4;
-constexpr double kSameLookMm = 0.1;    // of the points that cameras see of the markers
-constexpr double kSamePlaceMm = 0.25;  // of a marker that one camera sees, from where its ray was linearized
+// In LengthUnit: of the points that cameras see of the markers; of a marker that one camera sees, from where
+// its ray was linearized.
+constexpr double kSameLookMm = 0.1, kSamePlaceMm = 0.25;
 // Of a pressure that the shape tells: what the model's inflation is wrong by, and the rest.
 constexpr double kFromShapeShare = 0.05, kFromShapeMpa = 1e-4;
 
@@ -19,6 +22,7 @@ MarkerSource SourceOf(bool top, bool bottom) {
 SkinStage::SkinStage(const LinkModel& model, const CalibrationSummary& calibration,
                      const CameraEvidenceOptions& options)
     : model_(model),
+      length_unit_(LengthUnit(model)),
       evidence_(model, calibration.rig, options),
       doubt_(model, calibration.rig, calibration.covariance),
       baseline_mm_(Eigen::VectorXd::Zero(3 * model.markers.count())),
@@ -90,8 +94,8 @@ void SkinStage::Run(const LabelledMarkers& markers, const std::optional<Pressure
     about_mm_ = now;
     const bool reconsidered = evidence_.Reconsider(now, model_covariances_);
     if (reconsidered) estimator.skin().BeginAgain();
-    const bool looks_otherwise = evidence_.UpdateLooks(now) > kSameLookMm;
-    if (!reconsidered && !looks_otherwise && moved_mm < kSamePlaceMm) break;
+    const bool looks_otherwise = evidence_.UpdateLooks(now) > kSameLookMm * length_unit_;
+    if (!reconsidered && !looks_otherwise && moved_mm < kSamePlaceMm * length_unit_) break;
   }
   shape.rejected.clear();
   for (size_t m = 0; m < count; ++m) {

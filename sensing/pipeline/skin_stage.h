@@ -38,6 +38,7 @@ class SkinStage {
   void Measure(const Eigen::VectorXd& about_mm, std::span<const Vec3> drift_mm, SkinShape& shape);
 
   const LinkModel model_;
+  const double length_unit_;
   CameraEvidence evidence_;
   const CalibrationDoubt doubt_;
   PressureReading baseline_pressure_;

@@ -4,12 +4,14 @@
 #include <cstdio>
 #include <string>
 
+#include "sensing/core/similar_skin.h"
+
 namespace taclink {
 namespace {
 
-constexpr double kTouchedN = 0.05;
+constexpr double kTouchedN = 0.05;          // in ForceUnit
 constexpr double kLeastSeenFraction = 0.5;  // in each picture
-// Between the means of both halves, of the marker that moved most.
+// Between the means of both halves, of the marker that moved most; in LengthUnit.
 constexpr double kMovedMm = 0.15;
 
 Error Refused(std::string why) {
@@ -26,6 +28,8 @@ std::string Number(const char* format, double value) {
 
 TareCollector::TareCollector(const LinkModel& model, const TareOptions& options)
     : options_(options),
+      touched_n_(kTouchedN * ForceUnit(model)),
+      moved_mm_(kMovedMm * LengthUnit(model)),
       markers_(model.markers.count()),
       mean_(markers_),
       first_half_mm_(static_cast<size_t>(markers_), Vec3::Zero()),
@@ -34,7 +38,7 @@ TareCollector::TareCollector(const LinkModel& model, const TareOptions& options)
 std::optional<Error> TareCollector::Objection(const LinkState& state) const {
   for (const Contact& contact : state.contacts) {
     const double force_n = contact.force_n.norm();
-    if (force_n < kTouchedN) continue;
+    if (force_n < touched_n_) continue;
     return Refused("touched: a contact of " + Number("%.2f", force_n) +
                    " N at z = " + Number("%.0f", contact.center_mm.z()) +
                    " mm; let go of the skin, or force it if nothing touches");
@@ -55,7 +59,7 @@ std::optional<Error> TareCollector::Motion() const {
   double most = 0;
   for (size_t m = 0; m < first_half_mm_.size() && half > 0; ++m)
     most = std::max(most, (second_half_mm_[m] / (frames() - half) - first_half_mm_[m] / half).norm());
-  if (most <= kMovedMm && !mean_.moved()) return {};
+  if (most <= moved_mm_ && !mean_.moved()) return {};
   return Refused("the skin moved by " + Number("%.2f", most) + " mm meanwhile; keep it still, or force it");
 }
 

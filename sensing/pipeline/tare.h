@@ -37,6 +37,7 @@ class TareCollector {
   std::optional<Error> Motion() const;
 
   const TareOptions options_;
+  const double touched_n_, moved_mm_;
   const int markers_;
   MarkerMean mean_;
   MeanPressure pressure_;
