@@ -87,6 +87,8 @@ Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
     if (IsEmptyCsvLine(line)) continue;
     if (!header_read) {
       header_read = true;
+      // What spreadsheets begin a UTF-8 file with.
+      if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
       std::string header;
       for (const auto& field : CsvFields(line)) header += (header.empty() ? "" : ",") + field;
       if (header != kHeader) return fail("the header must be '" + std::string(kHeader) + "'");

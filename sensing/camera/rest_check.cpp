@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "sensing/camera/camera_fit.h"
 #include "sensing/camera/projection.h"
 #include "sensing/core/median.h"
 
@@ -96,6 +97,24 @@ std::optional<Dent> FindDent(const LinkModel& model, const CalibrationSummary& s
     return one && *one * worst->second > 0 && std::abs(*one) > limit_mm;
   });
   return Dent{worst->first, static_cast<int>(moved), worst->second};
+}
+
+std::optional<Dent> FindDent(const LinkModel& model, const StereoRig& rig, const LabelledMarkers& rest,
+                             double limit_mm) {
+  CalibrationSummary summary;
+  summary.rig = rig;
+  for (const CameraId id : kBothCameras) {
+    const Projector projector(rig[id]);
+    auto& residuals = summary.cameras[Index(id)].residuals;
+    for (int m = 0; m < model.markers.count(); ++m) {
+      const MarkerObservation& seen = rest.cameras[Index(id)][static_cast<size_t>(m)];
+      const auto expected = projector.Project(SeenPoint(model, m, projector.center_in_link(), true));
+      residuals.emplace_back();
+      if (seen.seen && expected)
+        residuals.back() = {MarkerResidual::Kind::kUsed, seen.center_px, seen.center_px - *expected};
+    }
+  }
+  return FindDent(model, summary, limit_mm);
 }
 
 std::string Describe(const LinkModel& model, const Dent& dent) {

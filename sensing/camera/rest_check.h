@@ -4,6 +4,7 @@
 #include <string>
 
 #include "sensing/camera/calibration.h"
+#include "sensing/core/markers.h"
 
 namespace taclink {
 
@@ -18,6 +19,10 @@ struct Dent {
 /// the skin. Noise and a mould's errors differ from marker to marker; a touch moves neighbours alike. Markers
 /// left out of the fit count as well, by their residuals.
 std::optional<Dent> FindDent(const LinkModel& model, const CalibrationSummary& summary, double limit_mm);
+
+/// The same where the cameras were known before these pictures.
+std::optional<Dent> FindDent(const LinkModel& model, const StereoRig& rig, const LabelledMarkers& rest,
+                             double limit_mm);
 
 /// What a person should know and do.
 std::string Describe(const LinkModel& model, const Dent& dent);

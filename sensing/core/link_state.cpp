@@ -30,8 +30,12 @@ const char* Name(ReasonId id) {
       return "encircled";
     case ReasonId::kSparseMarkers:
       return "sparse_markers";
+    case ReasonId::kUnsettled:
+      return "unsettled";
     case ReasonId::kForceModel:
       return "force_model";
+    case ReasonId::kCamerasMoved:
+      return "cameras_moved";
     case ReasonId::kDrift:
       return "drift";
   }

@@ -37,7 +37,9 @@ enum class ReasonId : uint8_t {
   kBeyondMarkers,     ///< a load between a clamp and the first ring: how much of it is seen is not sure
   kEncircled,         ///< bodies all around bend the skin in waves that are hardly resolved
   kSparseMarkers,     ///< a load on this skin may hide between markers
+  kUnsettled,         ///< where no camera sees the skin its shape did not settle
   kForceModel,        ///< the force model that was asked for does not hold here
+  kCamerasMoved,      ///< all markers together are off: taken out of the estimate, but calibrate
   kDrift,             ///< the baseline has drifted
 };
 inline constexpr int kReasonCount = static_cast<int>(ReasonId::kDrift) + 1;

@@ -63,6 +63,7 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   covariance_.WriteDirect(skin, inflated, covariance_mm2_);
   if (prior.baseline_mm_per_mpa.size() == by_pressure_.size())
     dense::AddOuter(prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa, covariance_mm2_);
+  dense::AddOuter(covariance_.by_cameras_mm(), covariance_mm2_);
   direct_mm2_ = covariance_mm2_.cast<float>();
   direct_mm2_.triangularView<Eigen::StrictlyUpper>() = direct_mm2_.transpose();
   covariance_.AddStray(skin, local_n, covariance_mm2_);

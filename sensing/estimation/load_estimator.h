@@ -39,6 +39,8 @@ struct LoadEstimate {
   /// Where the markers are beside the equilibrium, by what they say and by how wrong the model may be; mm,
   /// stacked. Empty: nothing was fitted.
   Eigen::VectorXd beside_mm;
+  /// How far cameras that have moved or changed since the baseline put a marker off, the most of all.
+  double camera_shift_mm = 0;
   double pressure_error_mpa = 0;  ///< true less told
   double pressure_sigma_mpa = 0;  ///< of the corrected pressure
   double chi2_per_dof = 0;

@@ -53,6 +53,9 @@ void LoadEstimator::Conclude(const Linearization& skin, LoadEstimate& estimate) 
   Eigen::VectorXf beside(pulls_per_mm_.size());
   dense::Product(direct_mm2_, pulls_per_mm_.cast<float>(), beside);
   estimate.beside_mm = beside.cast<double>();
+  const Eigen::MatrixXd& by_cameras_mm = covariance_.by_cameras_mm();
+  const Eigen::VectorXd shift_mm = by_cameras_mm * (by_cameras_mm.transpose() * pulls_per_mm_);
+  estimate.camera_shift_mm = shift_mm.reshaped(3, shift_mm.size() / 3).colwise().norm().maxCoeff();
   estimate.chi2_per_dof =
       solution_.residual.squaredNorm() /
       std::max<double>(1, static_cast<double>(std::count(is_shown_.begin(), is_shown_.end(), 1)));

@@ -27,6 +27,9 @@ class MarkerCovariance {
   /// Adds that of stray forces. `local_n`: force in the neighborhood of each site. Sets the stray forces'
   /// standard deviations by direction and site.
   void AddStray(const Linearization& skin, const Eigen::VectorXd& local_n, Eigen::MatrixXd& covariance_mm2);
+  /// By column, of one standard deviation: what cameras that have moved or changed a little since the
+  /// baseline make of all markers together.
+  const Eigen::MatrixXd& by_cameras_mm() const { return by_cameras_mm_; }
   const std::array<Eigen::VectorXd, 3>& stray_sigmas_n() const { return stray_n_; }
 
   /// Forces on sites, or on markers, smoothed over the neighborhood in which they count as local.
@@ -38,6 +41,7 @@ class MarkerCovariance {
  private:
   const SkinMechanics& mechanics_;
   const Neighborhoods& near_;
+  Eigen::MatrixXd by_cameras_mm_;
   std::array<Eigen::VectorXd, 3> stray_n_;
 };
 

@@ -28,6 +28,8 @@ constexpr double kLeastPressureSigma =
     1e-3;  // of the steps in which the skin is inflated: a prior is no certainty
 constexpr int kMostSteps = 8, kMostTangents = 3;
 constexpr double kShrinks = 0.5;  // steps by less: the tangent is too old
+// Of the sum of all loads between the last two steps, and what they move a marker that is seen by: settled.
+constexpr double kSameLoads = 0.02, kSeenSettledMm = 0.15;
 
 double LongestOff(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   if (a.size() != b.size()) return 1e9;
@@ -111,6 +113,20 @@ double SkinEstimator::FurthestOff(const ShellState& state, const MarkerObservati
     if (!(most > 0)) continue;
     const Vec3 off = markers_mm_.segment<3>(3 * static_cast<Eigen::Index>(m)) - observed.displacement_mm[m];
     furthest = std::max(furthest, std::sqrt(off.dot(information * off) * 3 / most));
+  }
+  return furthest;
+}
+
+// The farthest that a seen marker has moved since the last call, mm.
+double SkinEstimator::SeenMotion(const ShellState& state, const MarkerObservations& observed) {
+  markers_before_mm_.swap(markers_mm_);
+  mechanics_.markers().Displacements(state, markers_mm_);
+  if (markers_before_mm_.size() != markers_mm_.size()) return kUnlimitedMm;
+  double furthest = 0;
+  for (size_t m = 0; m < observed.information.size(); ++m) {
+    const auto at = 3 * static_cast<Eigen::Index>(m);
+    if (observed.information[m].trace() > 0)
+      furthest = std::max(furthest, (markers_mm_ - markers_before_mm_).segment<3>(at).norm());
   }
   return furthest;
 }
@@ -251,11 +267,17 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
   if (!touched_->IsGoodFor(problem, estimate.state) &&
       !Remake(*touched_, problem, estimate.state, local_n, estimate))
     return false;
-  double before_mm = 1e9;
+  double before_mm = 1e9, normal_before_n = 0;
+  bool is_seen_settled = false;
   for (int step = 0; step < kMostSteps; ++step) {
     double step_mm = 0;
     if (!StepOnce(*touched_, problem, estimate, step_mm)) return false;
     local_n = touched_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
+    double normal_n = 0;
+    for (const EstimatedLoad& load : estimate.loads.loads) normal_n += load.normal_force_n;
+    is_seen_settled = SeenMotion(estimate.state, problem.observed) < kSeenSettledMm * unit &&
+                      std::abs(normal_n - normal_before_n) < kSameLoads * normal_n;
+    normal_before_n = normal_n;
     const double distance_mm = touched_->DistanceMm(estimate.state);
     const bool is_off = distance_mm > touched_->reach_mm || !touched_->HasLocal(local_n);
     const bool is_slow = step > 0 && step_mm > kShrinks * before_mm;
@@ -273,7 +295,10 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
       return true;
     }
   }
-  return before_mm < kNearlySettledMm * unit;
+  if (before_mm < kNearlySettledMm * unit) return true;
+  // A skin that would buckle where a body hides it need not settle there.
+  if (is_seen_settled) estimate.unsettled_mm = before_mm;
+  return is_seen_settled;
 }
 
 // The markers are where the skin without loads has them, but for the cameras' noise: each by itself, over
@@ -304,7 +329,7 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSk
   used_ = &tangent;
   Forget();
   estimate.loads.loads.clear();
-  estimate.loads.chi2_per_dof = estimate.loads.region_chi2_per_dof = 0;
+  estimate.loads.chi2_per_dof = estimate.loads.region_chi2_per_dof = estimate.loads.camera_shift_mm = 0;
   estimate.loads.converged = true;
   estimate.loads.pressure_error_mpa = off / told;
   estimate.loads.pressure_sigma_mpa = prior.sigma_mpa;
@@ -346,7 +371,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
     past_before_.has_last = past_before_.has_next = false;
   estimate.failure = EstimateFailure::kNoEquilibrium;
   estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
-  estimate.first_order_mm = 0;
+  estimate.first_order_mm = estimate.unsettled_mm = 0;
   estimate.has_shape = false;
   PressurePrior prior;
   const InflatedSkin* baseline = mechanics_.Inflated(observation.baseline_pressure.mpa);
@@ -424,6 +449,7 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
 bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   estimate.loads = {};
   estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
+  estimate.unsettled_mm = 0;
   start_ = problem.inflated.state;
   const bool is_small = IsFirstOrder() || FurthestOff(problem.inflated.state, problem.observed) <
                                               2 * kStillReachMm * mechanics_.length_unit();

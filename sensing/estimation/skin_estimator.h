@@ -49,6 +49,9 @@ struct SkinEstimate {
   /// The longest way of a point of the skin under this pressure, without loads, from where a first-order
   /// model that was asked for begins; else 0.
   double first_order_mm = 0;
+  /// How far the last step still moved the skin somewhere that no camera sees, where loads and seen markers
+  /// had settled; else 0.
+  double unsettled_mm = 0;
   int assimilation_steps = 0, tangents = 0, steps = 0;
 };
 
@@ -88,6 +91,7 @@ class SkinEstimator {
                SkinEstimate& estimate);
   bool AreNeighborsStill() const;
   double FurthestOff(const ShellState& state, const MarkerObservations& observed);
+  double SeenMotion(const ShellState& state, const MarkerObservations& observed);
   bool Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n);
   bool Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
               const Eigen::VectorXd& local_n, SkinEstimate& estimate);
@@ -120,7 +124,7 @@ class SkinEstimator {
     ShellState last, next;
   };
   Past past_, past_before_;  // past_before_: when the last call began
-  Eigen::VectorXd markers_mm_;
+  Eigen::VectorXd markers_mm_, markers_before_mm_;
   Eigen::VectorXd radial_pull_, radial_weight_;  // of the frame in work
 };
 

@@ -24,7 +24,10 @@ constexpr double kMostRegionResidual = 5;
 // And RMS over all markers, in standard deviations: right answers stay below 1, a squeeze that the mesh is
 // too coarse for is at 1.4.
 constexpr double kMostResidual = 1.2;
-constexpr int kLeftOutTogether = 3;  // of a marker and its neighbors
+constexpr int kLeftOutTogether = 3;     // of a marker and its neighbors
+constexpr double kLeftOutShare = 0.04;  // of all labels
+// What is taken up as the cameras' motion; of markers with 0.1 mm of noise it stays below 0.1.
+constexpr double kMostCameraShiftMm = 0.3;
 // Contacts all around that follow each other within five elements bend the skin in waves that elements show
 // badly and noise hides: on solids, the sum of six came out up to a quarter too large.
 constexpr double kWaveDeg = 75, kBeltMm = 24;
@@ -160,8 +163,7 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
   if (IsEncircled(state.contacts, kBeltMm * LengthUnit(evidence.model)))
     state.reasons.push_back({ReasonId::kEncircled,
                              "contacts follow each other closely all around the skin: the sum of their "
-                             "forces may be a quarter too large, and each further "
-                             "off"});
+                             "forces may be a quarter off, and each much further"});
   if (const double apart_mm = WidestRingsMm(evidence.model), decay_mm = DecayLengthMm(evidence.model);
       apart_mm > kWidestRings * decay_mm)
     state.reasons.push_back(
@@ -169,12 +171,24 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
                                         "within %.1f mm: loads may hide "
                                         "between markers",
                                         apart_mm, decay_mm)});
-  if (MostLeftOut(evidence.model, state.shape) >= kLeftOutTogether)
+  if (MostLeftOut(evidence.model, state.shape) >= kLeftOutTogether ||
+      static_cast<double>(state.shape.rejected.size()) >
+          kLeftOutShare * kCameraCount * evidence.model.markers.count())
     state.reasons.push_back(
         {ReasonId::kLabels,
-         "neighboring markers were left out because they contradict the others; clean the "
+         "neighboring or many markers were left out because they contradict the others; clean the "
          "cameras' view, or calibrate again"});
   const double unit = LengthUnit(evidence.model);
+  if (const double shift_mm = evidence.estimate.loads.camera_shift_mm; shift_mm > kMostCameraShiftMm * unit)
+    state.reasons.push_back(
+        {ReasonId::kCamerasMoved, Text("all markers together are off by up to %.2f mm, as if the cameras had "
+                                       "moved since they were calibrated; calibrate again, or tare",
+                                       shift_mm)});
+  if (evidence.estimate.unsettled_mm > 0)
+    state.reasons.push_back(
+        {ReasonId::kUnsettled, Text("the skin may buckle where no camera sees it: its shape there moved by "
+                                    "%.1f mm in the last step; forces and seen markers had settled",
+                                    evidence.estimate.unsettled_mm)});
   if (state.forces.model == ForceModel::kLiteral)
     state.reasons.push_back(
         {ReasonId::kForceModel,

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "sensing/camera/rest_check.h"
 #include "sensing/markers/rest_labels.h"
 #include "sensing/pipeline/rest_match.h"
 
@@ -90,6 +91,11 @@ Result<bool> RestPose::Finish() {
                  "the skin moved while its rest shape was taken; do not touch it"};
   }
   if (rig_) {
+    // Pressure moves whole rings, which count as the lens' errors do; what stands out of a ring is a touch.
+    if (const auto dent = FindDent(model_, *rig_, mean_.markers(), CalibrationOptions{}.max_dent_mm)) {
+      StartAgain();
+      return Error{ErrorCode::kFailedPrecondition, Describe(model_, *dent)};
+    }
     calibration_.emplace().rig = *rig_;
     return true;
   }

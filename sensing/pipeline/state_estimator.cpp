@@ -76,6 +76,8 @@ void StateEstimator::WriteShape(SkinShape& shape) const {
       shape.displacements_mm[m] = estimate_.displacements_mm.segment<3>(at) - baseline;
       // Of the model's error and the marker's own observation; both are of the same marker.
       shape.covariances_mm2[m] = (model.inverse() + measured.information_per_mm2).inverse();
+      if (measured.information_per_mm2.isZero())
+        shape.covariances_mm2[m].diagonal().array() += estimate_.unsettled_mm * estimate_.unsettled_mm;
     } else {
       const double unknown_mm = estimate_.has_shape ? kSpringsMm : kUnknownMm;
       const Mat3 information =

@@ -81,5 +81,13 @@ TEST_F(MarkerCsvTest, ADeviationThatIsGivenIsUsed) {
   EXPECT_NEAR(usual->covariances_mm2[1](0, 0), MarkerNoise{}.xy_mm * MarkerNoise{}.xy_mm, 1e-12);
 }
 
+TEST_F(MarkerCsvTest, AByteOrderMarkIsNoPartOfTheHeader) {
+  const std::string file =
+      Write("marked.csv", "\xEF\xBB\xBFpath,ring,ux,uy,uz\n1,1,0.1,0,0\n2,1,0,0,0\n3,1,0,0,0\n");
+  const auto shape = ReadMarkerCsv(file, LoadLinkModel("cylinder").value(), 0.1);
+  ASSERT_TRUE(shape.ok()) << shape.error().message;
+  EXPECT_EQ(shape->seen(), 3);
+}
+
 }  // namespace
 }  // namespace taclink::command

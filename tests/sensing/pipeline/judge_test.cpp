@@ -74,6 +74,28 @@ TEST_F(JudgeTest, MarkersThatContradictAreTold) {
   EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kResidual));
 }
 
+TEST_F(JudgeTest, CamerasThatMovedAreTold) {
+  estimate_.loads.camera_shift_mm = 0.29;
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  estimate_.loads.camera_shift_mm = 0.31;
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kCamerasMoved));
+  EXPECT_THAT(state_.status_reason, testing::HasSubstr("0.31 mm"));
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+}
+
+TEST_F(JudgeTest, ASkinThatBucklesUnseenIsTold) {
+  estimate_.unsettled_mm = 1.2;
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kUnsettled));
+}
+
+// Far from each other, so that no neighbors are left out together.
+TEST_F(JudgeTest, ManyMarkersThatWereLeftOutAreTold) {
+  for (int k = 0; k < 20; ++k) state_.shape.rejected.push_back({CameraId::kTop, 11 * k});
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kLabels));
+  state_.shape.rejected.resize(19);
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+}
+
 TEST_F(JudgeTest, WhatHasNoAnswerHasNoForces) {
   estimate_.failure = EstimateFailure::kNotConverged;
   state_.forces.converged = false;

@@ -237,6 +237,21 @@ TEST_F(LinkPipelineTest, TouchedSkinIsNoBaseline) {
   EXPECT_THAT(state_.status_reason, HasSubstr("moved"));
 }
 
+// Also where the cameras are known: what touches at the start would be missing while it stays, and a ghost
+// afterwards. Pressure alone is no touch.
+TEST_F(LinkPipelineTest, TouchedSkinIsNoBaselineOfKnownCameras) {
+  options_.rig = model_.nominal_rig;
+  LinkPipeline pipeline(model_, options_);
+  for (int k = 0; k < options_.rest_frames; ++k) pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_THAT(state_.status_reason, HasSubstr("the skin is touched near path"));
+  for (int k = 0; k < options_.rest_frames; ++k) pipeline.Process(Frame(0), state_);
+  pipeline.Process(Frame(0), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_NEAR(state_.total_force_n.norm(), 0.2, 0.04);
+}
+
 TEST_F(LinkPipelineTest, RefusedRestIsTriedAgainAtGrowingIntervalsAndBeginsWithinASecond) {
   LinkPipeline pipeline(model_, options_);
   constexpr int64_t kFrameNs = 33'333'333;
