@@ -100,7 +100,7 @@ std::optional<Dent> FindDent(const LinkModel& model, const CalibrationSummary& s
 }
 
 std::optional<Dent> FindDent(const LinkModel& model, const StereoRig& rig, const LabelledMarkers& rest,
-                             double limit_mm) {
+                             const Eigen::VectorXd& inflation_mm, double limit_mm) {
   CalibrationSummary summary;
   summary.rig = rig;
   for (const CameraId id : kBothCameras) {
@@ -108,7 +108,8 @@ std::optional<Dent> FindDent(const LinkModel& model, const StereoRig& rig, const
     auto& residuals = summary.cameras[Index(id)].residuals;
     for (int m = 0; m < model.markers.count(); ++m) {
       const MarkerObservation& seen = rest.cameras[Index(id)][static_cast<size_t>(m)];
-      const auto expected = projector.Project(SeenPoint(model, m, projector.center_in_link(), true));
+      const auto expected = projector.Project(SeenPoint(model, m, projector.center_in_link(), true) +
+                                              inflation_mm.segment<3>(3 * m));
       residuals.emplace_back();
       if (seen.seen && expected)
         residuals.back() = {MarkerResidual::Kind::kUsed, seen.center_px, seen.center_px - *expected};

@@ -74,6 +74,9 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
     const auto i = static_cast<size_t>(m);
     auto block = covariance_mm2_.block<3, 3>(3 * m, 3 * m);
     model_covariance_[i] = block.selfadjointView<Eigen::Lower>();
+    // All markers together tell the cameras' modes; one by one they would hide a wrong marker in them.
+    const auto by_cameras_mm = covariance_.by_cameras_mm().middleRows<3>(3 * m);
+    model_covariance_[i].noalias() -= by_cameras_mm * by_cameras_mm.transpose();
     noise_mm2_[i] = NoiseOf(observed.information[i], kUnseenMm * mechanics_.length_unit());
     block += noise_mm2_[i];
   }
@@ -236,7 +239,8 @@ std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
   weights_ = sparsity;
   const bool is_cold = chosen.empty();
   const Eigen::VectorXd* found = &solver_.Solve(*frame_gram_, target_ - weights_, chosen);
-  // Those of the last step are a good guess; neither the minimum nor whether one is found may depend on it.
+  // Those of the last step are a good guess. The minimum does not depend on it, but the solver may give up on
+  // the way from there.
   if (!solver_.converged() && !is_cold) {
     chosen.clear();
     found = &solver_.Solve(*frame_gram_, target_ - weights_, chosen);

@@ -79,6 +79,9 @@ class LoadEstimator {
   /// Writes these for what was fitted last.
   void Conclude(const Linearization& skin, LoadEstimate& estimate);
 
+  /// The frames before.
+  void Forget() { chosen_.clear(); }
+
   const MarkerCovariance& covariance() const { return covariance_; }
   /// Covariance of the model's error at a marker, after Prepare.
   Mat3 ModelCovariance(int marker) const { return model_covariance_[static_cast<size_t>(marker)]; }

@@ -26,8 +26,8 @@ constexpr double kLeastPressureSigma =
     1e-3;  // of the steps in which the skin is inflated: a prior is no certainty
 constexpr int kMostSteps = 8, kMostTangents = 3;
 constexpr double kShrinks = 0.5;  // steps by less: the tangent is too old
-// Of the sum of all loads between the last two steps, and what they move a marker that is seen by: settled.
-constexpr double kSameLoads = 0.02, kSeenSettledMm = 0.15;
+// Between the last two steps, of the loads in any neighborhood by the largest, and of a seen marker: settled.
+constexpr double kSameLoads = 0.05, kSeenSettledMm = 0.15;
 
 double LongestOff(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   if (a.size() != b.size()) return 1e9;
@@ -265,17 +265,14 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
   if (!touched_->IsGoodFor(problem, estimate.state) &&
       !Remake(*touched_, problem, estimate.state, local_n, estimate))
     return false;
-  double before_mm = 1e9, normal_before_n = 0;
+  double before_mm = 1e9, step_mm = 0;
   bool is_seen_settled = false;
   for (int step = 0; step < kMostSteps; ++step) {
-    double step_mm = 0;
     if (!StepOnce(*touched_, problem, estimate, step_mm)) return false;
+    const Eigen::VectorXd local_before_n = local_n;
     local_n = touched_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
-    double normal_n = 0;
-    for (const EstimatedLoad& load : estimate.loads.loads) normal_n += load.normal_force_n;
     is_seen_settled = SeenMotion(estimate.state, problem.observed) < kSeenSettledMm * unit &&
-                      std::abs(normal_n - normal_before_n) < kSameLoads * normal_n;
-    normal_before_n = normal_n;
+                      (local_n - local_before_n).cwiseAbs().maxCoeff() < kSameLoads * local_n.maxCoeff();
     const double distance_mm = touched_->DistanceMm(estimate.state);
     const bool is_off = distance_mm > touched_->reach_mm || !touched_->HasLocal(local_n);
     const bool is_slow = step > 0 && step_mm > kShrinks * before_mm;
@@ -283,7 +280,8 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
         step_mm * std::min(1.0, kTangentErrorPerMm * distance_mm / unit) < kSettledMm * unit;
     if (is_settled && !is_off) return true;
     before_mm = step_mm;
-    if ((is_off || is_slow) && estimate.tangents < kMostTangents) {
+    // Not after the last step: what is told of it is in terms of its tangent.
+    if (step + 1 < kMostSteps && (is_off || is_slow) && estimate.tangents < kMostTangents) {
       if (is_slow) touched_->is_prepared = false;
       TakeNext(problem, estimate.state, local_n);
       const bool is_good = touched_->IsGoodFor(problem, estimate.state) && touched_->HasLocal(local_n);
@@ -293,9 +291,9 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
       return true;
     }
   }
-  if (before_mm < kNearlySettledMm * unit) return true;
+  if (step_mm < kNearlySettledMm * unit) return true;
   // A skin that would buckle where a body hides it need not settle there.
-  if (is_seen_settled) estimate.unsettled_mm = before_mm;
+  if (is_seen_settled) estimate.unsettled_mm = step_mm;
   return is_seen_settled;
 }
 
@@ -332,7 +330,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   bool is_solved = Solve(problem, estimate);
   // A marker that is somewhere else must not cost the frame.
   for (const double most : {kSurelyIsolated, kPerhapsIsolated}) {
-    if (is_solved) break;
+    if (is_solved && estimate.unsettled_mm == 0) break;
     const int hidden = HideIsolated(mechanics_.model(), inflated->markers_mm, most, mechanics_.length_unit(),
                                     problem.observed);
     if (hidden > 0) is_solved = Solve(problem, estimate);

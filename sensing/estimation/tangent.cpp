@@ -51,6 +51,7 @@ bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Ei
 void Tangent::Forget() {
   is_prepared = false;
   local_n.resize(0);
+  loads.Forget();
 }
 
 }  // namespace taclink

@@ -182,7 +182,8 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
   if (const double shift_mm = evidence.estimate.loads.camera_shift_mm; shift_mm > kMostCameraShiftMm * unit)
     state.reasons.push_back(
         {ReasonId::kCamerasMoved, Text("all markers together are off by up to %.2f mm, as if the cameras had "
-                                       "moved since they were calibrated; calibrate again, or tare",
+                                       "moved since they were calibrated; calibrate again, or tare (or "
+                                       "displacements count from elsewhere)",
                                        shift_mm)});
   if (evidence.estimate.unsettled_mm > 0)
     state.reasons.push_back(

@@ -197,7 +197,7 @@ struct LinkPipeline::Stages {
       rest_progress.taken = 0;
       return SetStatus(state, LinkStatus::kCalibrating, trouble);
     }
-    const auto complete = rest->Add(detections);
+    const auto complete = rest->Add(detections, *inflation);
     rest_progress.taken = rest->taken();
     rest_progress.refusal = complete ? std::nullopt : std::optional(complete.error());
     if (!complete) {

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "sensing/camera/rest_check.h"
+#include "sensing/core/similar_skin.h"
 #include "sensing/markers/rest_labels.h"
 #include "sensing/pipeline/rest_match.h"
 
@@ -21,7 +22,8 @@ void RestPose::StartAgain() {
   mean_.Clear();
 }
 
-Result<bool> RestPose::Add(const std::array<Detections, kCameraCount>& detections) {
+Result<bool> RestPose::Add(const std::array<Detections, kCameraCount>& detections,
+                           const Eigen::VectorXd& inflation_mm) {
   Result<void> good;
   if (!tracker_) {
     good = Begin(detections);
@@ -35,7 +37,7 @@ Result<bool> RestPose::Add(const std::array<Detections, kCameraCount>& detection
   }
   mean_.Add(labels_);
   if (taken() < frames_) return false;
-  return Finish();
+  return Finish(inflation_mm);
 }
 
 // Labels the first pair, and makes the tracker that labels the others.
@@ -82,7 +84,7 @@ Result<void> RestPose::CheckCount() const {
   return {};
 }
 
-Result<bool> RestPose::Finish() {
+Result<bool> RestPose::Finish(const Eigen::VectorXd& inflation_mm) {
   mean_.Finish();
   noise_px_ = mean_.noise_px();
   if (mean_.moved()) {
@@ -91,10 +93,11 @@ Result<bool> RestPose::Finish() {
                  "the skin moved while its rest shape was taken; do not touch it"};
   }
   if (rig_) {
-    // Pressure moves whole rings, which count as the lens' errors do; what stands out of a ring is a touch.
-    if (const auto dent = FindDent(model_, *rig_, mean_.markers(), CalibrationOptions{}.max_dent_mm)) {
+    const double limit_mm = CalibrationOptions{}.max_dent_mm * LengthUnit(model_);
+    if (const auto dent = FindDent(model_, *rig_, mean_.markers(), inflation_mm, limit_mm)) {
       StartAgain();
-      return Error{ErrorCode::kFailedPrecondition, Describe(model_, *dent)};
+      return Error{ErrorCode::kFailedPrecondition,
+                   Describe(model_, *dent) + "; if nothing is there, a camera has moved: calibrate again"};
     }
     calibration_.emplace().rig = *rig_;
     return true;

@@ -20,8 +20,9 @@ class RestPose {
   RestPose(const LinkModel& model, const std::optional<StereoRig>& rig, int frames);
 
   /// True: complete. False: needs more pairs. Error: this pair is no use (too few markers, bad fit), with the
-  /// reason; collecting starts again.
-  Result<bool> Add(const std::array<Detections, kCameraCount>& detections);
+  /// reason; collecting starts again. `inflation_mm`: what pressure moves the markers by, stacked.
+  Result<bool> Add(const std::array<Detections, kCameraCount>& detections,
+                   const Eigen::VectorXd& inflation_mm);
 
   /// Forgets the pairs so far.
   void StartAgain();
@@ -39,7 +40,7 @@ class RestPose {
  private:
   Result<void> Begin(const std::array<Detections, kCameraCount>& detections);
   Result<void> CheckCount() const;
-  Result<bool> Finish();
+  Result<bool> Finish(const Eigen::VectorXd& inflation_mm);
 
   const LinkModel model_;
   const std::optional<StereoRig> rig_;

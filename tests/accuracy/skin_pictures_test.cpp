@@ -17,6 +17,7 @@ TEST_P(SkinPictures, EndRight) {
     for (const StabilityRow& row : RunPictureCase(skin)) {
       ++cases;
       EXPECT_EQ(row.ending, Ending::kRight) << row.name << ": " << row.reason;
+      EXPECT_EQ(row.reason, "ok") << row.name;
     }
   }
   EXPECT_EQ(cases, 2);

@@ -238,7 +238,7 @@ TEST_F(LinkPipelineTest, TouchedSkinIsNoBaseline) {
 }
 
 // Also where the cameras are known: what touches at the start would be missing while it stays, and a ghost
-// afterwards. Pressure alone is no touch.
+// afterwards.
 TEST_F(LinkPipelineTest, TouchedSkinIsNoBaselineOfKnownCameras) {
   options_.rig = model_.nominal_rig;
   LinkPipeline pipeline(model_, options_);
@@ -250,6 +250,20 @@ TEST_F(LinkPipelineTest, TouchedSkinIsNoBaselineOfKnownCameras) {
   EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
   pipeline.Process(Frame(kTouchedS), state_);
   EXPECT_NEAR(state_.total_force_n.norm(), 0.2, 0.04);
+}
+
+// Nor is pressure a touch, or a lens that dirt covers in part.
+TEST_F(LinkPipelineTest, PressureAndDirtAreNoTouchOfKnownCameras) {
+  Scene inflated = scene_;
+  inflated.pressure = {{0, 1.5}};
+  inflated.camera.dirt_specks = 6;
+  skin_ = SimulatedSkin::Make(model_, inflated).value();
+  options_.rig = model_.nominal_rig;
+  options_.pressure_mpa = 1.5e-3;
+  renderer_ = Renderer(model_, model_.nominal_rig, inflated.camera, 3);
+  LinkPipeline pipeline(model_, options_);
+  for (int k = 0; k <= options_.rest_frames; ++k) pipeline.Process(Frame(0), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
 }
 
 TEST_F(LinkPipelineTest, RefusedRestIsTriedAgainAtGrowingIntervalsAndBeginsWithinASecond) {
