@@ -17,10 +17,11 @@ constexpr double kStrayN = 1e-3, kNormalShare = 0.01, kTangentialShare = 0.003;
 // Of each of the cameras' modes, where it moves markers most: phantoms of a newton came of 0.3 mm that no
 // mode took up, and between 0.05 and 0.35 the solids' forces do not depend on it.
 constexpr double kCameraMm = 0.2;
-constexpr int kCameraModes = 8;
+constexpr int kCameraModes = 9;
 
-// Of a marker: shifts of all, turns about the middle of the link, a stretch along the axis, and a bow of z,
-// which two cameras at the ends know worst in the middle. Not a growth of the radius: that is the pressure's.
+// Of a marker: shifts of all, turns about the middle of the link, a stretch along the axis, a bow of z, which
+// two cameras at the ends know worst in the middle, and a twist, of cameras that are rolled against each other.
+// Not a growth of the radius: that is the pressure's.
 Eigen::Matrix<double, 3, kCameraModes> CameraModes(const Vec3& at_mm, double length_mm) {
   const double half_mm = length_mm / 2;
   const Vec3 from_middle = (at_mm - Vec3(0, 0, half_mm)) / half_mm;
@@ -29,6 +30,7 @@ Eigen::Matrix<double, 3, kCameraModes> CameraModes(const Vec3& at_mm, double len
   for (int axis = 0; axis < 3; ++axis) modes.col(3 + axis) = Vec3::Unit(axis).cross(from_middle);
   modes.col(6) = Vec3(0, 0, from_middle.z());
   modes.col(7) = Vec3(0, 0, std::sin(kPi * at_mm.z() / length_mm));
+  modes.col(8) = from_middle.z() * Vec3(-at_mm.y(), at_mm.x(), 0).normalized();
   return modes;
 }
 

@@ -102,11 +102,11 @@ TEST_F(SkinEstimatorTest, FindsAForceItsPlaceAndTheShape) {
   }
 }
 
-// Cameras that have moved or turned shift all markers alike, or along z by where they are: no load, and none
-// of a load's force along the wall.
+// Cameras that have moved or turned, or are rolled against each other, shift all markers together: no load,
+// and none of a load's force along the wall.
 TEST_F(SkinEstimatorTest, CamerasThatMovedAreNoForce) {
   const Vec3 middle(0, 0, model_.length_mm / 2);
-  const Vec3 turn(0, 0.006, 0), shift(0.2, 0, 0.3);
+  const Vec3 turn(0, 0.006, 0), shift(0.2, 0, 0.3), roll(0, 0, 0.005);
   for (const double force_n : {0.0, 0.4}) {
     const Pushed pushed = Push(model_, 1.0, 1.3, 95, force_n, 4);
     ASSERT_TRUE(pushed.ok);
@@ -114,7 +114,8 @@ TEST_F(SkinEstimatorTest, CamerasThatMovedAreNoForce) {
     for (int m = 0; m < model_.markers.count(); ++m) {
       const Vec3 at = model_.RestMarker(m);
       const Vec3 bow(0, 0, 0.2 * std::sin(kPi * at.z() / model_.length_mm));
-      moved_mm.segment<3>(3 * m) += turn.cross(at - middle) + shift + bow;
+      const Vec3 rolled = (at - middle).z() / middle.z() * roll.cross(at - middle);
+      moved_mm.segment<3>(3 * m) += turn.cross(at - middle) + shift + bow + rolled;
     }
     estimator_.Estimate(Observe(moved_mm, 1.0, 0.05), estimate_);
     ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
