@@ -82,12 +82,14 @@ int MostLeftOut(const LinkModel& model, const SkinShape& shape) {
   return most;
 }
 
-// Or on the last ring: of a body there, half is beyond.
+// Or on the last ring, for of a body there half is beyond, or no further from it than its center may be off.
 bool IsBeyondMarkers(const LinkModel& model, const std::vector<Contact>& contacts) {
   const auto& rings = model.markers.rings_z_mm;
-  const double margin = 0.1 * (rings[1] - rings[0]);
   return std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
-    return contact.center_mm.z() < rings.front() + margin || contact.center_mm.z() > rings.back() - margin;
+    const double sigma_mm =
+        contact.center_covariance_mm2 ? std::sqrt((*contact.center_covariance_mm2)(2, 2)) : 0;
+    const double margin_mm = 0.1 * (rings[1] - rings[0]) + sigma_mm, z_mm = contact.center_mm.z();
+    return z_mm < rings.front() + margin_mm || z_mm > rings.back() - margin_mm;
   });
 }
 
@@ -158,8 +160,8 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
   if (IsBeyondMarkers(evidence.model, state.contacts))
     state.reasons.push_back(
         {ReasonId::kBeyondMarkers,
-         "a contact lies on the first ring of markers or between it and the clamped end: what presses there "
-         "hardly shows, and may be stronger"});
+         "a contact lies, or may lie, on the first ring of markers or between it and the clamped end: what "
+         "presses there hardly shows, and may be stronger"});
   if (IsEncircled(state.contacts, kBeltMm * LengthUnit(evidence.model)))
     state.reasons.push_back({ReasonId::kEncircled,
                              "contacts follow each other closely all around the skin: the sum of their "

@@ -58,6 +58,17 @@ TEST_F(JudgeTest, BodiesAlongTheLinkAreNotAround) {
   EXPECT_THAT(Reasons(), testing::IsEmpty());
 }
 
+// What is known of its center does not tell on which side of the first ring it is.
+TEST_F(JudgeTest, AContactThatMayBeBesideTheMarkersIsTold) {
+  const double first_mm = model_.markers.rings_z_mm.front();
+  Touch(20, first_mm + 4);
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  state_.contacts[0].center_covariance_mm2 = Mat3(2.5 * 2.5 * Mat3::Identity());
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kBeyondMarkers));
+  state_.contacts[0].center_mm.z() = first_mm + 6;
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+}
+
 TEST_F(JudgeTest, APressureThatDoesNotFitIsTold) {
   state_.pressure_estimate = {.mpa = 1.14e-3, .sigma_mpa = 1e-6};
   EXPECT_THAT(Reasons(), testing::IsEmpty());
