@@ -25,9 +25,10 @@ constexpr double kNoiseDeviations = 2;        // of a spring's pull, that noise 
 constexpr double kLeastPressureSigma =
     1e-3;  // of the steps in which the skin is inflated: a prior is no certainty
 constexpr int kMostSteps = 8, kMostTangents = 3;
+constexpr int kStepsOfTangent = 3;  // the least: a new one is a disturbance where a skin may buckle
 constexpr double kShrinks = 0.5;  // steps by less: the tangent is too old
 // Between the last two steps, of the loads in any neighborhood by the largest, and of a seen marker: settled.
-constexpr double kSameLoads = 0.05, kSeenSettledMm = 0.15;
+constexpr double kSameLoads = 0.1, kSeenSettledMm = 0.2;
 
 double LongestOff(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   if (a.size() != b.size()) return 1e9;
@@ -280,8 +281,7 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
         step_mm * std::min(1.0, kTangentErrorPerMm * distance_mm / unit) < kSettledMm * unit;
     if (is_settled && !is_off) return true;
     before_mm = step_mm;
-    // Not after the last step: what is told of it is in terms of its tangent.
-    if (step + 1 < kMostSteps && (is_off || is_slow) && estimate.tangents < kMostTangents) {
+    if (step + kStepsOfTangent < kMostSteps && (is_off || is_slow) && estimate.tangents < kMostTangents) {
       if (is_slow) touched_->is_prepared = false;
       TakeNext(problem, estimate.state, local_n);
       const bool is_good = touched_->IsGoodFor(problem, estimate.state) && touched_->HasLocal(local_n);
