@@ -62,33 +62,30 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   by_pressure_ = prior.sigma_mpa * skin.by_pressure();
   covariance_.WriteDirect(skin, inflated, covariance_mm2_);
   if (prior.baseline_mm_per_mpa.size() == by_pressure_.size())
-    dense::AddOuter(prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa, covariance_mm2_);
-  dense::AddOuter(covariance_.by_cameras_mm(), covariance_mm2_);
-  direct_mm2_ = covariance_mm2_.cast<float>();
+    dense::AddOuter((prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa).cast<float>(), covariance_mm2_);
+  dense::AddOuter(covariance_.by_cameras_mm().cast<float>(), covariance_mm2_);
+  direct_mm2_ = covariance_mm2_;
   direct_mm2_.triangularView<Eigen::StrictlyUpper>() = direct_mm2_.transpose();
   covariance_.AddStray(skin, local_n, covariance_mm2_);
-  dense::AddOuter(by_pressure_, covariance_mm2_);
+  dense::AddOuter(by_pressure_.cast<float>(), covariance_mm2_);
   noise_mm2_.resize(static_cast<size_t>(markers));
   model_covariance_.resize(noise_mm2_.size());
   for (int m = 0; m < markers; ++m) {
     const auto i = static_cast<size_t>(m);
     auto block = covariance_mm2_.block<3, 3>(3 * m, 3 * m);
-    model_covariance_[i] = block.selfadjointView<Eigen::Lower>();
+    model_covariance_[i] = block.cast<double>().eval().selfadjointView<Eigen::Lower>();
     // All markers together tell the cameras' modes; one by one they would hide a wrong marker in them.
     const auto by_cameras_mm = covariance_.by_cameras_mm().middleRows<3>(3 * m);
     model_covariance_[i].noalias() -= by_cameras_mm * by_cameras_mm.transpose();
     noise_mm2_[i] = NoiseOf(observed.information[i], kUnseenMm * mechanics_.length_unit());
-    block += noise_mm2_[i];
+    block += noise_mm2_[i].cast<float>();
   }
   factor_ = covariance_mm2_;
   if (!dense::Cholesky(factor_)) return false;
-  single_factor_ = factor_.cast<float>();
-  whitened_pressure_ = by_pressure_;
-  dense::SolveLower(factor_, whitened_pressure_);
+  whitened_pressure_ = Whitened(by_pressure_);
   SpreadColumns(skin.columns()[0]);
   hidden_.resize(0, 0);
   dense::SolveLower(factor_, columns_);
-  single_columns_ = columns_.cast<float>();
   dense::Gram(columns_, gram_);
   gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
   regions_.clear();
@@ -103,7 +100,7 @@ void LoadEstimator::SpreadColumns(const Eigen::MatrixXf& at_nodes) {
     sum.setZero();
     for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), site); it; ++it)
       sum += static_cast<float>(it.value()) * at_nodes.col(it.row());
-    columns_.col(site) = sum.cast<double>();
+    columns_.col(site) = sum;
   }
   const int around = mechanics_.columns();
   for (int row = 0; row < mechanics_.site_rows(); ++row)
@@ -125,10 +122,10 @@ bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const Pres
   return worse <= kNewlySeenShare * static_cast<double>(noise_mm2_.size());
 }
 
-void LoadEstimator::Whiten(Eigen::MatrixXd& columns) const {
+Eigen::MatrixXd LoadEstimator::Whitened(const Eigen::MatrixXd& columns) const {
   Eigen::MatrixXf single = columns.cast<float>();
-  dense::SolveLower(single_factor_, single);
-  columns = single.cast<double>();
+  dense::SolveLower(factor_, single);
+  return single.cast<double>();
 }
 
 // What was seen when all was prepared and is not seen now is unknown: its unit vectors, whitened, are
@@ -166,12 +163,12 @@ void LoadEstimator::Hide(const MarkerObservations& observed) {
   hidden_.setZero(factor_.rows(), static_cast<Eigen::Index>(missing.size()));
   for (size_t k = 0; k < missing.size(); ++k)
     hidden_.block<3, 1>(missing[k].first, static_cast<Eigen::Index>(k)) = missing[k].second;
-  Whiten(hidden_);
+  hidden_ = Whitened(hidden_);
   if (hidden_.cols() > 0) {
     // Orthonormal by Cholesky of its Gram matrix, which is well conditioned.
     Eigen::MatrixXd gram;
-    dense::Gram(hidden_, gram);
-    const Eigen::LLT<Eigen::MatrixXd> llt(gram.selfadjointView<Eigen::Lower>());
+    dense::TransposedProduct(hidden_, hidden_, gram);
+    const Eigen::LLT<Eigen::MatrixXd> llt(gram);
     llt.matrixU().solveInPlace<Eigen::OnTheRight>(hidden_);
   }
 }
@@ -198,11 +195,10 @@ void LoadEstimator::ProjectOut(const Eigen::MatrixXd& tangential) {
   frame_gram_ = &free_gram_;
   if (is_hidden_projected_ && tangential.cols() == 0) return;
   is_hidden_projected_ = tangential.cols() == 0;
-  dense::TransposedProduct(basis, columns_, hidden_columns_);
-  Eigen::MatrixXd product;
-  const Eigen::MatrixXd scaled = shrink.asDiagonal() * hidden_columns_;
-  dense::TransposedProduct(hidden_columns_, scaled, product);
-  free_gram_ = gram_ - product;
+  dense::TransposedProduct(basis.cast<float>(), columns_, hidden_columns_);
+  const Eigen::MatrixXf scaled = shrink.cast<float>().asDiagonal() * hidden_columns_;
+  free_gram_ = gram_;
+  dense::AddTransposedProduct(-1, hidden_columns_, scaled, free_gram_);
 }
 
 // What sites bear of loads of sites and bands.
@@ -224,9 +220,9 @@ std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
   const int sites = mechanics_.site_count(), around = mechanics_.columns();
   const double unit = mechanics_.force_unit();
   Eigen::VectorXf target(columns_.cols());
-  dense::TransposedProduct(single_columns_, frame_data_.cast<float>(), target);
+  dense::TransposedProduct(columns_, frame_data_.cast<float>(), target);
   target_ = target.cast<double>();
-  norms_ = frame_gram_->diagonal().cwiseMax(0).cwiseSqrt();
+  norms_ = frame_gram_->diagonal().cast<double>().cwiseMax(0).cwiseSqrt();
   Eigen::VectorXd sorted = norms_.head(sites);
   std::nth_element(sorted.data(), sorted.data() + sites / 2, sorted.data() + sites);
   usual_norm_ = sorted[sites / 2];
@@ -283,7 +279,7 @@ double LoadEstimator::Unexplained(const std::vector<HillFinder::Hill>& hills, si
   }
   const double all = frame_data_.dot(data_);
   if (sites.empty()) return all;
-  const Eigen::MatrixXd exact = (*frame_gram_)(sites, sites);
+  const Eigen::MatrixXd exact = (*frame_gram_)(sites, sites).cast<double>();
   Eigen::MatrixXd h = exact;
   h.diagonal().array() += kRidge * h.trace() / static_cast<double>(sites.size());
   const Eigen::VectorXd b = target_(sites);
@@ -314,7 +310,7 @@ void LoadEstimator::Eliminate(std::vector<HillFinder::Hill>& hills) {
 LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
                                              const Eigen::MatrixXd& tangential) {
   const auto n = static_cast<Eigen::Index>(sites.size());
-  Eigen::MatrixXd normal = columns_(Eigen::all, sites);
+  Eigen::MatrixXd normal = columns_(Eigen::all, sites).cast<double>();
   Eigen::VectorXd data = data_;
   if (hidden_.cols() > 0) {
     normal -= hidden_ * (hidden_.transpose() * normal);
@@ -360,15 +356,13 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
 
 void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed, LoadEstimate& estimate) {
   estimate = {};
-  Eigen::MatrixXd data(factor_.rows(), 1);
+  Eigen::VectorXd data = Eigen::VectorXd::Zero(factor_.rows());
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const auto i = static_cast<size_t>(m);
     const bool seen = observed.information[i].trace() > 0 && observed.displacement_mm[i].allFinite();
-    data.block<3, 1>(3 * m, 0).setZero();
-    if (seen) data.block<3, 1>(3 * m, 0) = observed.displacement_mm[i] - skin.base_mm().segment<3>(3 * m);
+    if (seen) data.segment<3>(3 * m) = observed.displacement_mm[i] - skin.base_mm().segment<3>(3 * m);
   }
-  Whiten(data);
-  data_ = data.col(0);
+  data_ = Whitened(data);
   Hide(observed);
   std::vector<HillFinder::Hill> hills;
   std::vector<int> slipping;  // hills with a tangential force, in the order of their columns

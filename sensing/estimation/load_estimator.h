@@ -93,7 +93,7 @@ class LoadEstimator {
   static constexpr double kCoupleNmm = 10;
 
   void SpreadColumns(const Eigen::MatrixXf& at_nodes);
-  void Whiten(Eigen::MatrixXd& columns) const;
+  Eigen::MatrixXd Whitened(const Eigen::MatrixXd& columns) const;
   void Hide(const MarkerObservations& observed);
   void ShareBands(const Eigen::VectorXd& loads, const std::vector<int>& support);
   std::vector<HillFinder::Hill> Select(const Linearization& skin);
@@ -145,14 +145,12 @@ class LoadEstimator {
 
   // Since Prepare. Whitened: in units of independent standard deviations.
   std::vector<Mat3> noise_mm2_, model_covariance_;
-  Eigen::MatrixXd covariance_mm2_, factor_;
+  Eigen::MatrixXf covariance_mm2_, factor_;
   Eigen::MatrixXf direct_mm2_;   // of it, what no force and no pressure of the estimate explains
   Eigen::VectorXd by_pressure_;  // stacked, of one standard deviation
-  Eigen::MatrixXd whitened_pressure_;
+  Eigen::VectorXd whitened_pressure_;
   double pressure_sigma_ = 0;
-  Eigen::MatrixXd columns_, gram_;
-  // For what every frame does with all of them, which is bound by memory.
-  Eigen::MatrixXf single_columns_, single_factor_;
+  Eigen::MatrixXf columns_, gram_;
   struct Region {
     std::vector<int> rows;
     Eigen::LLT<Eigen::MatrixXf> factor;
@@ -164,9 +162,10 @@ class LoadEstimator {
   // tangential forces that were let in; data and Gram matrix without it.
   using Direction = std::pair<int, Vec3>;  // first row of the marker, unit vector
   std::vector<Direction> missing_;         // what hidden_ is of
-  Eigen::MatrixXd hidden_, hidden_columns_, free_gram_;
+  Eigen::MatrixXd hidden_;
+  Eigen::MatrixXf hidden_columns_, free_gram_;
   bool is_hidden_projected_ = false;             // free_gram_ is without hidden_ alone
-  const Eigen::MatrixXd* frame_gram_ = nullptr;  // gram_, where nothing is hidden
+  const Eigen::MatrixXf* frame_gram_ = nullptr;  // gram_, where nothing is hidden
   Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
   std::vector<char> is_shown_;  // by row
   std::vector<int> chosen_;     // loads above zero of the last selection

@@ -87,7 +87,7 @@ void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill&
 
 void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
   Eigen::MatrixXf pulls = solution_.residual.cast<float>();
-  dense::SolveLowerTransposed(single_factor_, pulls);
+  dense::SolveLowerTransposed(factor_, pulls);
   pulls_per_mm_ = pulls.col(0).cast<double>();
   const std::array<Eigen::VectorXd, 3> pulled = skin.PulledAtSites(pulls_per_mm_);
   std::array<Eigen::VectorXd, 3> contacts;
@@ -132,9 +132,9 @@ void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& es
       const double share = load.inward_n[k] / load.normal_force_n;
       const int site = load.sites[k], row = site / columns, column = site % columns;
       const auto at = [&](int r, int c) {
-        return columns_.col(std::clamp(r, 0, rows - 1) * columns + (c + columns) % columns);
+        return columns_.col(std::clamp(r, 0, rows - 1) * columns + (c + columns) % columns).cast<double>();
       };
-      normal += share * columns_.col(site);
+      normal += share * columns_.col(site).cast<double>();
       around += 0.5 * load.inward_n[k] * (at(row, column + 1) - at(row, column - 1));
       along += 0.5 * load.inward_n[k] * (at(row + 1, column) - at(row - 1, column));
     }
@@ -190,11 +190,11 @@ double LoadEstimator::WorstRegion(const Eigen::VectorXd& residual) {
           for (int c = 0; c < 3; ++c) region.rows.push_back(3 * neighbor + c);
         }
       }
-      region.factor.compute(covariance_mm2_(region.rows, region.rows).cast<float>());
+      region.factor.compute(covariance_mm2_(region.rows, region.rows));
       regions_.push_back(std::move(region));
     }
   }
-  const Eigen::VectorXf left_mm = single_factor_.triangularView<Eigen::Lower>() * residual.cast<float>();
+  const Eigen::VectorXf left_mm = factor_.triangularView<Eigen::Lower>() * residual.cast<float>();
   double worst = 0;
   for (const Region& region : regions_) {
     int shown = 0;

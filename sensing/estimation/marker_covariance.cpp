@@ -45,7 +45,7 @@ MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics, const Neighbo
 }
 
 void MarkerCovariance::WriteDirect(const Linearization& skin, const InflatedSkin& inflated,
-                                   Eigen::MatrixXd& covariance_mm2) const {
+                                   Eigen::MatrixXf& covariance_mm2) const {
   const int markers = mechanics_.marker_count();
   Eigen::VectorXd moved(markers), grown(markers);
   for (int m = 0; m < markers; ++m) {
@@ -65,13 +65,13 @@ void MarkerCovariance::WriteDirect(const Linearization& skin, const InflatedSkin
       block.topLeftCorner<2, 2>() += growth * out_i.head<2>() * out_j.head<2>().transpose();
       block(2, 2) += kAxialShare * kAxialShare * growth;
       if (i == j) block.diagonal().array() += kFloorMm * kFloorMm;
-      covariance_mm2.block<3, 3>(3 * i, 3 * j) = block;
+      covariance_mm2.block<3, 3>(3 * i, 3 * j) = block.cast<float>();
     }
   }
 }
 
 void MarkerCovariance::AddStray(const Linearization& skin, const Eigen::VectorXd& local_n,
-                                Eigen::MatrixXd& covariance_mm2) {
+                                Eigen::MatrixXf& covariance_mm2) {
   const double unit = mechanics_.force_unit();
   const int sites = mechanics_.site_count(), markers = mechanics_.marker_count();
   Eigen::MatrixXf scaled(3 * markers, 3 * sites);
@@ -81,9 +81,7 @@ void MarkerCovariance::AddStray(const Linearization& skin, const Eigen::VectorXd
     scaled.middleCols(static_cast<Eigen::Index>(k) * sites, sites).noalias() =
         skin.columns()[k] * stray_n_[k].cast<float>().asDiagonal();
   }
-  Eigen::MatrixXf stray_mm2 = Eigen::MatrixXf::Zero(3 * markers, 3 * markers);
-  dense::AddOuter(scaled, stray_mm2);
-  covariance_mm2.triangularView<Eigen::Lower>() += stray_mm2.cast<double>();
+  dense::AddOuter(scaled, covariance_mm2);
 }
 
 }  // namespace taclink

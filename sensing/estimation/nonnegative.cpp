@@ -7,7 +7,10 @@ namespace taclink {
 namespace {
 
 // Of the diagonal: neighbouring loads displace nearly alike, and a factor must exist.
+template <typename Scalar>
 constexpr double kRidge = 1e-9;
+template <>
+constexpr double kRidge<float> = 1e-6;
 constexpr double kTolerance = 1e-9;
 // What needs more is no load of a few bodies, and would keep a link from its next frame.
 constexpr int kMostSolutions = 500;
@@ -16,20 +19,22 @@ constexpr size_t kMostVariables = 150;
 }  // namespace
 
 // False: it depends on those that are in, by rounding.
-bool NonNegativeSolver::Append(const Eigen::MatrixXd& h, int variable) {
+template <typename Matrix>
+bool NonNegativeSolver::Append(const Matrix& h, int variable) {
   const auto k = static_cast<Eigen::Index>(in_.size());
   if (factor_.rows() <= k) factor_.conservativeResize(2 * k + 32, 2 * k + 32);
   auto row = factor_.row(k).head(k);
   for (Eigen::Index i = 0; i < k; ++i) row[i] = h(variable, in_[static_cast<size_t>(i)]);
   factor_.topLeftCorner(k, k).triangularView<Eigen::Lower>().solveInPlace(row.transpose());
-  const double left = h(variable, variable) * (1 + kRidge) - row.squaredNorm();
+  const double left = h(variable, variable) * (1 + kRidge<typename Matrix::Scalar>)-row.squaredNorm();
   if (!(left > 0)) return false;
   factor_(k, k) = std::sqrt(left);
   in_.push_back(variable);
   return true;
 }
 
-void NonNegativeSolver::Refactor(const Eigen::MatrixXd& h, size_t from) {
+template <typename Matrix>
+void NonNegativeSolver::Refactor(const Matrix& h, size_t from) {
   const std::vector<int> again(in_.begin() + static_cast<std::ptrdiff_t>(from), in_.end());
   in_.resize(from);
   for (const int variable : again) {
@@ -49,7 +54,8 @@ void NonNegativeSolver::SolveOnSupport(const Eigen::VectorXd& b) {
 
 // To the minimum over the variables that are in; those that would go below zero leave. False: they take
 // turns.
-bool NonNegativeSolver::StepToOptimum(const Eigen::MatrixXd& h, const Eigen::VectorXd& b) {
+template <typename Matrix>
+bool NonNegativeSolver::StepToOptimum(const Matrix& h, const Eigen::VectorXd& b) {
   while (!in_.empty()) {
     if (work_ > kMostSolutions || in_.size() > kMostVariables) return false;
     SolveOnSupport(b);
@@ -77,7 +83,8 @@ bool NonNegativeSolver::StepToOptimum(const Eigen::MatrixXd& h, const Eigen::Vec
   return true;
 }
 
-const Eigen::VectorXd& NonNegativeSolver::Solve(const Eigen::MatrixXd& h, const Eigen::VectorXd& b,
+template <typename Matrix>
+const Eigen::VectorXd& NonNegativeSolver::Solve(const Matrix& h, const Eigen::VectorXd& b,
                                                 std::vector<int>& support) {
   const Eigen::Index n = b.size();
   x_.setZero(n);
@@ -89,28 +96,35 @@ const Eigen::VectorXd& NonNegativeSolver::Solve(const Eigen::MatrixXd& h, const 
   }
   const double tolerance = kTolerance * std::max(1.0, b.cwiseAbs().maxCoeff());
   converged_ = StepToOptimum(h, b);
-  int refused = -1;
+  refused_.clear();
   while (converged_) {
     gradient_ = b;
-    for (const int variable : in_) gradient_ -= x_[variable] * h.col(variable);
+    for (const int variable : in_) gradient_ -= x_[variable] * h.col(variable).template cast<double>();
     for (const int variable : in_) gradient_[variable] = -1;
-    if (refused >= 0) gradient_[refused] = -1;
+    for (const int variable : refused_) gradient_[variable] = -1;
     Eigen::Index best = 0;
     if (n == 0 || gradient_.maxCoeff(&best) <= tolerance) break;
     const auto variable = static_cast<int>(best);
-    refused = -1;
     const size_t before = in_.size();
     if (!Append(h, variable)) {
-      refused = variable;
+      refused_.push_back(variable);
       continue;
     }
     is_in_[static_cast<size_t>(variable)] = 1;
     converged_ = StepToOptimum(h, b);
     // By rounding it leaves at once.
-    if (in_.size() == before && !is_in_[static_cast<size_t>(variable)]) refused = variable;
+    if (in_.size() == before && !is_in_[static_cast<size_t>(variable)])
+      refused_.push_back(variable);
+    else
+      refused_.clear();
   }
   support = in_;
   return x_;
 }
+
+template const Eigen::VectorXd& NonNegativeSolver::Solve(const Eigen::MatrixXd&, const Eigen::VectorXd&,
+                                                         std::vector<int>&);
+template const Eigen::VectorXd& NonNegativeSolver::Solve(const Eigen::MatrixXf&, const Eigen::VectorXd&,
+                                                         std::vector<int>&);
 
 }  // namespace taclink

@@ -10,18 +10,23 @@ namespace taclink {
 /// not depend on where it starts. One thread.
 class NonNegativeSolver {
  public:
-  /// `h`: symmetric, both halves. `support`: on entry where to start, on return the variables above zero.
-  /// Returns x; the reference holds until the next call. False in `converged` where it gave up.
-  const Eigen::VectorXd& Solve(const Eigen::MatrixXd& h, const Eigen::VectorXd& b, std::vector<int>& support);
+  /// `h`: symmetric, both halves, in double or single precision. `support`: on entry where to start, on
+  /// return the variables above zero. Returns x; the reference holds until the next call. False in
+  /// `converged` where it gave up.
+  template <typename Matrix>
+  const Eigen::VectorXd& Solve(const Matrix& h, const Eigen::VectorXd& b, std::vector<int>& support);
   bool converged() const { return converged_; }
 
  private:
-  bool Append(const Eigen::MatrixXd& h, int variable);
-  void Refactor(const Eigen::MatrixXd& h, size_t from);
+  template <typename Matrix>
+  bool Append(const Matrix& h, int variable);
+  template <typename Matrix>
+  void Refactor(const Matrix& h, size_t from);
   void SolveOnSupport(const Eigen::VectorXd& b);
-  bool StepToOptimum(const Eigen::MatrixXd& h, const Eigen::VectorXd& b);
+  template <typename Matrix>
+  bool StepToOptimum(const Matrix& h, const Eigen::VectorXd& b);
 
-  std::vector<int> in_;
+  std::vector<int> in_, refused_;  // refused: that could not come in since one last did
   Eigen::MatrixXd factor_;
   Eigen::VectorXd x_, on_support_, trial_, gradient_;
   std::vector<char> is_in_;

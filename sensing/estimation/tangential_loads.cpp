@@ -31,7 +31,7 @@ Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, cons
             static_cast<float>(spread[site]) * skin.columns()[static_cast<size_t>(k + 1)].col(site);
     }
   }
-  dense::SolveLower(single_factor_, single);
+  dense::SolveLower(factor_, single);
   Eigen::MatrixXd columns = single.cast<double>();
   if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
   return columns;
@@ -53,7 +53,7 @@ LoadEstimator::FitColumns LoadEstimator::ColumnsOf(const std::vector<int>& actin
   const auto loads = static_cast<Eigen::Index>(acting.size());
   FitColumns fit;
   fit.columns.resize(data_.size(), loads + tangential.cols());
-  fit.columns << columns_(Eigen::all, acting), tangential;
+  fit.columns << columns_(Eigen::all, acting).cast<double>(), tangential;
   if (hidden_.cols() > 0) fit.columns -= hidden_ * (hidden_.transpose() * fit.columns);
   Eigen::MatrixXd information;
   dense::TransposedProduct(fit.columns, fit.columns, information);
@@ -147,7 +147,7 @@ Eigen::MatrixXd LoadEstimator::ShiftColumns(const Linearization& skin, const Est
                              .cast<double>();
     }
   }
-  Whiten(shift);
+  shift = Whitened(shift);
   if (hidden_.cols() > 0) shift -= hidden_ * (hidden_.transpose() * shift);
   return shift;
 }

@@ -10,19 +10,20 @@ namespace taclink::dense {
 
 /// The lower Cholesky factor in place; what is above the diagonal is not touched. False: not positive
 /// definite.
-bool Cholesky(Eigen::MatrixXd& a);
+bool Cholesky(Eigen::MatrixXf& a);
 /// b := L^-1 b, or L^-T b.
-void SolveLower(const Eigen::MatrixXd& l, Eigen::Ref<Eigen::MatrixXd> b);
 void SolveLower(const Eigen::MatrixXf& l, Eigen::Ref<Eigen::MatrixXf> b);
 void SolveLowerTransposed(const Eigen::MatrixXf& l, Eigen::Ref<Eigen::MatrixXf> b);
 /// Lower half of c := c + a a^T.
-void AddOuter(const Eigen::MatrixXd& a, Eigen::MatrixXd& c);
 void AddOuter(const Eigen::MatrixXf& a, Eigen::MatrixXf& c);
 /// c := c + scale a b, or scale a b^T.
 void AddProduct(double scale, const Eigen::Ref<const Eigen::MatrixXd>& a,
                 const Eigen::Ref<const Eigen::MatrixXd>& b, bool transpose_b, Eigen::Ref<Eigen::MatrixXd> c);
 void AddProduct(float scale, const Eigen::Ref<const Eigen::MatrixXf>& a,
                 const Eigen::Ref<const Eigen::MatrixXf>& b, bool transpose_b, Eigen::Ref<Eigen::MatrixXf> c);
+/// c := scale a b.
+void SetProduct(float scale, const Eigen::Ref<const Eigen::MatrixXf>& a,
+                const Eigen::Ref<const Eigen::MatrixXf>& b, Eigen::Ref<Eigen::MatrixXf> c);
 /// The inverse of a symmetric matrix, which need not be definite, in its place. False: singular.
 bool InvertSymmetric(Eigen::MatrixXd& a);
 /// y := a x, or a^T x.
@@ -32,7 +33,11 @@ void TransposedProduct(const Eigen::MatrixXf& a, const Eigen::Ref<const Eigen::V
                        Eigen::Ref<Eigen::VectorXf> y);
 /// c := a^T b.
 void TransposedProduct(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, Eigen::MatrixXd& c);
+void TransposedProduct(const Eigen::MatrixXf& a, const Eigen::MatrixXf& b, Eigen::MatrixXf& c);
+/// c := c + scale a^T b.
+void AddTransposedProduct(float scale, const Eigen::MatrixXf& a, const Eigen::MatrixXf& b,
+                          Eigen::MatrixXf& c);
 /// Lower half of c := a^T a.
-void Gram(const Eigen::MatrixXd& a, Eigen::MatrixXd& c);
+void Gram(const Eigen::MatrixXf& a, Eigen::MatrixXf& c);
 
 }  // namespace taclink::dense

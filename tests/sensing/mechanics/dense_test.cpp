@@ -17,8 +17,8 @@ class Dense : public testing::Test {
     const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 2 * kRows);
     return a * a.transpose();
   }
-  static Eigen::MatrixXd LowerOf(const Eigen::MatrixXd& a) { return a.triangularView<Eigen::Lower>(); }
-  static Eigen::MatrixXd AboveOf(const Eigen::MatrixXd& a) {
+  static Eigen::MatrixXf LowerOf(const Eigen::MatrixXf& a) { return a.triangularView<Eigen::Lower>(); }
+  static Eigen::MatrixXf AboveOf(const Eigen::MatrixXf& a) {
     return a.triangularView<Eigen::StrictlyUpper>();
   }
   static void ExpectClose(const Eigen::MatrixXd& found, const Eigen::MatrixXd& expected,
@@ -27,27 +27,32 @@ class Dense : public testing::Test {
     ASSERT_EQ(found.cols(), expected.cols());
     EXPECT_LT((found - expected).norm(), tolerance * expected.norm());
   }
+  static void ExpectClose(const Eigen::MatrixXf& found, const Eigen::MatrixXd& expected,
+                          double tolerance = 1e-5) {
+    ExpectClose(Eigen::MatrixXd(found.cast<double>()), expected, tolerance);
+  }
 
   void SetUp() override { std::srand(5); }  // Eigen's Random draws from it.
 };
 
 TEST_F(Dense, CholeskyIsEigens) {
   const Eigen::MatrixXd a = PositiveDefinite();
-  Eigen::MatrixXd l = a;
+  Eigen::MatrixXf l = a.cast<float>();
+  const Eigen::MatrixXf above = AboveOf(l);
   ASSERT_TRUE(dense::Cholesky(l));
   ExpectClose(LowerOf(l), a.llt().matrixL());
-  EXPECT_EQ(AboveOf(l), AboveOf(a));  // as promised, not touched
+  EXPECT_EQ(AboveOf(l), above);  // as promised, not touched
 }
 
 TEST_F(Dense, CholeskyReadsTheLowerHalfAlone) {
   const Eigen::MatrixXd a = PositiveDefinite();
-  Eigen::MatrixXd l = LowerOf(a);
+  Eigen::MatrixXf l = LowerOf(a.cast<float>());
   ASSERT_TRUE(dense::Cholesky(l));
   ExpectClose(l, a.llt().matrixL());
 }
 
 TEST_F(Dense, CholeskySaysWhatIsNotPositiveDefinite) {
-  Eigen::MatrixXd a = PositiveDefinite();
+  Eigen::MatrixXf a = PositiveDefinite().cast<float>();
   a(40, 40) = -1;
   EXPECT_FALSE(dense::Cholesky(a));
 }
@@ -55,17 +60,13 @@ TEST_F(Dense, CholeskySaysWhatIsNotPositiveDefinite) {
 // One column and several take different routines.
 TEST_F(Dense, TriangularSolutionsAreEigens) {
   const Eigen::MatrixXd l = PositiveDefinite().llt().matrixL();
-  const Eigen::MatrixXf single_l = l.cast<float>();
   for (const Eigen::Index columns : {1, 7}) {
     const Eigen::MatrixXd b = Eigen::MatrixXd::Random(kRows, columns);
-    Eigen::MatrixXd forward = b;
-    Eigen::MatrixXf single = b.cast<float>(), backward = single;
-    dense::SolveLower(l, forward);
-    dense::SolveLower(single_l, single);
-    dense::SolveLowerTransposed(single_l, backward);
+    Eigen::MatrixXf forward = b.cast<float>(), backward = forward;
+    dense::SolveLower(l.cast<float>(), forward);
+    dense::SolveLowerTransposed(l.cast<float>(), backward);
     ExpectClose(forward, l.triangularView<Eigen::Lower>().solve(b));
-    ExpectClose(single.cast<double>(), forward, 1e-5);
-    ExpectClose(backward.cast<double>(), l.transpose().triangularView<Eigen::Upper>().solve(b), 1e-5);
+    ExpectClose(backward, l.transpose().triangularView<Eigen::Upper>().solve(b));
   }
 }
 
@@ -73,47 +74,42 @@ TEST_F(Dense, TriangularSolutionsAreEigens) {
 TEST_F(Dense, TriangularSolutionsOfABlock) {
   const Eigen::MatrixXd l = PositiveDefinite().llt().matrixL();
   const Eigen::MatrixXd before = Eigen::MatrixXd::Random(kRows + 11, 9);
-  Eigen::MatrixXd forward = before;
-  Eigen::MatrixXf single = before.cast<float>();
-  dense::SolveLower(l, forward.block(4, 2, kRows, 3));
-  dense::SolveLower(l.cast<float>(), single.block(4, 2, kRows, 3));
+  Eigen::MatrixXf forward = before.cast<float>();
+  dense::SolveLower(l.cast<float>(), forward.block(4, 2, kRows, 3));
   Eigen::MatrixXd expected = before;
   expected.block(4, 2, kRows, 3) = l.triangularView<Eigen::Lower>().solve(before.block(4, 2, kRows, 3));
   ExpectClose(forward, expected);
-  EXPECT_EQ(forward.topRows(4), before.topRows(4));
-  ExpectClose(single.cast<double>(), expected, 1e-5);
+  EXPECT_EQ(forward.topRows(4), before.topRows(4).cast<float>());
 }
 
 // What is above a factor's diagonal is left over from before the factorization and must not count.
 TEST_F(Dense, TriangularSolutionsIgnoreTheUpperHalf) {
   const Eigen::MatrixXd a = PositiveDefinite();
   const Eigen::VectorXd b = Eigen::VectorXd::Random(kRows);
-  Eigen::MatrixXd l = a;
+  Eigen::MatrixXf l = a.cast<float>(), x = b.cast<float>();
   ASSERT_TRUE(dense::Cholesky(l));
-  const Eigen::MatrixXf single_l = l.cast<float>();
-  Eigen::MatrixXf x = b.cast<float>();
-  dense::SolveLower(single_l, x);
-  dense::SolveLowerTransposed(single_l, x);
-  ExpectClose(x.cast<double>(), a.llt().solve(b), 1e-4);
+  dense::SolveLower(l, x);
+  dense::SolveLowerTransposed(l, x);
+  ExpectClose(x, a.llt().solve(b), 1e-4);
 }
 
 TEST_F(Dense, AddOuterAddsToTheLowerHalf) {
-  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 13), c = Eigen::MatrixXd::Random(kRows, kRows);
-  Eigen::MatrixXd sum = c;
+  const Eigen::MatrixXf a = Eigen::MatrixXf::Random(kRows, 13), c = Eigen::MatrixXf::Random(kRows, kRows);
+  Eigen::MatrixXf sum = c;
   dense::AddOuter(a, sum);
-  ExpectClose(LowerOf(sum), LowerOf(c + a * a.transpose()));
+  ExpectClose(LowerOf(sum), LowerOf(c + a * a.transpose()).cast<double>());
   EXPECT_EQ(AboveOf(sum), AboveOf(c));
 }
 
 TEST_F(Dense, GramIsTheLowerHalfOfTheProduct) {
-  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 13);
-  Eigen::MatrixXd c;
+  const Eigen::MatrixXf a = Eigen::MatrixXf::Random(kRows, 13);
+  Eigen::MatrixXf c;
   dense::Gram(a, c);
-  ExpectClose(LowerOf(c), LowerOf(a.transpose() * a));
+  ExpectClose(LowerOf(c), LowerOf(a.transpose() * a).cast<double>());
   // What a matrix of the right size held before does not count, not even if it is no number.
-  c.setConstant(std::nan(""));
+  c.setConstant(std::nanf(""));
   dense::Gram(a, c);
-  ExpectClose(LowerOf(c), LowerOf(a.transpose() * a));
+  ExpectClose(LowerOf(c), LowerOf(a.transpose() * a).cast<double>());
 }
 
 TEST_F(Dense, TransposedProductIsEigens) {
@@ -124,6 +120,11 @@ TEST_F(Dense, TransposedProductIsEigens) {
   c.setConstant(std::nan(""));
   dense::TransposedProduct(a, b, c);
   ExpectClose(c, a.transpose() * b);
+  Eigen::MatrixXf single = Eigen::MatrixXf::Constant(13, 5, std::nanf(""));
+  dense::TransposedProduct(a.cast<float>(), b.cast<float>(), single);
+  ExpectClose(single, a.transpose() * b);
+  dense::AddTransposedProduct(-3, a.cast<float>(), b.cast<float>(), single);
+  ExpectClose(single, -2 * a.transpose() * b);
 }
 
 TEST_F(Dense, ProductsWithAVectorAreEigens) {
@@ -150,7 +151,10 @@ TEST_F(Dense, AddProductIsEigensOnBlocksToo) {
   ExpectClose(c, expected);
   Eigen::MatrixXf single = before.cast<float>();
   dense::AddProduct(-1.5F, a.cast<float>().eval(), b.cast<float>().eval(), false, single.block(3, 2, 9, 5));
-  EXPECT_LT((single.cast<double>() - expected).norm(), 1e-5 * expected.norm());
+  ExpectClose(single, expected);
+  expected.block(3, 2, 9, 5) = 2 * a * b;
+  dense::SetProduct(2, a.cast<float>().eval(), b.cast<float>().eval(), single.block(3, 2, 9, 5));
+  ExpectClose(single, expected);
 }
 
 TEST_F(Dense, SymmetricInversesOfDefiniteAndIndefinite) {
@@ -166,13 +170,13 @@ TEST_F(Dense, SymmetricInversesOfDefiniteAndIndefinite) {
 }
 
 TEST_F(Dense, EmptyMatricesAreNoError) {
-  Eigen::MatrixXd empty(0, 0), no_columns(kRows, 0), c;
+  Eigen::MatrixXf empty(0, 0), no_columns(kRows, 0), c;
   EXPECT_TRUE(dense::Cholesky(empty));
   dense::Gram(no_columns, c);
   EXPECT_EQ(c.size(), 0);
-  const Eigen::MatrixXd l = PositiveDefinite().llt().matrixL();
+  const Eigen::MatrixXf l = PositiveDefinite().llt().matrixL().toDenseMatrix().cast<float>();
   dense::SolveLower(l, no_columns);
-  Eigen::MatrixXd same = l;
+  Eigen::MatrixXf same = l;
   dense::AddOuter(no_columns, same);
   EXPECT_EQ(same, l);
 }
