@@ -22,11 +22,11 @@ Linearization::Linearization(const SkinMechanics& mechanics)
       jacobian_(mechanics.markers().MakeJacobian(mechanics.shell())),
       frames_(static_cast<size_t>(mechanics.site_count())) {
   const Eigen::Index row_dofs = hessian_.rows() / mechanics.site_rows();
-  filled_.assign(static_cast<size_t>(mechanics.site_rows()), 0);
+  filled_.resize(static_cast<size_t>(mechanics.site_rows()));
   for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
     for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it) {
-      for (auto i = static_cast<size_t>(it.col() / row_dofs); i < filled_.size(); ++i)
-        filled_[i] = std::max(filled_[i], row + 1);
+      BlockTridiagonal::Rows& rows = filled_[static_cast<size_t>(it.col() / row_dofs)];
+      rows = rows.With({row, row + 1});
     }
   }
 }

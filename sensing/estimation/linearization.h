@@ -74,8 +74,8 @@ class Linearization {
   double pressure_mpa_ = 0, tangent_pressure_mpa_ = 0;
   Eigen::VectorXd tangent_gradient_, tangent_base_mm_;
   Eigen::VectorXd gradient_, pressure_force_, base_mm_, without_, by_pressure_, motion_;
-  Eigen::MatrixXf adjoint_;           // J K^-1: 3 markers x dofs
-  std::vector<Eigen::Index> filled_;  // rows of J that reach that row of nodes or one before
+  Eigen::MatrixXf adjoint_;                     // J K^-1: 3 markers x dofs
+  std::vector<BlockTridiagonal::Rows> filled_;  // rows of J that reach that row of nodes
   std::array<Eigen::MatrixXf, 3> columns_;
   std::vector<Mat3> frames_;
 };

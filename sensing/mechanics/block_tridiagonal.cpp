@@ -1,82 +1,122 @@
 #include "sensing/mechanics/block_tridiagonal.h"
 
+#include <algorithm>
 #include <cassert>
-#include <utility>
 
 #include "sensing/mechanics/dense.h"
 
 namespace taclink {
+namespace {
+
+// A block of a matrix of which the lower triangle is there.
+void WriteBlock(const Eigen::SparseMatrix<double>& lower, Eigen::Index row, Eigen::Index column,
+                Eigen::MatrixXd& block) {
+  const Eigen::Index size = block.rows(), first = std::max(row, column) * size;
+  block.setZero();
+  for (Eigen::Index c = 0; c < size; ++c) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(lower, std::min(row, column) * size + c); it; ++it) {
+      const Eigen::Index r = it.row() - first;
+      if (r < 0 || r >= size) continue;
+      (row < column ? block(c, r) : block(r, c)) = it.value();
+      if (row == column) block(c, r) = it.value();
+    }
+  }
+}
+
+}  // namespace
+
+BlockTridiagonal::Rows BlockTridiagonal::Rows::With(const Rows& other) const {
+  if (count() == 0) return other;
+  if (other.count() == 0) return *this;
+  return {std::min(begin, other.begin), std::max(end, other.end)};
+}
 
 BlockTridiagonal::BlockTridiagonal(Eigen::Index block, Eigen::Index blocks)
     : block_(block),
+      middle_(blocks / 2),
       inverse_(static_cast<size_t>(blocks), Eigen::MatrixXf(block, block)),
-      below_(static_cast<size_t>(blocks), Eigen::MatrixXf(block, block)) {}
+      carried_(static_cast<size_t>(blocks), Eigen::MatrixXf(block, block)) {}
+
+template <typename Visit>
+void BlockTridiagonal::ForEachInward(Visit visit) const {
+  for (Eigen::Index i = 0; i < middle_; ++i) visit(i, i + 1);
+  for (auto i = static_cast<Eigen::Index>(inverse_.size()) - 1; i > middle_; --i) visit(i, i - 1);
+}
+
+template <typename Visit>
+void BlockTridiagonal::ForEachOutward(Visit visit) const {
+  for (Eigen::Index i = middle_; i-- > 0;) visit(i, i + 1);
+  for (Eigen::Index i = middle_ + 1; i < static_cast<Eigen::Index>(inverse_.size()); ++i) visit(i, i - 1);
+}
 
 bool BlockTridiagonal::Factorise(const Eigen::SparseMatrix<double>& lower) {
-  assert(lower.cols() == block_ * static_cast<Eigen::Index>(inverse_.size()));
-  Eigen::MatrixXd off(block_, block_), next_off(block_, block_);  // B_i, B_(i+1)
-  Eigen::MatrixXd diagonal(block_, block_), before(block_, block_), below(block_, block_);
-  for (size_t i = 0; i < inverse_.size(); ++i) {
-    diagonal.setZero();
-    next_off.setZero();
-    const Eigen::Index first = static_cast<Eigen::Index>(i) * block_;
-    for (Eigen::Index column = 0; column < block_; ++column) {
-      for (Eigen::SparseMatrix<double>::InnerIterator it(lower, first + column); it; ++it) {
-        const Eigen::Index row = it.row() - first;
-        assert(row < 2 * block_);
-        (row < block_ ? diagonal(row, column) : next_off(row - block_, column)) = it.value();
-      }
-    }
-    diagonal.triangularView<Eigen::StrictlyUpper>() = diagonal.transpose();
-    if (i > 0) {
-      below.setZero();
-      dense::AddProduct(1, off, before, false, below);
-      dense::AddProduct(-1, below, off, true, diagonal);
-      below_[i] = below.cast<float>();
-    }
-    if (!dense::InvertSymmetric(diagonal)) return false;
-    inverse_[i] = diagonal.cast<float>();
-    std::swap(diagonal, before);
-    std::swap(off, next_off);
-  }
+  const auto last = static_cast<Eigen::Index>(inverse_.size()) - 1;
+  assert(lower.cols() == block_ * (last + 1));
+  Eigen::MatrixXd schur(block_, block_), beside(block_, block_),
+      carried(block_, block_);  // S_i, B(j, i), C_i
+  Eigen::MatrixXd middle(block_, block_);
+  WriteBlock(lower, middle_, middle_, middle);
+  bool is_regular = true;
+  ForEachInward([&](Eigen::Index i, Eigen::Index j) {
+    if (i == 0 || i == last) WriteBlock(lower, i, i, schur);
+    is_regular = is_regular && dense::InvertSymmetric(schur);
+    if (!is_regular) return;
+    WriteBlock(lower, j, i, beside);
+    carried.setZero();
+    dense::AddProduct(1, beside, schur, false, carried);
+    inverse_[static_cast<size_t>(i)] = schur.cast<float>();
+    carried_[static_cast<size_t>(i)] = carried.cast<float>();
+    if (j != middle_) WriteBlock(lower, j, j, schur);
+    dense::AddProduct(-1, carried, beside, true, j == middle_ ? middle : schur);
+  });
+  if (!is_regular || !dense::InvertSymmetric(middle)) return false;
+  inverse_[static_cast<size_t>(middle_)] = middle.cast<float>();
   return true;
 }
 
 void BlockTridiagonal::Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const {
   assert(rhs.size() == block_ * static_cast<Eigen::Index>(inverse_.size()));
   Eigen::VectorXf all = rhs.cast<float>(), product(block_);
-  const auto part = [&](size_t i) { return all.segment(static_cast<Eigen::Index>(i) * block_, block_); };
-  for (size_t i = 1; i < inverse_.size(); ++i) {
-    dense::Product(below_[i], part(i - 1), product);
-    part(i) -= product;
-  }
-  for (size_t i = inverse_.size(); i-- > 0;) {
-    dense::Product(inverse_[i], part(i), product);
+  const auto part = [&](Eigen::Index i) { return all.segment(i * block_, block_); };
+  ForEachInward([&](Eigen::Index i, Eigen::Index j) {
+    dense::Product(carried_[static_cast<size_t>(i)], part(i), product);
+    part(j) -= product;
+  });
+  dense::Product(inverse_[static_cast<size_t>(middle_)], part(middle_), product);
+  part(middle_) = product;
+  ForEachOutward([&](Eigen::Index i, Eigen::Index j) {
+    dense::Product(inverse_[static_cast<size_t>(i)], part(i), product);
     part(i) = product;
-    if (i + 1 == inverse_.size()) continue;
-    dense::TransposedProduct(below_[i + 1], part(i + 1), product);
+    dense::TransposedProduct(carried_[static_cast<size_t>(i)], part(j), product);
     part(i) -= product;
-  }
+  });
   x = all.cast<double>();
 }
 
-void BlockTridiagonal::SolveRows(Eigen::MatrixXf& rhs, const std::vector<Eigen::Index>& filled,
-                                 Eigen::MatrixXf& x) const {
+void BlockTridiagonal::SolveRows(Eigen::MatrixXf& rhs, std::vector<Rows> filled, Eigen::MatrixXf& x) const {
   assert(rhs.cols() == block_ * static_cast<Eigen::Index>(inverse_.size()) &&
          filled.size() == inverse_.size());
   x.resize(rhs.rows(), rhs.cols());
-  const auto part = [&](Eigen::MatrixXf& all, size_t i, Eigen::Index rows) {
-    return all.block(0, static_cast<Eigen::Index>(i) * block_, rows, block_);
+  const auto part = [&](Eigen::MatrixXf& all, Eigen::Index i, const Rows& rows) {
+    return all.block(rows.begin, i * block_, rows.count(), block_);
   };
-  for (size_t i = 1; i < filled.size(); ++i) {
-    dense::AddProduct(-1.0F, part(rhs, i - 1, filled[i - 1]), below_[i], true, part(rhs, i, filled[i - 1]));
-  }
-  for (size_t i = filled.size(); i-- > 0;) {
-    part(x, i, rhs.rows()).setZero();
-    dense::AddProduct(1.0F, part(rhs, i, filled[i]), inverse_[i], false, part(x, i, filled[i]));
-    if (i + 1 == filled.size()) continue;
-    dense::AddProduct(-1.0F, part(x, i + 1, rhs.rows()), below_[i + 1], false, part(x, i, rhs.rows()));
-  }
+  const Rows all_rows{0, rhs.rows()};
+  ForEachInward([&](Eigen::Index i, Eigen::Index j) {
+    const Rows& rows = filled[static_cast<size_t>(i)];
+    dense::AddProduct(-1.0F, part(rhs, i, rows), carried_[static_cast<size_t>(i)], true, part(rhs, j, rows));
+    Rows& onto = filled[static_cast<size_t>(j)];
+    onto = onto.With(rows);
+  });
+  const auto add_own = [&](Eigen::Index i) {
+    const Rows& rows = filled[static_cast<size_t>(i)];
+    dense::AddProduct(1.0F, part(rhs, i, rows), inverse_[static_cast<size_t>(i)], false, part(x, i, rows));
+  };
+  part(x, middle_, all_rows).setZero();
+  add_own(middle_);
+  ForEachOutward([&](Eigen::Index i, Eigen::Index j) {
+    dense::SetProduct(-1.0F, part(x, j, all_rows), carried_[static_cast<size_t>(i)], part(x, i, all_rows));
+    add_own(i);
+  });
 }
 
 }  // namespace taclink

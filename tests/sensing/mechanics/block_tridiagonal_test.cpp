@@ -48,13 +48,15 @@ TEST_P(BlockTridiagonalTest, RowsAreSolvedTogether) {
   const Eigen::MatrixXd matrix = Tridiagonal(GetParam());
   BlockTridiagonal factor(kBlock, kBlocks);
   ASSERT_TRUE(factor.Factorise(LowerOf(matrix)));
-  // Row r reaches from block r / 2 on.
+  // Rows reach one block, two, or none.
   constexpr Eigen::Index kRows = 10;
-  Eigen::MatrixXf rhs = Eigen::MatrixXf::Random(kRows, kSize);
-  std::vector<Eigen::Index> filled;
+  const std::vector<BlockTridiagonal::Rows> filled = {{0, 3}, {2, 5}, {}, {5, 8}, {7, 9}};
+  const Eigen::MatrixXf any = Eigen::MatrixXf::Random(kRows, kSize);
+  Eigen::MatrixXf rhs = Eigen::MatrixXf::Zero(kRows, kSize);
   for (Eigen::Index block = 0; block < kBlocks; ++block) {
-    filled.push_back(2 * (block + 1));
-    rhs.block(filled.back(), block * kBlock, kRows - filled.back(), kBlock).setZero();
+    const auto& rows = filled[static_cast<size_t>(block)];
+    rhs.block(rows.begin, block * kBlock, rows.count(), kBlock) =
+        any.block(rows.begin, block * kBlock, rows.count(), kBlock);
   }
   const Eigen::MatrixXd expected = rhs.cast<double>() * matrix.inverse();
   Eigen::MatrixXf x;
