@@ -128,6 +128,13 @@ Eigen::MatrixXd LoadEstimator::Whitened(const Eigen::MatrixXd& columns) const {
   return single.cast<double>();
 }
 
+// Without its eigenvalues, of which the least is no smaller than the determinant over the square of half the
+// trace. False may be wrong.
+bool IsSurelySeen(const Mat3& information, double least) {
+  const double half = information.trace() / 2;
+  return half > 0 && information.determinant() > least * half * half;
+}
+
 // What was seen when all was prepared and is not seen now is unknown: its unit vectors, whitened, are
 // projected out of data and columns, which is the same as leaving these rows out.
 void LoadEstimator::Hide(const MarkerObservations& observed) {
@@ -136,8 +143,9 @@ void LoadEstimator::Hide(const MarkerObservations& observed) {
   is_shown_.assign(static_cast<size_t>(3 * mechanics_.marker_count()), 1);
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const auto i = static_cast<size_t>(m);
-    Eigen::SelfAdjointEigenSolver<Mat3> modes;
     const Mat3& information = observed.information[i];
+    if (IsSurelySeen(information, 1 / (0.3 * unseen2))) continue;
+    Eigen::SelfAdjointEigenSolver<Mat3> modes;
     if (!information.allFinite() || information.isZero())
       modes.computeDirect(Mat3::Zero());
     else
