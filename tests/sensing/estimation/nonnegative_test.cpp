@@ -58,6 +58,27 @@ TEST(NonNegativeSolver, DoesNotDependOnWhereItStarts) {
   EXPECT_LT((h * (from_nothing - from_others)).norm(), 1e-6 * b.norm());
 }
 
+TEST(NonNegativeSolver, SinglePrecisionIsAsGoodAMinimum) {
+  const auto [h, b] = Smooth(3, 60);
+  NonNegativeSolver solver;
+  std::vector<int> exact, rounded;
+  const Eigen::VectorXd x = solver.Solve(h, b, exact);
+  const Eigen::VectorXd y = solver.Solve(Eigen::MatrixXf(h.cast<float>()), b, rounded);
+  EXPECT_TRUE(solver.converged());
+  const auto objective = [&](const Eigen::VectorXd& at) { return 0.5 * at.dot(h * at) - b.dot(at); };
+  EXPECT_NEAR(objective(y), objective(x), 1e-3 * std::abs(objective(x)));
+}
+
+// Two that push and that the first leaves no room for: neither may wait for the other for ever.
+TEST(NonNegativeSolver, WhatCannotComeInEndsTheSearch) {
+  const Eigen::Matrix3d h{{1, 0.99, 0.99}, {0.99, 0.97, 0.96}, {0.99, 0.96, 0.97}};
+  NonNegativeSolver solver;
+  std::vector<int> support;
+  const Eigen::VectorXd x = solver.Solve(Eigen::MatrixXd(h), Eigen::Vector3d(1.01, 1.005, 1.005), support);
+  EXPECT_EQ(support, std::vector<int>{0});
+  EXPECT_NEAR(x[0], 1.01, 1e-6);
+}
+
 TEST(NonNegativeSolver, NothingPushesNothingIsThere) {
   const Eigen::MatrixXd h = Eigen::MatrixXd::Identity(3, 3);
   NonNegativeSolver solver;
