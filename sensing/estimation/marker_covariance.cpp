@@ -20,8 +20,8 @@ constexpr double kCameraMm = 0.2;
 constexpr int kCameraModes = 9;
 
 // Of a marker: shifts of all, turns about the middle of the link, a stretch along the axis, a bow of z, which
-// two cameras at the ends know worst in the middle, and a twist, of cameras that are rolled against each other.
-// Not a growth of the radius: that is the pressure's.
+// two cameras at the ends know worst in the middle, and a twist, of cameras that are rolled against each
+// other. Not a growth of the radius: that is the pressure's.
 Eigen::Matrix<double, 3, kCameraModes> CameraModes(const Vec3& at_mm, double length_mm) {
   const double half_mm = length_mm / 2;
   const Vec3 from_middle = (at_mm - Vec3(0, 0, half_mm)) / half_mm;
@@ -72,16 +72,33 @@ void MarkerCovariance::WriteDirect(const Linearization& skin, const InflatedSkin
 
 void MarkerCovariance::AddStray(const Linearization& skin, const Eigen::VectorXd& local_n,
                                 Eigen::MatrixXf& covariance_mm2) {
-  const double unit = mechanics_.force_unit();
-  const int sites = mechanics_.site_count(), markers = mechanics_.marker_count();
-  Eigen::MatrixXf scaled(3 * markers, 3 * sites);
-  for (size_t k = 0; k < 3; ++k) {
-    const double share = k == 0 ? kNormalShare : kTangentialShare;
-    stray_n_[k] = ((share * local_n).cwiseAbs2().array() + kStrayN * kStrayN * unit * unit).sqrt();
-    scaled.middleCols(static_cast<Eigen::Index>(k) * sites, sites).noalias() =
-        skin.columns()[k] * stray_n_[k].cast<float>().asDiagonal();
+  const int sites = mechanics_.site_count(), around = mechanics_.columns();
+  for (auto& sigmas : stray_n_) sigmas.setZero(sites);
+  Eigen::MatrixXf scaled(covariance_mm2.rows(), 3 * sites);
+  Eigen::Index used = 0;
+  const auto add = [&](size_t direction, int site, double share, double of_sites) {
+    const double sigma_n =
+        std::sqrt(of_sites) * std::hypot(share * local_n[site], kStrayN * mechanics_.force_unit());
+    stray_n_[direction][site] = sigma_n;
+    scaled.col(used++) = static_cast<float>(sigma_n) * skin.columns()[direction].col(site);
+  };
+  for (int site = 0; site < sites; ++site) {
+    add(0, site, kNormalShare, 1);
+    // One of four neighbors stands for all: along the wall the skin is stiff, and they move markers alike.
+    const int row = site / around, column = site % around;
+    if ((row + column) % 2 == 0) add(row % 2 == 0 ? 1 : 2, site, kTangentialShare, 4);
   }
+  scaled.conservativeResize(Eigen::NoChange, used);
   dense::AddOuter(scaled, covariance_mm2);
+}
+
+// Most sites bear nothing.
+Eigen::VectorXd MarkerCovariance::LocalOfSites(const Eigen::VectorXd& forces_n) const {
+  Eigen::VectorXd local_n = Eigen::VectorXd::Zero(forces_n.size());
+  for (Eigen::Index site = 0; site < forces_n.size(); ++site) {
+    if (forces_n[site] != 0) local_n += forces_n[site] * near_.local_sites.col(site);
+  }
+  return local_n;
 }
 
 }  // namespace taclink

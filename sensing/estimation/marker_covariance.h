@@ -33,7 +33,7 @@ class MarkerCovariance {
   const std::array<Eigen::VectorXd, 3>& stray_sigmas_n() const { return stray_n_; }
 
   /// Forces on sites, or on markers, smoothed over the neighborhood in which they count as local.
-  Eigen::VectorXd LocalOfSites(const Eigen::VectorXd& forces_n) const { return near_.local_sites * forces_n; }
+  Eigen::VectorXd LocalOfSites(const Eigen::VectorXd& forces_n) const;
   Eigen::VectorXd LocalOfMarkers(const Eigen::VectorXd& forces_n) const {
     return near_.local_markers * forces_n;
   }
