@@ -55,7 +55,7 @@ struct Contact {
   double area_mm2 = 0;             ///< of the loaded region, no finer than the marker grid
   std::vector<int> markers;        ///< indices of the loaded markers
   Vec3 moment_nmm = Vec3::Zero();  ///< of the load about the link frame's origin
-  double peak_pressure_mpa = 0;    ///< of the inward load, over a site's area
+  double peak_pressure_mpa = 0;    ///< of the inward load, over a cell of the load grid
   /// Of the load's spread over the skin: along its longer and its shorter axis, as long as the standard
   /// deviation of the load along it.
   Vec3 major_axis_mm = Vec3::Zero(), minor_axis_mm = Vec3::Zero();
