@@ -34,7 +34,7 @@ enum class ReasonId : uint8_t {
   kResidual,          ///< a region of markers contradicts the estimate
   kLabels,            ///< markers of one region were left out as contradicting
   kTooDeep,           ///< pressed in deeper than forces were compared with the truth
-  kBeyondMarkers,     ///< a load between a clamp and the first ring: how much of it is seen is not sure
+  kBeyondMarkers,     ///< a load that may lie between a clamp and the ring beside it, where it hardly shows
   kEncircled,         ///< bodies all around bend the skin in waves that are hardly resolved
   kSparseMarkers,     ///< a load on this skin may hide between markers
   kUnsettled,         ///< where no camera sees the skin its shape did not settle

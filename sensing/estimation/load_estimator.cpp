@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sensing/estimation/camera_noise.h"
 #include "sensing/mechanics/dense.h"
 
 namespace taclink {
@@ -24,29 +25,14 @@ constexpr double kLeastOfPeak = 0.03;
 constexpr double kHillGain = 20;  // of chi^2
 constexpr double kRefitSparsity = 0.1, kRefitEndSparsity = 1.0;
 constexpr double kRidge = 1e-9;
-constexpr double kUnseenMm = 30;  // standard deviation of a direction that is not seen, in units of length
-constexpr double kSameNoise = 2;  // ratio of standard deviations
+constexpr float kRounding = 1e-6F;  // of a Gram matrix in single precision
+constexpr double kUnseenMm = 30;    // standard deviation of a direction that is not seen, in units of length
+constexpr double kSameNoise = 2;    // ratio of standard deviations
 constexpr double kSameDirection = 0.9999;  // cosine
 
-// The cameras' covariance of a marker; what they do not see is as good as unknown.
-Mat3 NoiseOf(const Mat3& information, double unseen_mm) {
-  const double least = 1 / (unseen_mm * unseen_mm);
-  if (!information.allFinite()) return unseen_mm * unseen_mm * Mat3::Identity();
-  Eigen::SelfAdjointEigenSolver<Mat3> modes;
-  modes.computeDirect(information);
-  return modes.eigenvectors() * modes.eigenvalues().cwiseMax(least).cwiseInverse().asDiagonal() *
-         modes.eigenvectors().transpose();
-}
-
-// The trace of that, without the eigenvalues where all is seen: of the adjugate over the determinant.
-double NoiseTraceOf(const Mat3& information, double unseen_mm) {
-  const Mat3& a = information;
-  const double minors = a(1, 1) * a(2, 2) - a(1, 2) * a(2, 1) + a(0, 0) * a(2, 2) - a(0, 2) * a(2, 0) +
-                        a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0);
-  const double trace = minors / a.determinant();
-  // No variance is as large as that of what is not seen, then; false, too, where a number is none.
-  if (trace > 0 && trace < unseen_mm * unseen_mm && minors > 0) return trace;
-  return NoiseOf(information, unseen_mm).trace();
+// Lower half of c := c + a a^T, of few columns.
+void AddOuter(const Eigen::MatrixXd& a, Eigen::MatrixXd& c) {
+  c.selfadjointView<Eigen::Lower>().rankUpdate(a);
 }
 
 }  // namespace
@@ -62,27 +48,29 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   by_pressure_ = prior.sigma_mpa * skin.by_pressure();
   covariance_.WriteDirect(skin, inflated, covariance_mm2_);
   if (prior.baseline_mm_per_mpa.size() == by_pressure_.size())
-    dense::AddOuter((prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa).cast<float>(), covariance_mm2_);
-  dense::AddOuter(covariance_.by_cameras_mm().cast<float>(), covariance_mm2_);
-  direct_mm2_ = covariance_mm2_;
+    AddOuter(prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa, covariance_mm2_);
+  AddOuter(covariance_.by_cameras_mm(), covariance_mm2_);
+  direct_mm2_ = covariance_mm2_.cast<float>();
   direct_mm2_.triangularView<Eigen::StrictlyUpper>() = direct_mm2_.transpose();
   covariance_.AddStray(skin, local_n, covariance_mm2_);
-  dense::AddOuter(by_pressure_.cast<float>(), covariance_mm2_);
+  AddOuter(by_pressure_, covariance_mm2_);
   noise_mm2_.resize(static_cast<size_t>(markers));
   model_covariance_.resize(noise_mm2_.size());
   for (int m = 0; m < markers; ++m) {
     const auto i = static_cast<size_t>(m);
     auto block = covariance_mm2_.block<3, 3>(3 * m, 3 * m);
-    model_covariance_[i] = block.cast<double>().eval().selfadjointView<Eigen::Lower>();
+    model_covariance_[i] = block.selfadjointView<Eigen::Lower>();
     // All markers together tell the cameras' modes; one by one they would hide a wrong marker in them.
     const auto by_cameras_mm = covariance_.by_cameras_mm().middleRows<3>(3 * m);
     model_covariance_[i].noalias() -= by_cameras_mm * by_cameras_mm.transpose();
     noise_mm2_[i] = NoiseOf(observed.information[i], kUnseenMm * mechanics_.length_unit());
-    block += noise_mm2_[i].cast<float>();
+    block += noise_mm2_[i];
   }
-  factor_ = covariance_mm2_;
-  if (!dense::Cholesky(factor_)) return false;
-  whitened_pressure_ = Whitened(by_pressure_);
+  // In double: a marker that one camera sees has variances that are a million times apart.
+  Eigen::MatrixXd factor = covariance_mm2_;
+  if (!dense::Cholesky(factor)) return false;
+  factor_ = factor.cast<float>();
+  whitened_pressure_ = factor.triangularView<Eigen::Lower>().solve(by_pressure_);
   SpreadColumns(skin.columns()[0]);
   hidden_.resize(0, 0);
   dense::SolveLower(factor_, columns_);
@@ -126,13 +114,6 @@ Eigen::MatrixXd LoadEstimator::Whitened(const Eigen::MatrixXd& columns) const {
   Eigen::MatrixXf single = columns.cast<float>();
   dense::SolveLower(factor_, single);
   return single.cast<double>();
-}
-
-// Without its eigenvalues, of which the least is no smaller than the determinant over the square of half the
-// trace. False may be wrong.
-bool IsSurelySeen(const Mat3& information, double least) {
-  const double half = information.trace() / 2;
-  return half > 0 && information.determinant() > least * half * half;
 }
 
 // What was seen when all was prepared and is not seen now is unknown: its unit vectors, whitened, are
@@ -230,7 +211,8 @@ std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
   Eigen::VectorXf target(columns_.cols());
   dense::TransposedProduct(columns_, frame_data_.cast<float>(), target);
   target_ = target.cast<double>();
-  norms_ = frame_gram_->diagonal().cast<double>().cwiseMax(0).cwiseSqrt();
+  // Of a site of which hardly anything shows, what is left of its column is rounding.
+  norms_ = frame_gram_->diagonal().cwiseMax(kRounding * gram_.diagonal()).cast<double>().cwiseSqrt();
   Eigen::VectorXd sorted = norms_.head(sites);
   std::nth_element(sorted.data(), sorted.data() + sites / 2, sorted.data() + sites);
   usual_norm_ = sorted[sites / 2];
@@ -289,7 +271,7 @@ double LoadEstimator::Unexplained(const std::vector<HillFinder::Hill>& hills, si
   if (sites.empty()) return all;
   const Eigen::MatrixXd exact = (*frame_gram_)(sites, sites).cast<double>();
   Eigen::MatrixXd h = exact;
-  h.diagonal().array() += kRidge * h.trace() / static_cast<double>(sites.size());
+  h.diagonal().array() += kRounding * h.trace() / static_cast<double>(sites.size());
   const Eigen::VectorXd b = target_(sites);
   std::vector<int> support;
   const Eigen::VectorXd& x = solver_.Solve(h, b, support);

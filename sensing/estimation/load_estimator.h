@@ -145,7 +145,8 @@ class LoadEstimator {
 
   // Since Prepare. Whitened: in units of independent standard deviations.
   std::vector<Mat3> noise_mm2_, model_covariance_;
-  Eigen::MatrixXf covariance_mm2_, factor_;
+  Eigen::MatrixXd covariance_mm2_;
+  Eigen::MatrixXf factor_;
   Eigen::MatrixXf direct_mm2_;   // of it, what no force and no pressure of the estimate explains
   Eigen::VectorXd by_pressure_;  // stacked, of one standard deviation
   Eigen::VectorXd whitened_pressure_;

@@ -190,7 +190,7 @@ double LoadEstimator::WorstRegion(const Eigen::VectorXd& residual) {
           for (int c = 0; c < 3; ++c) region.rows.push_back(3 * neighbor + c);
         }
       }
-      region.factor.compute(covariance_mm2_(region.rows, region.rows));
+      region.factor.compute(covariance_mm2_(region.rows, region.rows).cast<float>());
       regions_.push_back(std::move(region));
     }
   }

@@ -27,10 +27,12 @@ Eigen::Matrix<double, 3, kCameraModes> CameraModes(const Vec3& at_mm, double len
   const Vec3 from_middle = (at_mm - Vec3(0, 0, half_mm)) / half_mm;
   Eigen::Matrix<double, 3, kCameraModes> modes;
   modes.leftCols<3>().setIdentity();
-  for (int axis = 0; axis < 3; ++axis) modes.col(3 + axis) = Vec3::Unit(axis).cross(from_middle);
+  const Vec3 around = Vec3(-at_mm.y(), at_mm.x(), 0).normalized();
+  for (int axis = 0; axis < 2; ++axis) modes.col(3 + axis) = Vec3::Unit(axis).cross(from_middle);
+  modes.col(5) = around;
   modes.col(6) = Vec3(0, 0, from_middle.z());
   modes.col(7) = Vec3(0, 0, std::sin(kPi * at_mm.z() / length_mm));
-  modes.col(8) = from_middle.z() * Vec3(-at_mm.y(), at_mm.x(), 0).normalized();
+  modes.col(8) = from_middle.z() * around;
   return modes;
 }
 
@@ -45,8 +47,9 @@ MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics, const Neighbo
 }
 
 void MarkerCovariance::WriteDirect(const Linearization& skin, const InflatedSkin& inflated,
-                                   Eigen::MatrixXf& covariance_mm2) const {
+                                   Eigen::MatrixXd& covariance_mm2) const {
   const int markers = mechanics_.marker_count();
+  const double floor_mm = kFloorMm * mechanics_.length_unit();
   Eigen::VectorXd moved(markers), grown(markers);
   for (int m = 0; m < markers; ++m) {
     const auto node = static_cast<size_t>(mechanics_.markers().node(m));
@@ -64,17 +67,17 @@ void MarkerCovariance::WriteDirect(const Linearization& skin, const InflatedSkin
       Mat3 block = moved[i] * moved[j] * near_.motion_alike(i, j) * Mat3::Identity();
       block.topLeftCorner<2, 2>() += growth * out_i.head<2>() * out_j.head<2>().transpose();
       block(2, 2) += kAxialShare * kAxialShare * growth;
-      if (i == j) block.diagonal().array() += kFloorMm * kFloorMm;
-      covariance_mm2.block<3, 3>(3 * i, 3 * j) = block.cast<float>();
+      if (i == j) block.diagonal().array() += floor_mm * floor_mm;
+      covariance_mm2.block<3, 3>(3 * i, 3 * j) = block;
     }
   }
 }
 
 void MarkerCovariance::AddStray(const Linearization& skin, const Eigen::VectorXd& local_n,
-                                Eigen::MatrixXf& covariance_mm2) {
+                                Eigen::MatrixXd& covariance_mm2) {
   const int sites = mechanics_.site_count(), around = mechanics_.columns();
   for (auto& sigmas : stray_n_) sigmas.setZero(sites);
-  Eigen::MatrixXf scaled(covariance_mm2.rows(), 3 * sites);
+  Eigen::MatrixXf scaled(covariance_mm2.rows(), 2 * sites);
   Eigen::Index used = 0;
   const auto add = [&](size_t direction, int site, double share, double of_sites) {
     const double sigma_n =
@@ -84,12 +87,15 @@ void MarkerCovariance::AddStray(const Linearization& skin, const Eigen::VectorXd
   };
   for (int site = 0; site < sites; ++site) {
     add(0, site, kNormalShare, 1);
-    // One of four neighbors stands for all: along the wall the skin is stiff, and they move markers alike.
+    // One of four neighbors stands for all (on either side of an odd seam, for three or five): along the wall
+    // the skin is stiff, and they move markers alike.
     const int row = site / around, column = site % around;
     if ((row + column) % 2 == 0) add(row % 2 == 0 ? 1 : 2, site, kTangentialShare, 4);
   }
   scaled.conservativeResize(Eigen::NoChange, used);
-  dense::AddOuter(scaled, covariance_mm2);
+  Eigen::MatrixXf stray_mm2 = Eigen::MatrixXf::Zero(covariance_mm2.rows(), covariance_mm2.rows());
+  dense::AddOuter(scaled, stray_mm2);
+  covariance_mm2.triangularView<Eigen::Lower>() += stray_mm2.cast<double>();
 }
 
 // Most sites bear nothing.

@@ -23,10 +23,11 @@ class MarkerCovariance {
   /// Of displacements that no force explains: a floor, and shares of the motion and of the inflation. Lower
   /// half, stacked markers.
   void WriteDirect(const Linearization& skin, const InflatedSkin& inflated,
-                   Eigen::MatrixXf& covariance_mm2) const;
-  /// Adds that of stray forces. `local_n`: force in the neighborhood of each site. Sets the stray forces'
-  /// standard deviations by direction and site.
-  void AddStray(const Linearization& skin, const Eigen::VectorXd& local_n, Eigen::MatrixXf& covariance_mm2);
+                   Eigen::MatrixXd& covariance_mm2) const;
+  /// Adds that of stray forces: inward at each site, around and along at a quarter of them each, which stand
+  /// for four. `local_n`: force in the neighborhood of each site. Sets the stray forces' standard deviations
+  /// by direction and site, 0 where there is none.
+  void AddStray(const Linearization& skin, const Eigen::VectorXd& local_n, Eigen::MatrixXd& covariance_mm2);
   /// By column, of one standard deviation: what cameras that have moved or changed a little since the
   /// baseline make of all markers together.
   const Eigen::MatrixXd& by_cameras_mm() const { return by_cameras_mm_; }

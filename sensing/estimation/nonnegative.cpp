@@ -26,7 +26,8 @@ bool NonNegativeSolver::Append(const Matrix& h, int variable) {
   auto row = factor_.row(k).head(k);
   for (Eigen::Index i = 0; i < k; ++i) row[i] = h(variable, in_[static_cast<size_t>(i)]);
   factor_.topLeftCorner(k, k).triangularView<Eigen::Lower>().solveInPlace(row.transpose());
-  const double left = h(variable, variable) * (1 + kRidge<typename Matrix::Scalar>)-row.squaredNorm();
+  const double ridge = kRidge<typename Matrix::Scalar> * h(variable, variable);
+  const double left = h(variable, variable) + ridge - row.squaredNorm();
   if (!(left > 0)) return false;
   factor_(k, k) = std::sqrt(left);
   in_.push_back(variable);
@@ -38,7 +39,9 @@ void NonNegativeSolver::Refactor(const Matrix& h, size_t from) {
   const std::vector<int> again(in_.begin() + static_cast<std::ptrdiff_t>(from), in_.end());
   in_.resize(from);
   for (const int variable : again) {
-    if (!Append(h, variable)) is_in_[static_cast<size_t>(variable)] = 0;
+    if (Append(h, variable)) continue;
+    is_in_[static_cast<size_t>(variable)] = 0;
+    x_[variable] = 0;
   }
 }
 
@@ -105,7 +108,6 @@ const Eigen::VectorXd& NonNegativeSolver::Solve(const Matrix& h, const Eigen::Ve
     Eigen::Index best = 0;
     if (n == 0 || gradient_.maxCoeff(&best) <= tolerance) break;
     const auto variable = static_cast<int>(best);
-    const size_t before = in_.size();
     if (!Append(h, variable)) {
       refused_.push_back(variable);
       continue;
@@ -113,7 +115,7 @@ const Eigen::VectorXd& NonNegativeSolver::Solve(const Matrix& h, const Eigen::Ve
     is_in_[static_cast<size_t>(variable)] = 1;
     converged_ = StepToOptimum(h, b);
     // By rounding it leaves at once.
-    if (in_.size() == before && !is_in_[static_cast<size_t>(variable)])
+    if (!is_in_[static_cast<size_t>(variable)])
       refused_.push_back(variable);
     else
       refused_.clear();

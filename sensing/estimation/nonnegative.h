@@ -10,9 +10,9 @@ namespace taclink {
 /// not depend on where it starts. One thread.
 class NonNegativeSolver {
  public:
-  /// `h`: symmetric, both halves, in double or single precision. `support`: on entry where to start, on
-  /// return the variables above zero. Returns x; the reference holds until the next call. False in
-  /// `converged` where it gave up.
+  /// `h`: symmetric but for rounding, both halves, in double or single precision. `support`: on entry where
+  /// to start, on return the variables above zero. Returns x; the reference holds until the next call. False
+  /// in `converged` where it gave up.
   template <typename Matrix>
   const Eigen::VectorXd& Solve(const Matrix& h, const Eigen::VectorXd& b, std::vector<int>& support);
   bool converged() const { return converged_; }
@@ -28,7 +28,7 @@ class NonNegativeSolver {
 
   std::vector<int> in_, refused_;  // refused: that could not come in since one last did
   Eigen::MatrixXd factor_;
-  Eigen::VectorXd x_, on_support_, trial_, gradient_;
+  Eigen::VectorXd x_, trial_, gradient_;
   std::vector<char> is_in_;
   bool converged_ = true;
   int work_ = 0;

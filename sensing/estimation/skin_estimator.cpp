@@ -26,7 +26,7 @@ constexpr double kLeastPressureSigma =
     1e-3;  // of the steps in which the skin is inflated: a prior is no certainty
 constexpr int kMostSteps = 8, kMostTangents = 3;
 constexpr int kStepsOfTangent = 3;  // the least: a new one is a disturbance where a skin may buckle
-constexpr double kShrinks = 0.5;  // steps by less: the tangent is too old
+constexpr double kShrinks = 0.5;    // steps by less: the tangent is too old
 // Between the last two steps, of the loads in any neighborhood by the largest, and of a seen marker: settled.
 constexpr double kSameLoads = 0.1, kSeenSettledMm = 0.2;
 

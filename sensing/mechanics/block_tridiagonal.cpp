@@ -23,6 +23,15 @@ void WriteBlock(const Eigen::SparseMatrix<double>& lower, Eigen::Index row, Eige
   }
 }
 
+[[maybe_unused]] bool IsBlockTridiagonal(const Eigen::SparseMatrix<double>& lower, Eigen::Index block) {
+  for (Eigen::Index c = 0; c < lower.cols(); ++c) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(lower, c); it; ++it) {
+      if (it.row() / block > c / block + 1) return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 BlockTridiagonal::Rows BlockTridiagonal::Rows::With(const Rows& other) const {
@@ -51,7 +60,7 @@ void BlockTridiagonal::ForEachOutward(Visit visit) const {
 
 bool BlockTridiagonal::Factorise(const Eigen::SparseMatrix<double>& lower) {
   const auto last = static_cast<Eigen::Index>(inverse_.size()) - 1;
-  assert(lower.cols() == block_ * (last + 1));
+  assert(lower.cols() == block_ * (last + 1) && IsBlockTridiagonal(lower, block_));
   Eigen::MatrixXd schur(block_, block_), beside(block_, block_),
       carried(block_, block_);  // S_i, B(j, i), C_i
   Eigen::MatrixXd middle(block_, block_);

@@ -34,8 +34,8 @@ class BlockTridiagonal {
     /// The least that has both.
     Rows With(const Rows& other) const;
   };
-  /// Rows of x are the solutions for the rows of `rhs`. `filled`: by block, those that are not zero there.
-  /// `rhs` is used up.
+  /// Rows of x are the solutions for the rows of `rhs`. `filled`: by block, those that are not zero there;
+  /// all others must be zero. `rhs` is used up.
   void SolveRows(Eigen::MatrixXf& rhs, std::vector<Rows> filled, Eigen::MatrixXf& x) const;
 
  private:

@@ -6,7 +6,6 @@
 
 // BLAS and LAPACK as Fortran has them; OpenBLAS' headers are in no runtime package.
 extern "C" {
-void spotrf_(const char* uplo, const int* n, float* a, const int* lda, int* info);
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 void strsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
             const int* n, const float* alpha, const float* a, const int* lda, float* b, const int* ldb);
@@ -47,8 +46,8 @@ void Solve(const char* transposed, const Eigen::MatrixXf& l, Eigen::Ref<Eigen::M
     strsm_("L", "L", transposed, "N", &m, &n, &one, l.data(), &lda, b.data(), &ldb);
 }
 
-void Multiply(const char* transposed, const Eigen::MatrixXf& a, const Eigen::Ref<const Eigen::VectorXf>& x,
-              Eigen::Ref<Eigen::VectorXf> y) {
+void MultiplyVector(const char* transposed, const Eigen::MatrixXf& a,
+                    const Eigen::Ref<const Eigen::VectorXf>& x, Eigen::Ref<Eigen::VectorXf> y) {
   assert(*transposed == 'T' ? a.rows() == x.size() && a.cols() == y.size()
                             : a.cols() == x.size() && a.rows() == y.size());
   const OneThread one_thread;
@@ -93,11 +92,11 @@ void MultiplyTransposed(float scale, const Eigen::MatrixXf& a, const Eigen::Matr
 
 }  // namespace
 
-bool Cholesky(Eigen::MatrixXf& a) {
+bool Cholesky(Eigen::MatrixXd& a) {
   const OneThread one_thread;
   const int n = Int(a.rows()), lda = Int(a.outerStride());
   int info = 0;
-  if (n > 0) spotrf_("L", &n, a.data(), &lda, &info);
+  if (n > 0) dpotrf_("L", &n, a.data(), &lda, &info);
   return info == 0;
 }
 
@@ -162,12 +161,12 @@ void Gram(const Eigen::MatrixXf& a, Eigen::MatrixXf& c) {
 
 void Product(const Eigen::MatrixXf& a, const Eigen::Ref<const Eigen::VectorXf>& x,
              Eigen::Ref<Eigen::VectorXf> y) {
-  Multiply("N", a, x, y);
+  MultiplyVector("N", a, x, y);
 }
 
 void TransposedProduct(const Eigen::MatrixXf& a, const Eigen::Ref<const Eigen::VectorXf>& x,
                        Eigen::Ref<Eigen::VectorXf> y) {
-  Multiply("T", a, x, y);
+  MultiplyVector("T", a, x, y);
 }
 
 void TransposedProduct(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, Eigen::MatrixXd& c) {

@@ -10,7 +10,7 @@ namespace taclink::dense {
 
 /// The lower Cholesky factor in place; what is above the diagonal is not touched. False: not positive
 /// definite.
-bool Cholesky(Eigen::MatrixXf& a);
+bool Cholesky(Eigen::MatrixXd& a);
 /// b := L^-1 b, or L^-T b.
 void SolveLower(const Eigen::MatrixXf& l, Eigen::Ref<Eigen::MatrixXf> b);
 void SolveLowerTransposed(const Eigen::MatrixXf& l, Eigen::Ref<Eigen::MatrixXf> b);

@@ -82,14 +82,15 @@ int MostLeftOut(const LinkModel& model, const SkinShape& shape) {
   return most;
 }
 
-// Or on the last ring, for of a body there half is beyond, or no further from it than its center may be off.
+// A contact beyond the first or the last ring, or on it, for of a body there half is beyond, or no further
+// inside than its center may be off.
 bool IsBeyondMarkers(const LinkModel& model, const std::vector<Contact>& contacts) {
   const auto& rings = model.markers.rings_z_mm;
   return std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
     const double sigma_mm =
         contact.center_covariance_mm2 ? std::sqrt((*contact.center_covariance_mm2)(2, 2)) : 0;
     const double margin_mm = 0.1 * (rings[1] - rings[0]) + sigma_mm, z_mm = contact.center_mm.z();
-    return z_mm < rings.front() + margin_mm || z_mm > rings.back() - margin_mm;
+    return !(z_mm >= rings.front() + margin_mm && z_mm <= rings.back() - margin_mm);
   });
 }
 
@@ -160,7 +161,7 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
   if (IsBeyondMarkers(evidence.model, state.contacts))
     state.reasons.push_back(
         {ReasonId::kBeyondMarkers,
-         "a contact lies, or may lie, on the first ring of markers or between it and the clamped end: what "
+         "a contact lies, or may lie, on the last ring of markers before a clamped end or beyond it: what "
          "presses there hardly shows, and may be stronger"});
   if (IsEncircled(state.contacts, kBeltMm * LengthUnit(evidence.model)))
     state.reasons.push_back({ReasonId::kEncircled,

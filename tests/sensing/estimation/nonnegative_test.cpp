@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 namespace taclink {
@@ -65,6 +66,9 @@ TEST(NonNegativeSolver, SinglePrecisionIsAsGoodAMinimum) {
   const Eigen::VectorXd x = solver.Solve(h, b, exact);
   const Eigen::VectorXd y = solver.Solve(Eigen::MatrixXf(h.cast<float>()), b, rounded);
   EXPECT_TRUE(solver.converged());
+  EXPECT_GE(y.minCoeff(), 0);
+  for (Eigen::Index i = 0; i < y.size(); ++i)
+    EXPECT_EQ(y[i] > 0, std::count(rounded.begin(), rounded.end(), i) == 1) << i;
   const auto objective = [&](const Eigen::VectorXd& at) { return 0.5 * at.dot(h * at) - b.dot(at); };
   EXPECT_NEAR(objective(y), objective(x), 1e-3 * std::abs(objective(x)));
 }

@@ -17,9 +17,13 @@ class Dense : public testing::Test {
     const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 2 * kRows);
     return a * a.transpose();
   }
-  static Eigen::MatrixXf LowerOf(const Eigen::MatrixXf& a) { return a.triangularView<Eigen::Lower>(); }
-  static Eigen::MatrixXf AboveOf(const Eigen::MatrixXf& a) {
-    return a.triangularView<Eigen::StrictlyUpper>();
+  template <typename Matrix>
+  static typename Matrix::PlainObject LowerOf(const Matrix& a) {
+    return a.template triangularView<Eigen::Lower>();
+  }
+  template <typename Matrix>
+  static typename Matrix::PlainObject AboveOf(const Matrix& a) {
+    return a.template triangularView<Eigen::StrictlyUpper>();
   }
   static void ExpectClose(const Eigen::MatrixXd& found, const Eigen::MatrixXd& expected,
                           double tolerance = 1e-12) {
@@ -37,22 +41,21 @@ class Dense : public testing::Test {
 
 TEST_F(Dense, CholeskyIsEigens) {
   const Eigen::MatrixXd a = PositiveDefinite();
-  Eigen::MatrixXf l = a.cast<float>();
-  const Eigen::MatrixXf above = AboveOf(l);
+  Eigen::MatrixXd l = a;
   ASSERT_TRUE(dense::Cholesky(l));
   ExpectClose(LowerOf(l), a.llt().matrixL());
-  EXPECT_EQ(AboveOf(l), above);  // as promised, not touched
+  EXPECT_EQ(AboveOf(l), AboveOf(a));  // as promised, not touched
 }
 
 TEST_F(Dense, CholeskyReadsTheLowerHalfAlone) {
   const Eigen::MatrixXd a = PositiveDefinite();
-  Eigen::MatrixXf l = LowerOf(a.cast<float>());
+  Eigen::MatrixXd l = LowerOf(a);
   ASSERT_TRUE(dense::Cholesky(l));
   ExpectClose(l, a.llt().matrixL());
 }
 
 TEST_F(Dense, CholeskySaysWhatIsNotPositiveDefinite) {
-  Eigen::MatrixXf a = PositiveDefinite().cast<float>();
+  Eigen::MatrixXd a = PositiveDefinite();
   a(40, 40) = -1;
   EXPECT_FALSE(dense::Cholesky(a));
 }
@@ -86,8 +89,10 @@ TEST_F(Dense, TriangularSolutionsOfABlock) {
 TEST_F(Dense, TriangularSolutionsIgnoreTheUpperHalf) {
   const Eigen::MatrixXd a = PositiveDefinite();
   const Eigen::VectorXd b = Eigen::VectorXd::Random(kRows);
-  Eigen::MatrixXf l = a.cast<float>(), x = b.cast<float>();
-  ASSERT_TRUE(dense::Cholesky(l));
+  Eigen::MatrixXd factor = a;
+  ASSERT_TRUE(dense::Cholesky(factor));
+  const Eigen::MatrixXf l = factor.cast<float>();
+  Eigen::MatrixXf x = b.cast<float>();
   dense::SolveLower(l, x);
   dense::SolveLowerTransposed(l, x);
   ExpectClose(x, a.llt().solve(b), 1e-4);
@@ -97,7 +102,7 @@ TEST_F(Dense, AddOuterAddsToTheLowerHalf) {
   const Eigen::MatrixXf a = Eigen::MatrixXf::Random(kRows, 13), c = Eigen::MatrixXf::Random(kRows, kRows);
   Eigen::MatrixXf sum = c;
   dense::AddOuter(a, sum);
-  ExpectClose(LowerOf(sum), LowerOf(c + a * a.transpose()).cast<double>());
+  ExpectClose(LowerOf(sum), LowerOf(Eigen::MatrixXf(c + a * a.transpose())).cast<double>());
   EXPECT_EQ(AboveOf(sum), AboveOf(c));
 }
 
@@ -170,7 +175,8 @@ TEST_F(Dense, SymmetricInversesOfDefiniteAndIndefinite) {
 }
 
 TEST_F(Dense, EmptyMatricesAreNoError) {
-  Eigen::MatrixXf empty(0, 0), no_columns(kRows, 0), c;
+  Eigen::MatrixXd empty(0, 0);
+  Eigen::MatrixXf no_columns(kRows, 0), c;
   EXPECT_TRUE(dense::Cholesky(empty));
   dense::Gram(no_columns, c);
   EXPECT_EQ(c.size(), 0);
