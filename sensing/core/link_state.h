@@ -36,7 +36,7 @@ enum class ReasonId : uint8_t {
   kTooDeep,           ///< pressed in deeper than forces were compared with the truth
   kBeyondMarkers,     ///< a load that may lie between a clamp and the ring beside it, where it hardly shows
   kEncircled,         ///< bodies all around bend the skin in waves that are hardly resolved
-  kSparseMarkers,     ///< a load on this skin may hide between markers
+  kSparseMarkers,     ///< a load on this skin may hide between the markers that are in sight
   kUnsettled,         ///< where no camera sees the skin its shape did not settle
   kForceModel,        ///< the force model that was asked for does not hold here
   kCamerasMoved,      ///< all markers together are off: taken out of the estimate, but calibrate

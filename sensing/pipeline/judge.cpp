@@ -14,8 +14,8 @@ namespace {
 constexpr double kDegradedFraction = 0.7, kLostFraction = 0.4;
 // Forces were compared with the truth down to dents of 15 mm on a link of sqrt(R t) = 11.6 mm.
 constexpr double kDeepestDentMm = 16;
-// Rings of markers so far apart, in sqrt(R t), over which a dent decays: on thinner skins forces were wrong.
-constexpr double kWidestRings = 3.5;
+// Markers in sight so far apart, in sqrt(R t), over which a dent decays: forces between them were wrong.
+constexpr double kWidestGap = 3.5;
 // A tangent is wrong by a fifth a millimeter (estimation.md); likewise.
 constexpr double kFirstOrderMm = 2.5;
 constexpr double kPressureDeviations = 3;
@@ -41,11 +41,43 @@ std::string Text(const char* format, ...) {
   return text;
 }
 
-double WidestRingsMm(const LinkModel& model) {
-  double widest_mm = 0;
-  const auto& rings = model.markers.rings_z_mm;
-  for (size_t i = 1; i < rings.size(); ++i) widest_mm = std::max(widest_mm, rings[i] - rings[i - 1]);
-  return widest_mm;
+// A marker of that ring is seen on the path or on one of so many beside it.
+bool IsSeenNear(const LinkModel& model, const SkinShape& shape, int path, int ring, int beside) {
+  const int paths = model.markers.paths;
+  for (int p = path - beside; p <= path + beside; ++p) {
+    const auto marker = static_cast<size_t>(model.MarkerIndex((p % paths + paths) % paths, ring));
+    if (shape.sources[marker] != MarkerSource::kInferred) return true;
+  }
+  return false;
+}
+
+struct Gap {
+  int path = 0;
+  double begin_mm = 0, end_mm = 0;
+  double length_mm() const { return end_mm - begin_mm; }
+};
+
+// Along the link, the clamped ends included, where no marker is in sight for half of `wide_mm` to either
+// side.
+Gap WidestGap(const LinkModel& model, const SkinShape& shape, double wide_mm) {
+  Gap widest;
+  const auto& rings_mm = model.markers.rings_z_mm;
+  const int unlike_paths = shape.seen() == model.markers.count() ? 1 : model.markers.paths;
+  for (int path = 0; path < unlike_paths; ++path) {
+    double begin_mm = 0;
+    for (int ring = 0; ring <= model.markers.rings(); ++ring) {
+      const bool is_end = ring == model.markers.rings();
+      const double at_mm = is_end ? model.length_mm : rings_mm[static_cast<size_t>(ring)];
+      if (!is_end) {
+        const double pitch_mm =
+            model.RestMarker(model.MarkerIndex(path, ring)).head<2>().norm() * model.markers.path_pitch_rad();
+        if (!IsSeenNear(model, shape, path, ring, static_cast<int>(wide_mm / 2 / pitch_mm))) continue;
+      }
+      if (at_mm - begin_mm > widest.length_mm()) widest = {path, begin_mm, at_mm};
+      begin_mm = at_mm;
+    }
+  }
+  return widest;
 }
 
 // Toward the axis from the inflated skin, of the marker that went furthest.
@@ -82,16 +114,22 @@ int MostLeftOut(const LinkModel& model, const SkinShape& shape) {
   return most;
 }
 
-// A contact beyond the first or the last ring, or on it, for of a body there half is beyond, or no further
-// inside than its center may be off.
-bool IsBeyondMarkers(const LinkModel& model, const std::vector<Contact>& contacts) {
-  const auto& rings = model.markers.rings_z_mm;
-  return std::any_of(contacts.begin(), contacts.end(), [&](const Contact& contact) {
-    const double sigma_mm =
-        contact.center_covariance_mm2 ? std::sqrt((*contact.center_covariance_mm2)(2, 2)) : 0;
-    const double margin_mm = 0.1 * (rings[1] - rings[0]) + sigma_mm, z_mm = contact.center_mm.z();
-    return !(z_mm >= rings.front() + margin_mm && z_mm <= rings.back() - margin_mm);
-  });
+// A contact beyond the first or the last ring that is seen there, or on it, for of a body there half is
+// beyond, or no further inside than its center may be off.
+bool IsBeyondMarkers(const LinkModel& model, const SkinShape& shape, const Contact& contact) {
+  const double angle = std::atan2(contact.center_mm.y(), contact.center_mm.x());
+  const auto path = static_cast<int>(
+      std::lround((angle - model.markers.first_path_angle_rad) / model.markers.path_pitch_rad()));
+  int first = 0, last = model.markers.rings() - 1;
+  while (first <= last && !IsSeenNear(model, shape, path, first, 1)) ++first;
+  while (first < last && !IsSeenNear(model, shape, path, last, 1)) --last;
+  if (first >= last) return true;
+  const auto& rings_mm = model.markers.rings_z_mm;
+  const double sigma_mm =
+      contact.center_covariance_mm2 ? std::sqrt((*contact.center_covariance_mm2)(2, 2)) : 0;
+  const double margin_mm = 0.1 * (rings_mm[1] - rings_mm[0]) + sigma_mm, z_mm = contact.center_mm.z();
+  return !(z_mm >= rings_mm[static_cast<size_t>(first)] + margin_mm &&
+           z_mm <= rings_mm[static_cast<size_t>(last)] - margin_mm);
 }
 
 bool IsEncircled(const std::vector<Contact>& contacts, double belt_mm) {
@@ -158,29 +196,10 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
          Text("the markers are off the estimated shape by %.1f times what is expected; the loads "
               "may be others",
               state.forces.residual)});
-  if (IsBeyondMarkers(evidence.model, state.contacts))
-    state.reasons.push_back(
-        {ReasonId::kBeyondMarkers,
-         "a contact lies, or may lie, on the last ring of markers before a clamped end or beyond it: what "
-         "presses there hardly shows, and may be stronger"});
   if (IsEncircled(state.contacts, kBeltMm * LengthUnit(evidence.model)))
     state.reasons.push_back({ReasonId::kEncircled,
                              "contacts follow each other closely all around the skin: the sum of their "
                              "forces may be a quarter off, and each much further"});
-  if (const double apart_mm = WidestRingsMm(evidence.model), decay_mm = DecayLengthMm(evidence.model);
-      apart_mm > kWidestRings * decay_mm)
-    state.reasons.push_back(
-        {ReasonId::kSparseMarkers, Text("rings of markers are %.0f mm apart, but a dent on this skin decays "
-                                        "within %.1f mm: loads may hide "
-                                        "between markers",
-                                        apart_mm, decay_mm)});
-  if (MostLeftOut(evidence.model, state.shape) >= kLeftOutTogether ||
-      static_cast<double>(state.shape.rejected.size()) >
-          kLeftOutShare * kCameraCount * evidence.model.markers.count())
-    state.reasons.push_back(
-        {ReasonId::kLabels,
-         "neighboring or many markers were left out because they contradict the others; clean the "
-         "cameras' view, or calibrate again"});
   const double unit = LengthUnit(evidence.model);
   if (const double shift_mm = evidence.estimate.loads.camera_shift_mm; shift_mm > kMostCameraShiftMm * unit)
     state.reasons.push_back(
@@ -211,6 +230,32 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
               kDeepestDentMm * unit)});
 }
 
+// What the markers that are in sight cannot tell.
+void AddSightReasons(const Evidence& evidence, LinkState& state) {
+  if (std::any_of(state.contacts.begin(), state.contacts.end(), [&](const Contact& contact) {
+        return IsBeyondMarkers(evidence.model, state.shape, contact);
+      }))
+    state.reasons.push_back({ReasonId::kBeyondMarkers,
+                             "a contact lies, or may lie, on the last ring of markers in sight before a "
+                             "clamped end or beyond it: "
+                             "what presses there hardly shows, and may be stronger"});
+  if (MostLeftOut(evidence.model, state.shape) >= kLeftOutTogether ||
+      static_cast<double>(state.shape.rejected.size()) >
+          kLeftOutShare * kCameraCount * evidence.model.markers.count())
+    state.reasons.push_back(
+        {ReasonId::kLabels,
+         "neighboring or many markers were left out because they contradict the others; clean the "
+         "cameras' view, or calibrate again"});
+  const double decay_mm = DecayLengthMm(evidence.model);
+  if (const Gap gap = WidestGap(evidence.model, state.shape, kWidestGap * decay_mm);
+      gap.length_mm() > kWidestGap * decay_mm)
+    state.reasons.push_back(
+        {ReasonId::kSparseMarkers,
+         Text("at path %d no marker is in sight from z = %.0f mm to %.0f mm, but a dent on this skin decays "
+              "within %.1f mm: loads may hide there",
+              gap.path + 1, gap.begin_mm, gap.end_mm, decay_mm)});
+}
+
 bool IsGrave(ReasonId id) {
   return id == ReasonId::kNotConverged || id == ReasonId::kImpossible || id == ReasonId::kNoEquilibrium;
 }
@@ -231,7 +276,10 @@ void Judge(const Evidence& evidence, LinkState& state) {
   if (!lost) AddPressureReasons(evidence, state);
   if (!lost && !evidence.drift_advice.empty())
     state.reasons.push_back({ReasonId::kDrift, evidence.drift_advice});
-  if (!lost && state.forces.converged) AddShapeReasons(evidence, state);
+  if (!lost && state.forces.converged) {
+    AddShapeReasons(evidence, state);
+    AddSightReasons(evidence, state);
+  }
   const bool grave = std::any_of(state.reasons.begin(), state.reasons.end(),
                                  [](const Reason& reason) { return IsGrave(reason.id); });
   state.status = lost ? LinkStatus::kLost : state.reasons.empty() ? LinkStatus::kOk : LinkStatus::kDegraded;

@@ -24,6 +24,11 @@ class JudgeTest : public ::testing::Test {
     contact.center_mm = model_.PointAtDepth(deg * kPi / 180, z_mm, 0);
     state_.contacts.push_back(contact);
   }
+  void Lose(int path, int ring) {
+    const int paths = model_.markers.paths;
+    state_.shape.sources[static_cast<size_t>(model_.MarkerIndex((path + paths) % paths, ring))] =
+        MarkerSource::kInferred;
+  }
   std::vector<ReasonId> Reasons() {
     Judge({.model = model_, .camera_trouble = "", .drift_advice = "", .told = told_, .estimate = estimate_},
           state_);
@@ -67,6 +72,37 @@ TEST_F(JudgeTest, AContactThatMayBeBesideTheMarkersIsTold) {
   EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kBeyondMarkers));
   state_.contacts[0].center_mm.z() = first_mm + 6;
   EXPECT_THAT(Reasons(), testing::IsEmpty());
+}
+
+// The last ring is not seen around it: what is told of it is told by the one before.
+TEST_F(JudgeTest, AContactBesideMarkersThatAreLostIsTold) {
+  const auto& rings_mm = model_.markers.rings_z_mm;
+  const auto last = static_cast<size_t>(model_.markers.rings() - 1);
+  Touch(0, rings_mm[last - 1] + 5);
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  const auto at = static_cast<int>(
+      std::lround((0 - model_.markers.first_path_angle_rad) / model_.markers.path_pitch_rad()));
+  for (int path = at - 1; path <= at + 1; ++path) Lose(path, static_cast<int>(last));
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kBeyondMarkers));
+}
+
+// A body may press where nothing is seen, without any contact told.
+TEST_F(JudgeTest, SkinOutOfSightIsTold) {
+  const int rings = model_.markers.rings(), paths = model_.markers.paths;
+  for (int path = 0; path < paths; ++path) Lose(path, rings - 1);
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  for (int path = 0; path < paths; ++path) Lose(path, rings - 2);
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kSparseMarkers));
+  state_.shape.sources.assign(static_cast<size_t>(model_.markers.count()), MarkerSource::kBoth);
+  // What a body hides, which its surroundings tell.
+  for (int path = 3; path < 6; ++path) {
+    for (int ring = 4; ring < 7; ++ring) Lose(path, ring);
+  }
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  for (int path = 0; path < 10; ++path) {
+    for (int ring = 4; ring < 7; ++ring) Lose(path, ring);
+  }
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kSparseMarkers));
 }
 
 TEST_F(JudgeTest, APressureThatDoesNotFitIsTold) {
