@@ -229,6 +229,7 @@ void LogLinkSolver::SolveForces(const PressurePair& pressure) {
          .camera_trouble = trouble,
          .drift_advice = "",
          .told = pressure.now,
+         .baseline = pressure.baseline,
          .estimate = estimate},
         state_);
 }

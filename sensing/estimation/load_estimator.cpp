@@ -47,8 +47,11 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   pressure_sigma_ = prior.sigma_mpa;
   by_pressure_ = prior.sigma_mpa * skin.by_pressure();
   covariance_.WriteDirect(skin, inflated, covariance_mm2_);
+  baseline_sigma_ = prior.baseline_sigma_mpa;
+  by_baseline_.setZero(by_pressure_.size());
   if (prior.baseline_mm_per_mpa.size() == by_pressure_.size())
-    AddOuter(prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa, covariance_mm2_);
+    by_baseline_ = prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa;
+  AddOuter(by_baseline_, covariance_mm2_);
   AddOuter(covariance_.by_cameras_mm(), covariance_mm2_);
   direct_mm2_ = covariance_mm2_.cast<float>();
   direct_mm2_.triangularView<Eigen::StrictlyUpper>() = direct_mm2_.transpose();
@@ -99,6 +102,12 @@ bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const Pres
   if (noise_mm2_.empty() || prior.sigma_mpa > kSameNoise * pressure_sigma_ ||
       pressure_sigma_ > kSameNoise * prior.sigma_mpa)
     return false;
+  constexpr double kSameMm = 1e-6;
+  const Eigen::VectorXd& baseline = prior.baseline_mm_per_mpa;
+  const bool is_same_baseline = baseline.size() == by_baseline_.size()
+                                    ? (prior.baseline_sigma_mpa * baseline - by_baseline_).isZero(kSameMm)
+                                    : by_baseline_.isZero(kSameMm);
+  if (!is_same_baseline) return false;
   const double unseen = kUnseenMm * mechanics_.length_unit(), unseen2 = unseen * unseen;
   constexpr double kMost = kSameNoise * kSameNoise, kNewlySeenShare = 0.02;
   int worse = 0;

@@ -42,6 +42,7 @@ struct LoadEstimate {
   /// How far cameras that have moved or changed since the baseline put a marker off, the most of all.
   double camera_shift_mm = 0;
   double pressure_error_mpa = 0;  ///< true less told
+  double baseline_error_mpa = 0;  ///< likewise, of the pressure under which the baseline was taken
   double pressure_sigma_mpa = 0;  ///< of the corrected pressure
   double chi2_per_dof = 0;
   double region_chi2_per_dof = 0;  ///< the largest of 3 x 3 markers
@@ -69,8 +70,8 @@ class LoadEstimator {
   /// neighborhood of each site, for the model's errors. False: the covariance has no factor.
   bool Prepare(const Linearization& skin, const InflatedSkin& inflated, const MarkerObservations& observed,
                const PressurePrior& prior, const Eigen::VectorXd& local_n);
-  /// Whether these observations are nearly as good, everywhere, as those that were prepared for; what is
-  /// missing now does not matter.
+  /// Whether these observations are nearly as good, everywhere, as those that were prepared for, and count
+  /// from the same baseline; what is missing now does not matter.
   bool IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const;
 
   /// After Prepare. The linearization may have been rebased. Covariances and what is left unexplained are not
@@ -147,10 +148,10 @@ class LoadEstimator {
   std::vector<Mat3> noise_mm2_, model_covariance_;
   Eigen::MatrixXd covariance_mm2_;
   Eigen::MatrixXf factor_;
-  Eigen::MatrixXf direct_mm2_;   // of it, what no force and no pressure of the estimate explains
-  Eigen::VectorXd by_pressure_;  // stacked, of one standard deviation
+  Eigen::MatrixXf direct_mm2_;  // of it, what no force and no pressure of the estimate explains
+  Eigen::VectorXd by_pressure_, by_baseline_;  // stacked, of one standard deviation
   Eigen::VectorXd whitened_pressure_;
-  double pressure_sigma_ = 0;
+  double pressure_sigma_ = 0, baseline_sigma_ = 0;
   Eigen::MatrixXf columns_, gram_;
   struct Region {
     std::vector<int> rows;

@@ -112,6 +112,8 @@ void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
     all.forces_n[k].array() += covariance_.stray_sigmas_n()[k].array().square() * pulled[k].array();
   }
   estimate.pressure_error_mpa = pressure_sigma_ * by_pressure_.dot(pulls_per_mm_);
+  // Displacements count from the baseline, so that what is missing in it shows with the other sign.
+  estimate.baseline_error_mpa = -baseline_sigma_ * by_baseline_.dot(pulls_per_mm_);
 }
 
 // Of three columns a contact for its force, two for its place, and the pressure's: the posterior of those

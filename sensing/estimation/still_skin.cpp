@@ -42,6 +42,7 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSk
   estimate.loads.chi2_per_dof = estimate.loads.region_chi2_per_dof = estimate.loads.camera_shift_mm = 0;
   estimate.loads.converged = true;
   estimate.loads.pressure_error_mpa = off / told;
+  estimate.loads.baseline_error_mpa = 0;
   estimate.loads.pressure_sigma_mpa = prior.sigma_mpa;
   estimate.state = inflated.state;
   estimate.displacements_mm = inflated.markers_mm + off / told * inflated.markers_mm_per_mpa;

@@ -173,14 +173,21 @@ void AddPressureReasons(const Evidence& evidence, LinkState& state) {
     state.reasons.push_back(
         {ReasonId::kPressureUnknown, "the pressure is not known: " + state.pressure.trouble});
   if (!state.pressure_estimate) return;
-  const double off = state.pressure_estimate->mpa - evidence.told.mpa;
-  const double sigma = evidence.told.sigma_mpa;
-  if (std::abs(off) <= kPressureDeviations * sigma || state.pressure.stale) return;
-  state.reasons.push_back(
-      {ReasonId::kPressureMismatch, Text("the skin's shape says %.3f kPa, the sensor %.3f kPa; check the "
-                                         "sensor, its hose and the baseline's "
-                                         "pressure",
-                                         1e3 * state.pressure_estimate->mpa, 1e3 * evidence.told.mpa)});
+  const PressureReading &told = evidence.told, &baseline = evidence.baseline;
+  const double now_mpa = state.pressure_estimate->mpa;
+  const double baseline_off_mpa = evidence.estimate.loads.baseline_error_mpa;
+  if (std::abs(baseline_off_mpa) > kPressureDeviations * baseline.sigma_mpa)
+    state.reasons.push_back(
+        {ReasonId::kPressureMismatch,
+         Text("the skin's shape says %.3f kPa, and %.3f kPa when the baseline was taken; told were %.3f and "
+              "%.3f kPa; check the sensor and the baseline's pressure, or tare",
+              1e3 * now_mpa, 1e3 * (baseline.mpa + baseline_off_mpa), 1e3 * told.mpa, 1e3 * baseline.mpa)});
+  else if (std::abs(now_mpa - told.mpa) > kPressureDeviations * told.sigma_mpa && !state.pressure.stale)
+    state.reasons.push_back(
+        {ReasonId::kPressureMismatch,
+         Text("the skin's shape says %.3f kPa, the sensor %.3f kPa; check the sensor, its hose and the "
+              "baseline's pressure",
+              1e3 * now_mpa, 1e3 * told.mpa)});
 }
 
 void AddShapeReasons(const Evidence& evidence, LinkState& state) {

@@ -14,6 +14,7 @@ struct Evidence {
   const std::string& camera_trouble;  ///< empty: none
   const std::string drift_advice;     ///< empty: the baseline has not drifted far
   PressureReading told;               ///< the pressure that was taken as told
+  PressureReading baseline;           ///< and that of the baseline
   const SkinEstimate& estimate;
 };
 

@@ -370,6 +370,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
          .camera_trouble = s.camera_trouble,
          .drift_advice = s.keeper.HasDriftedFar() ? s.keeper.DriftAdvice() : "",
          .told = told,
+         .baseline = s.skin->baseline_pressure(),
          .estimate = estimate},
         state);
   if (estimate.failure == EstimateFailure::kNone)

@@ -49,9 +49,13 @@ LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, const 
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   if (state.forces.converged)
     state.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
-  Judge(
-      {.model = model, .camera_trouble = "", .drift_advice = "", .told = pressure.now, .estimate = estimate},
-      state);
+  Judge({.model = model,
+         .camera_trouble = "",
+         .drift_advice = "",
+         .told = pressure.now,
+         .baseline = pressure.baseline,
+         .estimate = estimate},
+        state);
   return state;
 }
 

@@ -143,6 +143,21 @@ TEST_F(SkinEstimatorTest, PressureThatIsToldWrongIsNoForce) {
   EXPECT_NEAR(estimate_.pressure_mpa, 1e-3, 2e-5);
 }
 
+// Displacements of a slack skin that is pressed, from a baseline that is said to have been inflated.
+TEST_F(SkinEstimatorTest, ABaselinesPressureThatIsToldWrongShows) {
+  const Pushed pushed = Push(model_, 0, 1.3, 95, 0.1, 4);
+  ASSERT_TRUE(pushed.ok);
+  SkinObservation observation = Observe(pushed.markers_mm, 0, 0.05);
+  observation.pressure.sigma_mpa = observation.baseline_pressure.sigma_mpa = 5e-5;
+  observation.baseline_pressure.mpa = 5e-4;
+  estimator_.Estimate(observation, estimate_);
+  ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+  EXPECT_LT(estimate_.loads.baseline_error_mpa, -3e-4);
+  observation.baseline_pressure.mpa = 0;
+  estimator_.Estimate(observation, estimate_);
+  EXPECT_EQ(estimate_.loads.baseline_error_mpa, 0);
+}
+
 TEST_F(SkinEstimatorTest, TheShapeFollowsMarkersThatTheModelIsWrongAbout) {
   const Pushed inflated = Push(model_, 1.0, 1.3, 95, 0, 4);
   ASSERT_TRUE(inflated.ok);

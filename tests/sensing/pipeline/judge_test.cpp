@@ -30,7 +30,12 @@ class JudgeTest : public ::testing::Test {
         MarkerSource::kInferred;
   }
   std::vector<ReasonId> Reasons() {
-    Judge({.model = model_, .camera_trouble = "", .drift_advice = "", .told = told_, .estimate = estimate_},
+    Judge({.model = model_,
+           .camera_trouble = "",
+           .drift_advice = "",
+           .told = told_,
+           .baseline = baseline_,
+           .estimate = estimate_},
           state_);
     std::vector<ReasonId> ids;
     for (const Reason& reason : state_.reasons) ids.push_back(reason.id);
@@ -40,7 +45,7 @@ class JudgeTest : public ::testing::Test {
   const LinkModel model_ = LoadLinkModel("cylinder").value();
   LinkState state_;
   SkinEstimate estimate_;
-  PressureReading told_{.mpa = 1e-3, .sigma_mpa = 5e-5};
+  PressureReading told_{.mpa = 1e-3, .sigma_mpa = 5e-5}, baseline_{.mpa = 5e-4, .sigma_mpa = 5e-5};
 };
 
 TEST_F(JudgeTest, WhatIsWellIsOk) {
@@ -111,6 +116,16 @@ TEST_F(JudgeTest, APressureThatDoesNotFitIsTold) {
   state_.pressure_estimate->mpa = 1.16e-3;
   EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kPressureMismatch));
   EXPECT_THAT(state_.status_reason, testing::HasSubstr("1.160 kPa, the sensor 1.000 kPa"));
+}
+
+TEST_F(JudgeTest, ABaselinesPressureThatDoesNotFitIsTold) {
+  state_.pressure_estimate = {.mpa = 1e-3, .sigma_mpa = 1e-6};
+  estimate_.loads.baseline_error_mpa = -1.4e-4;
+  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  estimate_.loads.baseline_error_mpa = -1.6e-4;
+  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kPressureMismatch));
+  EXPECT_THAT(state_.status_reason,
+              testing::HasSubstr("0.340 kPa when the baseline was taken; told were 1.000 and 0.500 kPa"));
 }
 
 TEST_F(JudgeTest, MarkersThatContradictAreTold) {
