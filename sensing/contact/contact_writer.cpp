@@ -100,7 +100,7 @@ void ContactWriter::WriteShape(const EstimatedLoad& load, Contact& contact) {
   const Mat2 of_cell = Vec2(around.squaredNorm(), along.squaredNorm()).asDiagonal() * (1.0 / 12);
   Mat2 second = Mat2::Zero();
   double sum = 0;
-  const double middle = load.center.x() - origin_;
+  const double middle = std::remainder(load.center.x() - origin_, mechanics_.columns());
   contact.area_mm2 = 0;
   for (const SiteLoad& at : spread_) {
     const double area = mechanics_.mesh().areas_mm2[static_cast<size_t>(mechanics_.NodeOfSite(at.site))];
@@ -109,6 +109,10 @@ void ContactWriter::WriteShape(const EstimatedLoad& load, Contact& contact) {
     second += at.inward_n * (off_mm * off_mm.transpose() + of_cell);
     sum += at.inward_n;
     if (at.inward_n > kLoaded * peak_mpa_ * area) contact.area_mm2 += area;
+  }
+  if (load.is_hug) {
+    contact.center_mm.setZero();
+    for (const SiteLoad& at : spread_) contact.center_mm += at.inward_n / sum * OuterPoint(at.site);
   }
   const Eigen::SelfAdjointEigenSolver<Mat2> axes(second / std::max(sum, 1e-12));
   const auto axis = [&](Eigen::Index k) {
@@ -131,8 +135,16 @@ void ContactWriter::WriteOutline(Contact& contact) {
     }
   }
   contact.outline_mm.clear();
-  for (const Vec2& corner : ConvexHull(std::move(corners)))
-    contact.outline_mm.push_back(OuterPointAt(origin_ + corner.x(), corner.y()));
+  const std::vector<Vec2> hull = ConvexHull(std::move(corners));
+  for (size_t i = 0; i < hull.size(); ++i) {
+    // No chord through the link: a point for each site that the edge passes.
+    const Vec2 edge = hull[(i + 1) % hull.size()] - hull[i];
+    const int parts = std::max(1, static_cast<int>(std::ceil(edge.cwiseAbs().maxCoeff())));
+    for (int k = 0; k < parts; ++k) {
+      const Vec2 point = hull[i] + static_cast<double>(k) / parts * edge;
+      contact.outline_mm.push_back(OuterPointAt(origin_ + point.x(), point.y()));
+    }
+  }
 }
 
 void ContactWriter::WriteMarkers(Contact& contact) const {
@@ -157,6 +169,7 @@ void ContactWriter::WriteMarkers(Contact& contact) const {
 
 void ContactWriter::Write(const EstimatedLoad& load, Contact& contact) {
   Spread(load);
+  contact.is_hug = load.is_hug;
   contact.force_n = load.force_n;
   contact.normal_force_n = load.normal_force_n;
   contact.force_covariance_n2 = load.force_covariance_n2;

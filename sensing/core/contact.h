@@ -45,7 +45,8 @@ struct NodalForces {
 /// A connected region of the skin that something pushes on. Link frame.
 struct Contact {
   uint64_t id = 0;                            ///< lasts while the contact does; unique within a link's run
-  Vec3 center_mm = Vec3::Zero();              ///< on the deformed outer surface
+  bool is_hug = false;                        ///< presses alike all around the skin
+  Vec3 center_mm = Vec3::Zero();              ///< on the deformed outer surface; of a hug, on the axis
   Vec3 normal = Vec3::Zero();                 ///< unit, of the deformed skin, away from the axis
   Vec3 force_n = Vec3::Zero();                ///< what the world exerts on the skin
   std::optional<Mat3> force_covariance_n2;    ///< none: not known
@@ -60,7 +61,7 @@ struct Contact {
   /// deviation of the load along it.
   Vec3 major_axis_mm = Vec3::Zero(), minor_axis_mm = Vec3::Zero();
   /// A polygon round the loaded region on the deformed outer surface, counter-clockwise seen from outside;
-  /// convex on the unrolled skin. Empty: not known.
+  /// convex on the unrolled skin, a hug's cut open on the other side of `normal`. Empty: not known.
   std::vector<Vec3> outline_mm;
 };
 

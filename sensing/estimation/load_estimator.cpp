@@ -22,7 +22,6 @@ constexpr double kEndNorm = 1.0;  // of the median: beyond the markers loads har
 constexpr double kLeastHillN = 0.01;
 constexpr size_t kMostHills = 24;  // no scene that was ever compared with the truth has a third of it
 constexpr double kLeastOfPeak = 0.03;
-constexpr double kHillGain = 20;  // of chi^2
 constexpr double kRefitSparsity = 0.1, kRefitEndSparsity = 1.0;
 constexpr double kRidge = 1e-9;
 constexpr float kRounding = 1e-6F;  // of a Gram matrix in single precision
@@ -199,22 +198,10 @@ void LoadEstimator::ProjectOut(const Eigen::MatrixXd& tangential) {
   dense::AddTransposedProduct(-1, hidden_columns_, scaled, free_gram_);
 }
 
-// What sites bear of loads of sites and bands.
-void LoadEstimator::ShareBands(const Eigen::VectorXd& loads, const std::vector<int>& support) {
-  const int sites = mechanics_.site_count(), around = mechanics_.columns();
-  loads_.setZero(sites);
-  for (const int i : support) {
-    if (i < sites)
-      loads_[i] += loads[i];
-    else
-      loads_.segment((i - sites) * around, around).array() += loads[i] / around;
-  }
-}
-
 // Loads of all sites, and of bands all around, under a penalty that fades where much acts, grouped. What a
 // band does to an inflated skin is little beside what each of its sites would do alone, so that it would not
 // pay for theirs.
-std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
+std::vector<LoadEstimator::Hill> LoadEstimator::Select(const Linearization& skin) {
   const int sites = mechanics_.site_count(), around = mechanics_.columns();
   const double unit = mechanics_.force_unit();
   Eigen::VectorXf target(columns_.cols());
@@ -256,13 +243,13 @@ std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
   for (int site = 0; site < sites; ++site) {
     if (loads_[site] > 0) support.push_back(site);
   }
-  std::vector<HillFinder::Hill> hills = hills_.Find(skin, loads_, support);
-  std::erase_if(hills, [&](const HillFinder::Hill& hill) {
+  std::vector<Hill> hills = hills_.Find(skin, loads_, support);
+  std::erase_if(hills, [&](const Hill& hill) {
     double sum = 0;
     for (const int site : hill) sum += loads_[site];
     return sum < kLeastHillN * unit;
   });
-  for (HillFinder::Hill& hill : hills) {
+  for (Hill& hill : hills) {
     double peak = 0;
     for (const int site : hill) peak = std::max(peak, loads_[site]);
     std::erase_if(hill, [&](int site) { return loads_[site] <= kLeastOfPeak * peak; });
@@ -270,30 +257,30 @@ std::vector<HillFinder::Hill> LoadEstimator::Select(const Linearization& skin) {
   return hills;
 }
 
-// chi^2 that is left with all hills but one, without penalty.
-double LoadEstimator::Unexplained(const std::vector<HillFinder::Hill>& hills, size_t without) {
-  std::vector<int> sites;
+// What all hills but one explain, without penalty.
+LoadEstimator::Explanation LoadEstimator::Explain(const std::vector<Hill>& hills, size_t without) {
+  std::vector<int> columns;
   for (size_t i = 0; i < hills.size(); ++i) {
-    if (i != without) sites.insert(sites.end(), hills[i].begin(), hills[i].end());
+    if (i != without) columns.insert(columns.end(), hills[i].begin(), hills[i].end());
   }
   const double all = frame_data_.dot(data_);
-  if (sites.empty()) return all;
-  const Eigen::MatrixXd exact = (*frame_gram_)(sites, sites).cast<double>();
+  if (columns.empty()) return {.chi2 = all, .loads = {}};
+  const Eigen::MatrixXd exact = (*frame_gram_)(columns, columns).cast<double>();
   Eigen::MatrixXd h = exact;
-  h.diagonal().array() += kRounding * h.trace() / static_cast<double>(sites.size());
-  const Eigen::VectorXd b = target_(sites);
+  h.diagonal().array() += kRounding * h.trace() / static_cast<double>(columns.size());
+  const Eigen::VectorXd b = target_(columns);
   std::vector<int> support;
   const Eigen::VectorXd& x = solver_.Solve(h, b, support);
-  return all - 2 * b.dot(x) + x.dot(exact * x);
+  return {.chi2 = all - 2 * b.dot(x) + x.dot(exact * x), .loads = x};
 }
 
-void LoadEstimator::Eliminate(std::vector<HillFinder::Hill>& hills) {
-  double now = Unexplained(hills, hills.size());
+void LoadEstimator::Eliminate(std::vector<Hill>& hills) {
+  double now = Explain(hills, hills.size()).chi2;
   while (!hills.empty()) {
     double least = 0;
     size_t weakest = hills.size();
     for (size_t i = 0; i < hills.size(); ++i) {
-      const double gain = Unexplained(hills, i) - now;
+      const double gain = Explain(hills, i).chi2 - now;
       if (weakest < hills.size() && gain >= least) continue;
       least = gain;
       weakest = i;
@@ -304,12 +291,12 @@ void LoadEstimator::Eliminate(std::vector<HillFinder::Hill>& hills) {
   }
 }
 
-// Loads of the chosen sites almost without penalty, for that makes all of them too small; tangential forces
+// Loads of the chosen columns almost without penalty, for that makes all of them too small; tangential forces
 // are eliminated from the problem.
-LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
+LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& chosen,
                                              const Eigen::MatrixXd& tangential) {
-  const auto n = static_cast<Eigen::Index>(sites.size());
-  Eigen::MatrixXd normal = columns_(Eigen::all, sites).cast<double>();
+  const auto n = static_cast<Eigen::Index>(chosen.size());
+  Eigen::MatrixXd normal = columns_(Eigen::all, chosen).cast<double>();
   Eigen::VectorXd data = data_;
   if (hidden_.cols() > 0) {
     normal -= hidden_ * (hidden_.transpose() * normal);
@@ -331,13 +318,16 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& sites,
     b -= solved.transpose() * (tangential.transpose() * data);
   }
   const double unit = mechanics_.force_unit();
+  Eigen::VectorXd near_n = Eigen::VectorXd::Zero(mechanics_.site_count());
+  for (const int column : chosen)
+    ForSites(column, [&](int from, double) { near_n += loads_[from] * near_.load_sites.col(from); });
   for (Eigen::Index i = 0; i < n; ++i) {
-    const int site = sites[static_cast<size_t>(i)];
-    double near_n = 0;
-    for (const int from : sites) near_n += loads_[from] * near_.load_sites(site, from);
+    const int column = chosen[static_cast<size_t>(i)];
+    double near_column_n = 0;
+    ForSites(column, [&](int site, double share) { near_column_n += share * near_n[site]; });
     const double norm = std::sqrt(std::max(h(i, i), 0.0));
-    b[i] -= kRefitSparsity * norm / (1 + near_n / (kHillN * unit));
-    if (mechanics_.IsBeyondMarkers(site))
+    b[i] -= kRefitSparsity * norm / (1 + near_column_n / (kHillN * unit));
+    if (!IsBand(column) && mechanics_.IsBeyondMarkers(column))
       b[i] -= kRefitEndSparsity * std::max(kEndNorm * usual_norm_ - norm, 0.0);
   }
   h.diagonal().array() += kRidge * h.trace() / static_cast<double>(n);
@@ -363,7 +353,7 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
   }
   data_ = Whitened(data);
   Hide(observed);
-  std::vector<HillFinder::Hill> hills;
+  std::vector<Hill> hills;
   std::vector<int> slipping;  // hills with a tangential force, in the order of their columns
   Eigen::MatrixXd tangential(data_.size(), 0);
   // With tangential forces in, the selection is made once more with these taken as unknown.
@@ -373,6 +363,7 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
     estimate.converged = solver_.converged() && hills.size() <= kMostHills;
     if (!estimate.converged) return;
     Eliminate(hills);
+    JoinHugs(hills);
     if (hills.empty()) {
       solution_ = {.loads = {}, .tangential = {}, .residual = data_, .chi2 = 0};
       if (hidden_.cols() > 0) solution_.residual -= hidden_ * (hidden_.transpose() * data_);

@@ -18,6 +18,7 @@ struct EstimatedLoad {
   std::vector<int> sites;
   std::vector<double> inward_n;  ///< by `sites`; spreads over the neighbors of each
   std::vector<double> shares;    ///< by `sites`, of the tangential force; sum to 1
+  bool is_hug = false;           ///< all around the skin, alike: without a resultant across it
   bool has_tangential = false;
   Vec2 tangential_n = Vec2::Zero();  ///< around and along
   Vec2 couple_nmm = Vec2::Zero();    ///< about around and along: a glued body may turn the skin
@@ -92,14 +93,32 @@ class LoadEstimator {
   static constexpr double kTangentialN = 1;
   /// And of a couple, N mm: that force on an arm of a patch's size.
   static constexpr double kCoupleNmm = 10;
+  /// What a contact has to explain, of chi^2.
+  static constexpr double kHillGain = 20;
+  /// Columns of the problem that are one contact: sites or, of a hug, bands.
+  using Hill = HillFinder::Hill;
 
   void SpreadColumns(const Eigen::MatrixXf& at_nodes);
   Eigen::MatrixXd Whitened(const Eigen::MatrixXd& columns) const;
   void Hide(const MarkerObservations& observed);
+  /// The sites that a column of the problem loads, and the share of each: one site, or a band's.
+  template <typename Visit>
+  void ForSites(int column, Visit visit) const {
+    const int sites = mechanics_.site_count(), around = mechanics_.columns();
+    if (column < sites) return visit(column, 1.0);
+    for (int i = 0; i < around; ++i) visit((column - sites) * around + i, 1.0 / around);
+  }
+  bool IsBand(int column) const { return column >= mechanics_.site_count(); }
   void ShareBands(const Eigen::VectorXd& loads, const std::vector<int>& support);
-  std::vector<HillFinder::Hill> Select(const Linearization& skin);
-  void Eliminate(std::vector<HillFinder::Hill>& hills);
-  double Unexplained(const std::vector<HillFinder::Hill>& hills, size_t without);
+  void JoinHugs(std::vector<Hill>& hills);
+  void JoinHug(std::vector<Hill>& hills, const std::vector<size_t>& group);
+  std::vector<Hill> Select(const Linearization& skin);
+  void Eliminate(std::vector<Hill>& hills);
+  struct Explanation {
+    double chi2 = 0;
+    Eigen::VectorXd loads;  // by column, in the hills' order
+  };
+  Explanation Explain(const std::vector<Hill>& hills, size_t without);
 
   struct Solution {
     Eigen::VectorXd loads, tangential, residual;
@@ -107,11 +126,11 @@ class LoadEstimator {
   };
   /// Forces around and along, and couples about both.
   static constexpr Eigen::Index kTangential = 4;
-  Eigen::MatrixXd TangentialColumns(const Linearization& skin, const HillFinder::Hill& hill);
+  Eigen::MatrixXd TangentialColumns(const Linearization& skin, const Hill& hill);
   Eigen::VectorXd TangentialPrior(Eigen::Index columns) const;
-  Solution Refit(const std::vector<int>& sites, const Eigen::MatrixXd& tangential);
-  void LetSlip(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
-               std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution);
+  Solution Refit(const std::vector<int>& chosen, const Eigen::MatrixXd& tangential);
+  void LetSlip(const Linearization& skin, const std::vector<Hill>& hills, std::vector<int>& slipping,
+               Eigen::MatrixXd& tangential, Solution& solution);
   /// What a hill's tangential force would be, and would explain: chi^2.
   struct TangentialGain {
     double chi2 = 0;
@@ -131,9 +150,9 @@ class LoadEstimator {
   Eigen::MatrixXd ShiftColumns(const Linearization& skin, const EstimatedLoad& load) const;
   void MoveCenters(const Linearization& skin, LoadEstimate& estimate) const;
   void ProjectOut(const Eigen::MatrixXd& tangential);
-  void Finish(Linearization& skin, const std::vector<HillFinder::Hill>& hills,
-              const std::vector<int>& slipping, LoadEstimate& estimate);
-  void WriteLoad(const Linearization& skin, const HillFinder::Hill& hill, EstimatedLoad& load) const;
+  void Finish(Linearization& skin, const std::vector<Hill>& hills, const std::vector<int>& slipping,
+              LoadEstimate& estimate);
+  void WriteLoad(const Linearization& skin, EstimatedLoad& load) const;
   void WriteCovariances(const Linearization& skin, LoadEstimate& estimate);
   void WriteStray(Linearization& skin, LoadEstimate& estimate);
   double WorstRegion(const Eigen::VectorXd& residual);

@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "sensing/estimation/load_estimator.h"
 #include "sensing/mechanics/dense.h"
@@ -16,21 +17,24 @@ constexpr double kCenterShare = 0.25;  // of a site's spacing: what the grid of 
 
 }  // namespace
 
-void LoadEstimator::Finish(Linearization& skin, const std::vector<HillFinder::Hill>& hills,
+void LoadEstimator::Finish(Linearization& skin, const std::vector<Hill>& hills,
                            const std::vector<int>& slipping, LoadEstimate& estimate) {
   Eigen::Index at = 0;
   hill_of_load_.clear();
   for (size_t i = 0; i < hills.size(); ++i) {
     EstimatedLoad load;
-    double sum = 0;
-    for (const int site : hills[i]) sum += loads_[site];
-    for (const int site : hills[i]) {
+    for (const int column : hills[i]) {
       const double inward = solution_.loads[at++];
-      load.sites.push_back(site);
-      load.inward_n.push_back(inward);
-      load.shares.push_back(loads_[site] / sum);
+      load.is_hug = IsBand(column);
+      ForSites(column, [&](int site, double share) {
+        load.sites.push_back(site);
+        load.inward_n.push_back(share * inward);
+        load.shares.push_back(loads_[site]);
+      });
       load.normal_force_n += inward;
     }
+    const double sum = std::accumulate(load.shares.begin(), load.shares.end(), 0.0);
+    for (double& share : load.shares) share /= sum;
     const auto slips = std::find(slipping.begin(), slipping.end(), static_cast<int>(i));
     load.has_tangential = slips != slipping.end();
     if (load.has_tangential) {
@@ -40,7 +44,7 @@ void LoadEstimator::Finish(Linearization& skin, const std::vector<HillFinder::Hi
     }
     load.left_out_n = left_out_[i].force_n;
     if (load.normal_force_n <= 0) continue;
-    WriteLoad(skin, hills[i], load);
+    WriteLoad(skin, load);
     estimate.loads.push_back(std::move(load));
     hill_of_load_.push_back(i);
   }
@@ -62,14 +66,13 @@ void LoadEstimator::Conclude(const Linearization& skin, LoadEstimate& estimate) 
   estimate.region_chi2_per_dof = WorstRegion(solution_.residual);
 }
 
-void LoadEstimator::WriteLoad(const Linearization& skin, const HillFinder::Hill& hill,
-                              EstimatedLoad& load) const {
+void LoadEstimator::WriteLoad(const Linearization& skin, EstimatedLoad& load) const {
   const int columns = mechanics_.columns();
   const auto top = std::max_element(load.inward_n.begin(), load.inward_n.end()) - load.inward_n.begin();
-  const int origin = hill[static_cast<size_t>(top)] % columns;
+  const int origin = load.sites[static_cast<size_t>(top)] % columns;
   Vec2 center = Vec2::Zero(), tangential_center = Vec2::Zero();
-  for (size_t k = 0; k < hill.size(); ++k) {
-    const int site = hill[k];
+  for (size_t k = 0; k < load.sites.size(); ++k) {
+    const int site = load.sites[k];
     const int across = (site % columns - origin + columns + columns / 2) % columns - columns / 2;
     const Vec2 from_origin(across, site / columns);
     center += load.inward_n[k] * from_origin;
@@ -165,11 +168,19 @@ void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& es
     const int site = load.sites[static_cast<size_t>(
         std::max_element(load.inward_n.begin(), load.inward_n.end()) - load.inward_n.begin())];
     const Mat3& frame = skin.frames()[static_cast<size_t>(site)];
-    load.force_covariance_n2 = frame * covariance.block<3, 3>(5 * i, 5 * i) * frame.transpose();
-    // Left out because it explains little, not because it is known to be none.
-    const Vec3 left_out = frame.rightCols<2>() * load.left_out_n;
-    load.force_covariance_n2 += left_out * left_out.transpose();
-    load.force_covariance_n2 += kForceShare * kForceShare / 3 * load.force_n.squaredNorm() * Mat3::Identity();
+    if (load.is_hug) {
+      // How much it presses, and pulls along; sideways it may be uneven by as much.
+      load.force_covariance_n2 =
+          Vec3(covariance(5 * i, 5 * i), covariance(5 * i, 5 * i), covariance(5 * i + 2, 5 * i + 2))
+              .asDiagonal();
+    } else {
+      load.force_covariance_n2 = frame * covariance.block<3, 3>(5 * i, 5 * i) * frame.transpose();
+      // Left out because it explains little, not because it is known to be none.
+      const Vec3 left_out = frame.rightCols<2>() * load.left_out_n;
+      load.force_covariance_n2 += left_out * left_out.transpose();
+    }
+    const double size_n = std::max(load.force_n.norm(), load.normal_force_n);
+    load.force_covariance_n2 += kForceShare * kForceShare / 3 * size_n * size_n * Mat3::Identity();
     load.center_covariance = covariance.block<2, 2>(5 * i + 3, 5 * i + 3);
     load.center_covariance.diagonal().array() += kCenterShare * kCenterShare;
   }

@@ -16,11 +16,10 @@ constexpr double kShiftSites = 2;  // standard deviation of where a tangential f
 }  // namespace
 
 // Of a force of 1 N that the hill's sites share as they share the load, around and along, and of couples.
-Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, const HillFinder::Hill& hill) {
-  double sum = 0;
-  for (const int site : hill) sum += loads_[site];
+Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, const Hill& hill) {
   Eigen::VectorXd shares = Eigen::VectorXd::Zero(mechanics_.site_count());
-  for (const int site : hill) shares[site] = loads_[site] / sum;
+  for (const int column : hill) ForSites(column, [&](int site, double) { shares[site] = loads_[site]; });
+  shares /= shares.sum();
   const Eigen::VectorXd spread = mechanics_.spread() * shares;
   Eigen::MatrixXf single = Eigen::MatrixXf::Zero(factor_.rows(), kTangential);
   single.rightCols<2>() = skin.CoupleColumns(spread);
@@ -94,7 +93,7 @@ std::vector<LoadEstimator::TangentialGain> LoadEstimator::TangentialGains(
 
 // One after the other, the hill first whose tangential force explains most; none that explains little: what a
 // shell gets wrong of a solid looks like a tangential force of the normal one's size.
-void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<HillFinder::Hill>& hills,
+void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<Hill>& hills,
                             std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution) {
   std::vector<int> sites;
   for (const auto& hill : hills) sites.insert(sites.end(), hill.begin(), hill.end());

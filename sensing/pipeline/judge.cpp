@@ -114,12 +114,9 @@ int MostLeftOut(const LinkModel& model, const SkinShape& shape) {
   return most;
 }
 
-// A contact beyond the first or the last ring that is seen there, or on it, for of a body there half is
+// A contact beyond the first or the last ring that is seen on a path, or on it, for of a body there half is
 // beyond, or no further inside than its center may be off.
-bool IsBeyondMarkers(const LinkModel& model, const SkinShape& shape, const Contact& contact) {
-  const double angle = std::atan2(contact.center_mm.y(), contact.center_mm.x());
-  const auto path = static_cast<int>(
-      std::lround((angle - model.markers.first_path_angle_rad) / model.markers.path_pitch_rad()));
+bool IsBeyondMarkersOf(const LinkModel& model, const SkinShape& shape, int path, const Contact& contact) {
   int first = 0, last = model.markers.rings() - 1;
   while (first <= last && !IsSeenNear(model, shape, path, first, 1)) ++first;
   while (first < last && !IsSeenNear(model, shape, path, last, 1)) --last;
@@ -130,6 +127,17 @@ bool IsBeyondMarkers(const LinkModel& model, const SkinShape& shape, const Conta
   const double margin_mm = 0.1 * (rings_mm[1] - rings_mm[0]) + sigma_mm, z_mm = contact.center_mm.z();
   return !(z_mm >= rings_mm[static_cast<size_t>(first)] + margin_mm &&
            z_mm <= rings_mm[static_cast<size_t>(last)] - margin_mm);
+}
+
+// Where the contact is, and all around if it is there.
+bool IsBeyondMarkers(const LinkModel& model, const SkinShape& shape, const Contact& contact) {
+  const double angle = std::atan2(contact.center_mm.y(), contact.center_mm.x());
+  const auto path = static_cast<int>(
+      std::lround((angle - model.markers.first_path_angle_rad) / model.markers.path_pitch_rad()));
+  for (int beside = 0; beside < (contact.is_hug ? model.markers.paths : 1); ++beside) {
+    if (IsBeyondMarkersOf(model, shape, path + beside, contact)) return true;
+  }
+  return false;
 }
 
 bool IsEncircled(const std::vector<Contact>& contacts, double belt_mm) {

@@ -86,7 +86,8 @@ void AddSigmas(const SolidScene& scene, const std::vector<Contact>& found, Score
       if ((f.center_mm - c.center_mm).norm() > 10 || !f.force_covariance_n2) continue;
       ++score.forces;
       const Vec3 off = f.force_n - c.force_n;
-      score.ratios.push_back(f.force_n.dot(c.force_n) / c.force_n.squaredNorm());
+      if (c.force_n.norm() > 0.5 * c.normal_force_n)
+        score.ratios.push_back(f.force_n.dot(c.force_n) / c.force_n.squaredNorm());
       score.within_2_sigma += off.norm() < 2 * std::sqrt(f.force_covariance_n2->trace());
     }
   }
@@ -163,6 +164,31 @@ INSTANTIATE_TEST_SUITE_P(Markers, Solids,
                                            Expected{{"100 Pa", 0.1, 0, 100}, 0.95, 0.03},
                                            Expected{{"wrong", 0.1, 0, 0, 3}, 0.8, 0.07, 0.2, 2.5}),
                          [](const auto& at) { return "Case" + std::to_string(at.index); });
+
+// What presses alike all around is one contact without a resultant.
+TEST(SolidsTest, AHugIsOneContact) {
+  const LinkModel model = SolidSkin();
+  StateEstimator estimator(model, {});
+  int hugs = 0;
+  for (const SolidScene& scene : ReadSolidScenes()) {
+    if (scene.contacts.size() != 1) continue;
+    const SolidContact& truth = scene.contacts.front();
+    if (truth.force_n.norm() > 0.01 * truth.normal_force_n) continue;
+    ++hugs;
+    for (const How& how : {How{"exact"}, How{"hug", 0.1}}) {
+      SCOPED_TRACE(scene.name + " " + how.name);
+      const Shown shown = Show(scene, how);
+      const LinkState state = SolveMarkers(model, estimator, shown.pressure, shown.shape);
+      ASSERT_EQ(state.contacts.size(), 1u);
+      const Contact& contact = state.contacts.front();
+      EXPECT_TRUE(contact.is_hug);
+      EXPECT_NEAR(contact.normal_force_n, truth.normal_force_n, 0.12 * truth.normal_force_n);
+      EXPECT_LT(contact.force_n.norm(), 0.05 * truth.normal_force_n);
+      EXPECT_LT((contact.center_mm - truth.center_mm).norm(), 4);
+    }
+  }
+  EXPECT_GE(hugs, 6);
+}
 
 // Whatever was shown before, the same markers give the same forces: scenes in random order, every third with
 // most of its markers gone, against an estimator that knows nothing.
