@@ -18,7 +18,7 @@ void ContactFinder::Find(SkinEstimator& estimator, const SkinEstimate& estimate,
   contacts.clear();
   ContactWriter writer(estimator, estimate);
   for (const EstimatedLoad& load : estimate.loads.loads) {
-    if (load.normal_force_n < min_force_n_) continue;
+    if (std::max(load.normal_force_n, load.force_n.norm()) < min_force_n_) continue;
     writer.Write(load, contacts.emplace_back());
   }
   std::sort(contacts.begin(), contacts.end(),

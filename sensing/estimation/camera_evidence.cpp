@@ -130,7 +130,7 @@ void CameraEvidence::Observe(const LabelledMarkers& markers) {
     if (!o.seen) continue;
     o.pixel = seen.center_px - o.residual;
     const double drift2 =
-        options_.residual_drift * options_.residual_drift * (o.projected - o.rest_px).squaredNorm();
+        options_.residual_drift * options_.residual_drift * (o.pixel - o.rest_px).squaredNorm();
     o.covariance = seen.covariance_px2 + o.residual_covariance + camera + drift2 * Mat2::Identity();
     o.weight = o.covariance.inverse();
   }

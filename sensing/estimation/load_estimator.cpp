@@ -227,6 +227,7 @@ std::vector<LoadEstimator::Hill> LoadEstimator::Select(const Linearization& skin
     chosen.clear();
     found = &solver_.Solve(*frame_gram_, target_ - weights_, chosen);
   }
+  is_selected_ = solver_.converged();
   ShareBands(*found, chosen);
   for (int pass = 0; pass < kReweightings && !chosen.empty(); ++pass) {
     Eigen::VectorXd near = Eigen::VectorXd::Zero(norms_.size());
@@ -237,8 +238,9 @@ std::vector<LoadEstimator::Hill> LoadEstimator::Select(const Linearization& skin
       near[band] = near.segment((band - sites) * around, around).mean();
     weights_ = sparsity.array() / (1 + near.array() / (kHillN * unit));
     ShareBands(solver_.Solve(*frame_gram_, target_ - weights_, chosen), chosen);
+    is_selected_ = is_selected_ && solver_.converged();
   }
-  if (!solver_.converged()) chosen.clear();
+  if (!is_selected_) chosen.clear();
   std::vector<int> support;
   for (int site = 0; site < sites; ++site) {
     if (loads_[site] > 0) support.push_back(site);
@@ -334,6 +336,7 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& chosen,
   Solution solution;
   std::vector<int> support;
   solution.loads = solver_.Solve(h, b, support);
+  solution.converged = solver_.converged();
   solution.residual = data - normal * solution.loads;
   if (tangential.cols() > 0) {
     solution.tangential = inner.solve(tangential.transpose() * solution.residual);
@@ -359,13 +362,20 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
   // With tangential forces in, the selection is made once more with these taken as unknown.
   for (int stage = 0; stage < 2; ++stage) {
     ProjectOut(tangential);
-    hills = Select(skin);
-    estimate.converged = solver_.converged() && hills.size() <= kMostHills;
+    const Eigen::VectorXd loads_before = loads_;
+    std::vector<Hill> found = Select(skin);
+    estimate.converged = is_selected_ && found.size() <= kMostHills;
     if (!estimate.converged) return;
-    Eliminate(hills);
-    JoinHugs(hills);
+    Eliminate(found);
+    JoinHugs(found);
+    if (found.empty() && stage > 0) {
+      // Bodies that hardly press, but drag: what is left beside their pull does not tell where they are.
+      loads_ = loads_before;
+      break;
+    }
+    hills = std::move(found);
     if (hills.empty()) {
-      solution_ = {.loads = {}, .tangential = {}, .residual = data_, .chi2 = 0};
+      solution_ = {.loads = {}, .tangential = {}, .residual = data_, .chi2 = 0, .converged = true};
       if (hidden_.cols() > 0) solution_.residual -= hidden_ * (hidden_.transpose() * data_);
       solution_.chi2 = solution_.residual.squaredNorm();
       break;
@@ -373,7 +383,8 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
     LetSlip(skin, hills, slipping, tangential, solution_);
     if (slipping.empty()) break;
   }
-  if (hills.empty()) slipping.clear();
+  estimate.converged = solution_.converged;
+  if (!estimate.converged) return;
   Finish(skin, hills, slipping, estimate);
 }
 

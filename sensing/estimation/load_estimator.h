@@ -123,6 +123,7 @@ class LoadEstimator {
   struct Solution {
     Eigen::VectorXd loads, tangential, residual;
     double chi2 = 0;
+    bool converged = true;
   };
   /// Forces around and along, and couples about both.
   static constexpr Eigen::Index kTangential = 4;
@@ -188,6 +189,7 @@ class LoadEstimator {
   bool is_hidden_projected_ = false;             // free_gram_ is without hidden_ alone
   const Eigen::MatrixXf* frame_gram_ = nullptr;  // gram_, where nothing is hidden
   Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
+  bool is_selected_ = false;    // by a solver that came to its end
   std::vector<char> is_shown_;  // by row
   std::vector<int> chosen_;     // loads above zero of the last selection
   Solution solution_;

@@ -11,7 +11,8 @@ namespace taclink {
 namespace {
 
 constexpr double kStillTangential =
-    0.15;                              // of a normal force: what a contact without a tangential one may have
+    0.15;  // of a normal force: what a contact without a tangential one may have
+constexpr double kHardlyN = 1e-6;
 constexpr double kForceShare = 0.04;   // of a force: what the model gets wrong of it
 constexpr double kCenterShare = 0.25;  // of a site's spacing: what the grid of loads makes of a center
 
@@ -43,7 +44,12 @@ void LoadEstimator::Finish(Linearization& skin, const std::vector<Hill>& hills,
       load.couple_nmm = solution_.tangential.segment<2>(first + 2);
     }
     load.left_out_n = left_out_[i].force_n;
-    if (load.normal_force_n <= 0) continue;
+    if (load.normal_force_n <= 0) {
+      if (!load.has_tangential) continue;
+      // It drags and does not press, but where it is it is.
+      load.normal_force_n = kHardlyN * mechanics_.force_unit();
+      for (size_t k = 0; k < load.sites.size(); ++k) load.inward_n[k] = load.normal_force_n * load.shares[k];
+    }
     WriteLoad(skin, load);
     estimate.loads.push_back(std::move(load));
     hill_of_load_.push_back(i);

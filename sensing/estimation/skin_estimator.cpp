@@ -91,16 +91,6 @@ bool SkinEstimator::IsFirstOrder() const {
   return options_.model == ForceModel::kLinear || options_.model == ForceModel::kPressurised;
 }
 
-bool SkinEstimator::IsPossible(const SkinEstimate& estimate) const {
-  if (!estimate.displacements_mm.allFinite()) return false;
-  const LinkModel& model = mechanics_.model();
-  for (int m = 0; m < mechanics_.marker_count(); ++m) {
-    const Vec3 rest = model.RestMarker(m), at = rest + estimate.displacements_mm.segment<3>(3 * m);
-    if (at.head<2>().norm() > 2 * rest.head<2>().norm()) return false;
-  }
-  return true;
-}
-
 // The farthest that a seen marker is from its place in a state, mm.
 double SkinEstimator::FurthestOff(const ShellState& state, const MarkerObservations& observed) {
   mechanics_.markers().Displacements(state, markers_mm_);
@@ -331,9 +321,17 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   // A marker that is somewhere else must not cost the frame.
   for (const double most : {kSurelyIsolated, kPerhapsIsolated}) {
     if (is_solved && estimate.unsettled_mm == 0) break;
+    SkinProblem without = problem;
     const int hidden = HideIsolated(mechanics_.model(), inflated->markers_mm, most, mechanics_.length_unit(),
-                                    problem.observed);
-    if (hidden > 0) is_solved = Solve(problem, estimate);
+                                    without.observed);
+    if (hidden == 0) continue;
+    const bool was_solved = is_solved;
+    is_solved = Solve(without, estimate);
+    if (was_solved && !is_solved) {
+      is_solved = Solve(problem, estimate);
+      break;
+    }
+    problem.observed = without.observed;
   }
   if (!is_solved) {
     Forget();

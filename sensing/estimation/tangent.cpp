@@ -43,7 +43,8 @@ bool Tangent::IsGoodFor(const SkinProblem& problem, const ShellState& state) con
 bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local) {
   const bool is_kept = is_prepared && IsNear(state);
   local_n = local;
-  is_prepared = (is_kept || skin.At(state, problem.pressure_mpa)) &&
+  // The model's errors are those at `state`, whichever state the last step was from.
+  is_prepared = (is_kept ? skin.Rebase(state, problem.pressure_mpa) : skin.At(state, problem.pressure_mpa)) &&
                 loads.Prepare(skin, problem.inflated, problem.observed, problem.prior, local);
   return is_prepared;
 }
