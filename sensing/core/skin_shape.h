@@ -31,7 +31,7 @@ struct RejectedMarker {
 /// Where the markers' centres are. All by marker index (see LinkModel); link frame, mm.
 struct SkinShape {
   std::vector<Vec3> positions_mm;
-  std::vector<Vec3> displacements_mm;  ///< from the baseline, the shape at rest without pressure
+  std::vector<Vec3> displacements_mm;  ///< from the baseline, the shape in the baseline
   /// Of the displacements, errors of the rest pictures included. Those of the positions, if the markers are
   /// where the model has them. Errors of neighbours are alike: not for use as independent data.
   std::vector<Mat3> covariances_mm2;

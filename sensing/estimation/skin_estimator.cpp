@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "sensing/estimation/isolated_markers.h"
-
 namespace taclink {
 namespace {
 
@@ -14,14 +12,11 @@ constexpr double kSettledMm = 0.02;  // of the next step
 constexpr double kTangentErrorPerMm =
     0.2;                                  // share of a step that a tangent gets wrong, by how far it is from
 constexpr double kNearlySettledMm = 0.3;  // of the last step, when they run out
-constexpr double kLongestStepMm = 5, kUnlimitedMm = 1e9;
-constexpr double kStillReachMm = 0.4;    // from the inflated skin: its tangent is good enough
-constexpr double kTouchedReachMm = 2.5;  // likewise from where the touched one was made
-constexpr double kAssimilateMm = 2.5;    // farther off, a marker is pulled to its place first
+constexpr double kUnlimitedMm = 1e9;
+constexpr double kTouchedReachMm = 2.5;  // from where the touched skin's tangent was made: it is good enough
 constexpr int kFramesAhead = 2;          // that making a tangent may take
 constexpr double kAheadShare = 0.75;     // of a tangent's reach: so far ahead of a moving contact it is made
 constexpr double kModelPressureShare = 0.01;  // of the pressure: what the model's inflation is wrong by
-constexpr double kNoiseDeviations = 2;        // of a spring's pull, that noise alone makes
 constexpr double kLeastPressureSigma =
     1e-3;  // of the steps in which the skin is inflated: a prior is no certainty
 constexpr int kMostSteps = 8, kMostTangents = 3;
@@ -76,6 +71,7 @@ void SkinEstimator::Restart() {
 }
 void SkinEstimator::BeginAgain() {
   past_ = past_before_;
+  is_same_frame_ = true;
 }
 void SkinEstimator::Forget() {
   past_.has_last = past_.has_next = false;
@@ -91,21 +87,6 @@ bool SkinEstimator::IsFirstOrder() const {
   return options_.model == ForceModel::kLinear || options_.model == ForceModel::kPressurised;
 }
 
-// The farthest that a seen marker is from its place in a state, mm.
-double SkinEstimator::FurthestOff(const ShellState& state, const MarkerObservations& observed) {
-  mechanics_.markers().Displacements(state, markers_mm_);
-  double furthest = 0;
-  for (size_t m = 0; m < observed.information.size(); ++m) {
-    // One camera tells two directions.
-    const Mat3& information = observed.information[m];
-    const double most = information.trace();
-    if (!(most > 0)) continue;
-    const Vec3 off = markers_mm_.segment<3>(3 * static_cast<Eigen::Index>(m)) - observed.displacement_mm[m];
-    furthest = std::max(furthest, std::sqrt(off.dot(information * off) * 3 / most));
-  }
-  return furthest;
-}
-
 // The farthest that a seen marker has moved since the last call, mm.
 double SkinEstimator::SeenMotion(const ShellState& state, const MarkerObservations& observed) {
   markers_before_mm_.swap(markers_mm_);
@@ -118,42 +99,6 @@ double SkinEstimator::SeenMotion(const ShellState& state, const MarkerObservatio
       furthest = std::max(furthest, (markers_mm_ - markers_before_mm_).segment<3>(at).norm());
   }
   return furthest;
-}
-
-// A state near the markers: the inflated skin, the last frame's, or where springs pull either.
-bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n) {
-  const double unit = mechanics_.length_unit();
-  estimate.state = problem.inflated.state;
-  double off_mm = FurthestOff(estimate.state, problem.observed);
-  const auto consider = [&](bool is_there, const ShellState& state) {
-    if (!is_there || off_mm < kStillReachMm * unit) return;
-    const double mm = FurthestOff(state, problem.observed);
-    if (mm >= off_mm) return;
-    off_mm = mm;
-    estimate.state = state;
-  };
-  consider(past_.has_last, past_.last);
-  consider(past_.has_next, past_.next);
-  local_n.resize(0);
-  if (off_mm < kAssimilateMm * unit) return true;
-  Eigen::VectorXd pulls;
-  AssimilationSummary done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
-  if (!done.converged && past_.has_last) {
-    estimate.state = problem.inflated.state;
-    done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
-  }
-  estimate.assimilation_steps = done.iterations;
-  const int markers = mechanics_.marker_count();
-  Eigen::VectorXd sizes(markers);
-  for (int m = 0; m < markers; ++m) {
-    const double trace = problem.observed.information[static_cast<size_t>(m)].trace();
-    const double noise = trace > 0 ? 3 * kNoiseDeviations / std::sqrt(trace / 3) : 0;
-    sizes[m] = std::max(0.0, pulls.segment<3>(3 * m).norm() - noise);
-  }
-  local_n = touched_->loads.covariance().LocalOfMarkers(sizes);
-  start_ = estimate.state;
-  // What springs could not settle may still be near enough for the steps to come.
-  return FurthestOff(estimate.state, problem.observed) < kLongestStepMm * unit;
 }
 
 bool SkinEstimator::Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
@@ -176,22 +121,23 @@ void SkinEstimator::TakeNext(const SkinProblem& problem, const ShellState& state
     std::swap(touched_, maker_->spare());
 }
 
-// After a frame with loads, while the past is still the frame before: begins with the tangent that
-// will be asked for when it is due, if the motion goes on.
+// After a frame with loads: begins with the tangent that will be asked for when it is due, if the motion goes
+// on.
 void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate,
                               const Eigen::VectorXd& local_n) {
   if (maker_->is_begun()) {
     ++frames_since_begun_;
     return;
   }
-  if (!past_.has_last) return;
+  const Past& before = past_before_;
+  if (!before.has_last) return;
   ahead_ = estimate.state;
-  const double moved_mm = LongestOff(past_.last.mids_mm, ahead_.mids_mm);
+  const double moved_mm = LongestOff(before.last.mids_mm, ahead_.mids_mm);
   const double share =
       std::min<double>(kFramesAhead, kAheadShare * touched_->reach_mm / std::max(moved_mm, 1e-9));
-  Extrapolate(past_.last, share, ahead_);
+  Extrapolate(before.last, share, ahead_);
   const Eigen::VectorXd ahead_n =
-      (local_n + share * (local_n - local_before_n_)).cwiseMax(0.5 * local_n).cwiseMin(2 * local_n);
+      (local_n + share * (local_n - before.local_n)).cwiseMax(0.5 * local_n).cwiseMin(2 * local_n);
   const auto is_good = [&](const Tangent& tangent) {
     return tangent.IsGoodFor(problem, ahead_) && tangent.HasLocal(ahead_n);
   };
@@ -288,9 +234,10 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
 }
 
 void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& estimate) {
-  if (past_.has_last)
+  const bool is_new_frame = !std::exchange(is_same_frame_, false);
+  if (is_new_frame && past_.has_last)
     past_before_ = past_;
-  else
+  else if (is_new_frame)
     past_before_.has_last = past_before_.has_next = false;
   estimate.failure = EstimateFailure::kNoEquilibrium;
   estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
@@ -317,22 +264,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
 
   estimate.failure = EstimateFailure::kNotConverged;
   SkinProblem problem = MakeProblem(observation, *inflated, std::move(prior), estimate.baseline_mm);
-  bool is_solved = Solve(problem, estimate);
-  // A marker that is somewhere else must not cost the frame.
-  for (const double most : {kSurelyIsolated, kPerhapsIsolated}) {
-    if (is_solved && estimate.unsettled_mm == 0) break;
-    SkinProblem without = problem;
-    const int hidden = HideIsolated(mechanics_.model(), inflated->markers_mm, most, mechanics_.length_unit(),
-                                    without.observed);
-    if (hidden == 0) continue;
-    const bool was_solved = is_solved;
-    is_solved = Solve(without, estimate);
-    if (was_solved && !is_solved) {
-      is_solved = Solve(problem, estimate);
-      break;
-    }
-    problem.observed = without.observed;
-  }
+  const bool is_solved = SolveWithoutIsolated(problem, estimate);
   if (!is_solved) {
     Forget();
     estimate.state = start_;
@@ -355,15 +287,15 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
     return;
   }
   const Eigen::VectorXd local_n = used_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
-  if (maker_) MakeAhead(problem, estimate, local_n);
-  past_.has_next = past_.has_last;
+  if (maker_ && is_new_frame) MakeAhead(problem, estimate, local_n);
+  past_.has_next = past_before_.has_last;
   if (past_.has_next) {
     past_.next = estimate.state;
-    Extrapolate(past_.last, 1, past_.next);
+    Extrapolate(past_before_.last, 1, past_.next);
   }
   past_.last = estimate.state;
   past_.has_last = true;
-  local_before_n_ = local_n;
+  past_.local_n = local_n;
 }
 
 SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,

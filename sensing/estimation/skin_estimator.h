@@ -76,7 +76,9 @@ class SkinEstimator {
   void Estimate(const SkinObservation& observation, SkinEstimate& estimate);
   /// Forgets the frames before.
   void Restart();
-  /// The next call is of the same frame, without markers that were wrong: it begins from where the last call
+  /// The next call is of the same frame, looked at more closely: it begins from the last call's answer.
+  void Continue() { is_same_frame_ = true; }
+  /// The next call is of the same frame, without markers that were wrong: it begins from where the frame
   /// began, for a kink that a wrong marker has made may be an equilibrium without it.
   void BeginAgain();
 
@@ -86,6 +88,9 @@ class SkinEstimator {
   const LoadEstimator& loads() const;
 
  private:
+  /// In length units: from the inflated skin, whose tangent is good enough there; and of a step.
+  static constexpr double kStillReachMm = 0.4, kLongestStepMm = 5;
+
   void Forget();
   bool IsStill(const SkinObservation& observation, const InflatedSkin& inflated, const PressurePrior& prior,
                SkinEstimate& estimate);
@@ -103,6 +108,7 @@ class SkinEstimator {
   SkinProblem MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
                           PressurePrior prior, const Eigen::VectorXd& baseline_mm) const;
   bool Solve(const SkinProblem& problem, SkinEstimate& estimate);
+  bool SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& estimate);
   bool IsPossible(const SkinEstimate& estimate) const;
   /// One step from the slack or the inflated skin, whatever is asked of it.
   bool IsFirstOrder() const;
@@ -115,15 +121,16 @@ class SkinEstimator {
   Tangent* used_ = nullptr;
   std::unique_ptr<TangentMaker> maker_;  // of the touched skin's next one; null: first order asks for none
   ShellState ahead_;                     // where that one is thought to be asked for
-  Eigen::VectorXd local_before_n_;       // of the frame before
   int frames_since_begun_ = 0;           // by the next frame with loads
   ShellState start_;                     // that this frame's loads were sought from
   // Where a frame may begin: the state of the frame before and, after two, where their motion leads to.
   struct Past {
     bool has_last = false, has_next = false;
     ShellState last, next;
+    Eigen::VectorXd local_n;  // of `last`
   };
-  Past past_, past_before_;  // past_before_: when the last call began
+  Past past_, past_before_;  // past_before_: when the frame began
+  bool is_same_frame_ = false;
   Eigen::VectorXd markers_mm_, markers_before_mm_;
   Eigen::VectorXd radial_pull_, radial_weight_;  // of the frame in work
 };

@@ -8,25 +8,28 @@ namespace {
 
 // Below what any load has to explain (kHillGain of LoadEstimator): 3 x 3 markers show two thirds of a load.
 constexpr double kStillMarkerChi2 = 20, kStillSumChi2 = 12;
+// Of all numbers: what moves all markers alike, as cameras that have moved do, hides in each of them.
+constexpr double kStillChi2PerDof = 1.5;
 
 }  // namespace
 
 // The markers are where the skin without loads has them, but for the cameras' noise: each by itself, over
-// each 3 x 3 of them, and over each ring, radially. A load that explains less than that would not be let in
-// (kHillGain of LoadEstimator), so nothing has to be solved. True: the estimate is complete. Allocates
-// nothing.
+// each 3 x 3 of them, over each ring, radially, and all together. A load that explains less than that would
+// not be let in (kHillGain of LoadEstimator), so nothing has to be solved. True: the estimate is complete.
+// The tangent is made where there is none, for the shape's covariance. Else nothing is allocated.
 bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSkin& inflated,
                             const PressurePrior& prior, SkinEstimate& estimate) {
-  Tangent& tangent = *still_;
-  if (options_.model == ForceModel::kLinear || !tangent.is_prepared || !tangent.IsNear(inflated.state) ||
-      !tangent.loads.IsPreparedFor(observation.markers, prior))
-    return false;
-  double told = 1 / (prior.sigma_mpa * prior.sigma_mpa), off = 0;
+  if (options_.model == ForceModel::kLinear) return false;
+  double told = 1 / (prior.sigma_mpa * prior.sigma_mpa), off = 0, chi2 = 0;
+  int seen = 0;
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const Mat3& information = observation.markers.information[static_cast<size_t>(m)];
     const Vec3 error = observation.markers.displacement_mm[static_cast<size_t>(m)] +
                        estimate.baseline_mm.segment<3>(3 * m) - inflated.markers_mm.segment<3>(3 * m);
-    if (!(error.dot(information * error) <= kStillMarkerChi2)) return false;
+    const double marker_chi2 = error.dot(information * error);
+    if (!(marker_chi2 <= kStillMarkerChi2)) return false;
+    chi2 += marker_chi2;
+    seen += information.trace() > 0 ? 1 : 0;
     const auto node = static_cast<size_t>(mechanics_.markers().node(m));
     const Vec3 weighed = information * mechanics_.mesh().normals[node];
     radial_pull_[m] = weighed.dot(error);
@@ -35,11 +38,20 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSk
     told += by.dot(inflated.markers_mm_per_mpa.segment<3>(3 * m));
     off += by.dot(error);
   }
-  if (!AreNeighborsStill()) return false;
+  const double chi2_per_dof = (chi2 - off * off / told) / std::max(1, 3 * seen);
+  if (chi2_per_dof > kStillChi2PerDof || !AreNeighborsStill()) return false;
+  Tangent& tangent = *still_;
+  if (!tangent.is_prepared || !tangent.IsNear(inflated.state) ||
+      !tangent.loads.IsPreparedFor(observation.markers, prior)) {
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
+    const SkinProblem problem = MakeProblem(observation, inflated, prior, estimate.baseline_mm);
+    if (!Remake(tangent, problem, inflated.state, none, estimate)) return false;
+  }
   used_ = &tangent;
   Forget();
   estimate.loads.loads.clear();
-  estimate.loads.chi2_per_dof = estimate.loads.region_chi2_per_dof = estimate.loads.camera_shift_mm = 0;
+  estimate.loads.chi2_per_dof = chi2_per_dof;
+  estimate.loads.region_chi2_per_dof = estimate.loads.camera_shift_mm = 0;
   estimate.loads.converged = true;
   estimate.loads.pressure_error_mpa = off / told;
   estimate.loads.baseline_error_mpa = 0;

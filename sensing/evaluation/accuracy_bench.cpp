@@ -88,7 +88,8 @@ class Player {
     seed_ = MixBits(seed_);
     MakeShape(model_, stage, outcome_.noise_mm, seed_, shape_);
     const int64_t start = ThreadCpuClock().MonotonicNs();
-    estimator_->Estimate(PressuresOf(*path_), finder_, shape_, forces_, contacts_);
+    estimator_->Estimate(PressuresOf(*path_), shape_, forces_);
+    estimator_->FindContacts(finder_, shape_, forces_, contacts_);
     if (times) times->push_back(static_cast<float>(1e3 * SecondsSince(start)));
     ++outcome_.frames;
     outcome_.not_converged += forces_.converged ? 0 : 1;
@@ -129,7 +130,8 @@ double MemoryOf(const LinkModel& model, const AccuracyMethod& method, const std:
     for (const PathTruth& path : truths) {
       if (path.stages.empty() || ++shown > 3) continue;
       MakeShape(model, path.stages.back(), 0.05, 1, shape);
-      estimator->Estimate(PressuresOf(path), finder, shape, forces, contacts);
+      estimator->Estimate(PressuresOf(path), shape, forces);
+      estimator->FindContacts(finder, shape, forces, contacts);
     }
     return estimator;
   });

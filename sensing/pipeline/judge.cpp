@@ -295,6 +295,9 @@ void Judge(const Evidence& evidence, LinkState& state) {
     AddShapeReasons(evidence, state);
     AddSightReasons(evidence, state);
   }
+  if (!lost)
+    std::stable_partition(state.reasons.begin(), state.reasons.end(),
+                          [](const Reason& reason) { return IsGrave(reason.id); });
   const bool grave = std::any_of(state.reasons.begin(), state.reasons.end(),
                                  [](const Reason& reason) { return IsGrave(reason.id); });
   state.status = lost ? LinkStatus::kLost : state.reasons.empty() ? LinkStatus::kOk : LinkStatus::kDegraded;
@@ -305,6 +308,9 @@ void Judge(const Evidence& evidence, LinkState& state) {
     // Forces that can't be trusted are not shown; the measured shape is.
     state.contacts.clear();
     state.total_force_n.setZero();
+    std::fill(state.forces.forces_n.begin(), state.forces.forces_n.end(), Vec3::Zero());
+    std::fill(state.forces.sigmas_n.begin(), state.forces.sigmas_n.end(), 0);
+    state.forces.loaded.clear();
   }
 }
 

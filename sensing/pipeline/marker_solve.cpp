@@ -42,10 +42,13 @@ LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, const 
   ContactFinder finder(model);
   const SkinEstimate& estimate = estimator.estimate();
   for (int pass = 0; pass < kMostPasses; ++pass) {
-    estimator.Estimate(pressure, finder, state.shape, state.forces, state.contacts);
-    if (estimate.failure != EstimateFailure::kNone || !LeaveOutliersOut(state.shape)) break;
+    estimator.Estimate(pressure, state.shape, state.forces);
+    // Of the last pass nothing is left out, for it is in the answer.
+    const bool is_last = pass + 1 == kMostPasses;
+    if (estimate.failure != EstimateFailure::kNone || is_last || !LeaveOutliersOut(state.shape)) break;
     estimator.skin().BeginAgain();
   }
+  estimator.FindContacts(finder, state.shape, state.forces, state.contacts);
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   if (state.forces.converged)
     state.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};

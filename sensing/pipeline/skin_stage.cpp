@@ -73,7 +73,7 @@ void SkinStage::Run(const LabelledMarkers& markers, const std::optional<Pressure
       told.mpa = estimator.PressureFromShape(observed_, {told, baseline_pressure_});
       told.sigma_mpa = kFromShapeMpa + kFromShapeShare * std::abs(told.mpa);
     }
-    estimator.Estimate({told, baseline_pressure_}, finder, shape, state.forces, state.contacts);
+    estimator.Estimate({told, baseline_pressure_}, shape, state.forces);
     const SkinEstimate& estimate = estimator.estimate();
     if (estimate.failure != EstimateFailure::kNone) {
       about_mm_ = estimate.has_shape ? estimate.displacements_mm : baseline_mm_;
@@ -92,11 +92,16 @@ void SkinStage::Run(const LabelledMarkers& markers, const std::optional<Pressure
         moved_mm = std::max(moved_mm, (now - about_mm_).segment<3>(at).norm());
     }
     about_mm_ = now;
+    if (pass + 1 == kMostPasses) break;  // what is in the answer is not left out any more
     const bool reconsidered = evidence_.Reconsider(now, model_covariances_);
-    if (reconsidered) estimator.skin().BeginAgain();
     const bool looks_otherwise = evidence_.UpdateLooks(now) > kSameLookMm * length_unit_;
     if (!reconsidered && !looks_otherwise && moved_mm < kSamePlaceMm * length_unit_) break;
+    if (reconsidered)
+      estimator.skin().BeginAgain();
+    else
+      estimator.skin().Continue();
   }
+  estimator.FindContacts(finder, shape, state.forces, state.contacts);
   shape.rejected.clear();
   for (size_t m = 0; m < count; ++m) {
     shape.covariances_mm2[m] += doubt_.Of(m, shape.displacements_mm[m]);

@@ -110,8 +110,7 @@ void StateEstimator::WriteForces(NodalForces& forces) {
   }
 }
 
-void StateEstimator::Estimate(const PressurePair& pressure, ContactFinder& finder, SkinShape& shape,
-                              NodalForces& forces, std::vector<Contact>& contacts) {
+void StateEstimator::Estimate(const PressurePair& pressure, SkinShape& shape, NodalForces& forces) {
   const size_t markers = rest_mm_.size();
   observation_.markers.displacement_mm.resize(markers);
   observation_.markers.information.resize(markers);
@@ -128,19 +127,22 @@ void StateEstimator::Estimate(const PressurePair& pressure, ContactFinder& finde
   shape.displacements_mm.resize(markers);
   shape.covariances_mm2.resize(markers);
   WriteShape(shape);
-  if (thesis_) {
-    Eigen::VectorXd moved(3 * static_cast<Eigen::Index>(markers));
-    for (size_t m = 0; m < markers; ++m)
-      moved.segment<3>(3 * static_cast<Eigen::Index>(m)) = shape.displacements_mm[m];
-    thesis_->Estimate(moved, pressure.now.mpa - pressure.baseline.mpa, forces);
-    finder.FindIslands(shape.positions_mm, forces, contacts);
-    return;
-  }
-  WriteForces(forces);
-  if (forces.converged)
-    finder.Find(skin_, estimate_, contacts);
-  else
+  if (!thesis_) return WriteForces(forces);
+  Eigen::VectorXd moved(3 * static_cast<Eigen::Index>(markers));
+  for (size_t m = 0; m < markers; ++m)
+    moved.segment<3>(3 * static_cast<Eigen::Index>(m)) = shape.displacements_mm[m];
+  thesis_->Estimate(moved, pressure.now.mpa - pressure.baseline.mpa, forces);
+  forces.converged = estimate_.failure == EstimateFailure::kNone;  // or the shape is none
+}
+
+void StateEstimator::FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,
+                                  std::vector<Contact>& contacts) {
+  if (!forces.converged)
     contacts.clear();
+  else if (thesis_)
+    finder.FindIslands(shape.positions_mm, forces, contacts);
+  else
+    finder.Find(skin_, estimate_, contacts);
 }
 
 std::unique_ptr<StateEstimator> MakeStateEstimator(const LinkModel& model, const ForceOptions& options) {

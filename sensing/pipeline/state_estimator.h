@@ -35,9 +35,13 @@ class StateEstimator {
 
   /// Uses `shape`'s measured displacements, from the baseline, and its sources; sets the rest of it, where it
   /// can. Where it can't, the forces are not converged, and the shape is what is measured: what was not stays
-  /// at the inflated skin's, with a covariance that says so. `finder` gives contacts their ids.
-  void Estimate(const PressurePair& pressure, ContactFinder& finder, SkinShape& shape, NodalForces& forces,
-                std::vector<Contact>& contacts);
+  /// at the inflated skin's, with a covariance that says so. A frame may be looked at several times
+  /// (SkinEstimator::Continue, BeginAgain).
+  void Estimate(const PressurePair& pressure, SkinShape& shape, NodalForces& forces);
+  /// The contacts of what was estimated last, none where there is no answer. Once a frame, for `finder` gives
+  /// them the ids of those of the call before.
+  void FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,
+                    std::vector<Contact>& contacts);
   /// Forgets the frames before.
   void Restart() { skin_.Restart(); }
 
@@ -63,7 +67,7 @@ class StateEstimator {
   SkinEstimate estimate_;
 };
 
-/// Takes a moment: inflates the skin and factorises its stiffness.
+/// Takes a moment: builds the shell's meshes.
 std::unique_ptr<StateEstimator> MakeStateEstimator(const LinkModel& model, const ForceOptions& options);
 
 }  // namespace taclink

@@ -90,13 +90,17 @@ void Estimation(benchmark::State& state) {
   std::vector<Contact> contacts;
   const PressurePair pressure{.now = {kPressureMpa, PressureSigma(PressureOrigin::kSimulated)},
                               .baseline = {}};
-  for (SkinShape& frame : frames) estimator.Estimate(pressure, finder, frame, forces, contacts);
+  const auto estimate = [&](SkinShape& frame) {
+    estimator.Estimate(pressure, frame, forces);
+    estimator.FindContacts(finder, frame, forces, contacts);
+  };
+  for (SkinShape& frame : frames) estimate(frame);
   size_t next = 0;
   int unsolved = 0;
   double tangents = 0, steps = 0;
   for (auto _ : state) {
     if (motion == kCold) estimator.Restart();
-    estimator.Estimate(pressure, finder, frames[next++ % frames.size()], forces, contacts);
+    estimate(frames[next++ % frames.size()]);
     unsolved += forces.converged ? 0 : 1;
     tangents += estimator.estimate().tangents;
     steps += estimator.estimate().steps;
@@ -134,7 +138,9 @@ void LiveEstimation(benchmark::State& state) {
     for (due += kPeriod; Clock::now() < due;) {
     }
     const Clock::time_point begin = Clock::now();
-    estimator.Estimate(pressure, finder, frames[next++ % frames.size()], forces, contacts);
+    SkinShape& frame = frames[next++ % frames.size()];
+    estimator.Estimate(pressure, frame, forces);
+    estimator.FindContacts(finder, frame, forces, contacts);
     return std::chrono::duration<double>(Clock::now() - begin).count();
   };
   for (size_t i = 0; i < frames.size(); ++i) take();

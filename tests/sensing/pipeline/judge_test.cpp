@@ -162,8 +162,12 @@ TEST_F(JudgeTest, WhatHasNoAnswerHasNoForces) {
   estimate_.failure = EstimateFailure::kNotConverged;
   state_.forces.converged = false;
   Touch(20, 90);
+  state_.forces.forces_n.assign(state_.shape.sources.size(), Vec3(0, 0, 1));
+  state_.forces.loaded = {20};
   EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kNotConverged));
   EXPECT_THAT(state_.contacts, testing::IsEmpty());
+  EXPECT_THAT(state_.forces.forces_n, testing::Each(Vec3(0, 0, 0)));
+  EXPECT_THAT(state_.forces.loaded, testing::IsEmpty());
 }
 
 TEST_F(JudgeTest, FewMarkersAreALostLink) {

@@ -1,0 +1,85 @@
+// Where a frame begins: the part of SkinEstimator before its steps.
+#include <algorithm>
+#include <cmath>
+
+#include "sensing/estimation/isolated_markers.h"
+#include "sensing/estimation/skin_estimator.h"
+
+namespace taclink {
+namespace {
+
+constexpr double kAssimilateMm = 2.5;   // farther off, a marker is pulled to its place first
+constexpr double kNoiseDeviations = 2;  // of a spring's pull, that noise alone makes
+
+}  // namespace
+
+// The farthest that a seen marker is from its place in a state, mm.
+double SkinEstimator::FurthestOff(const ShellState& state, const MarkerObservations& observed) {
+  mechanics_.markers().Displacements(state, markers_mm_);
+  double furthest = 0;
+  for (size_t m = 0; m < observed.information.size(); ++m) {
+    // One camera tells two directions.
+    const Mat3& information = observed.information[m];
+    const double most = information.trace();
+    if (!(most > 0)) continue;
+    const Vec3 off = markers_mm_.segment<3>(3 * static_cast<Eigen::Index>(m)) - observed.displacement_mm[m];
+    furthest = std::max(furthest, std::sqrt(off.dot(information * off) * 3 / most));
+  }
+  return furthest;
+}
+
+// A state near the markers: the inflated skin, the last frame's, or where springs pull either.
+bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n) {
+  const double unit = mechanics_.length_unit();
+  estimate.state = problem.inflated.state;
+  double off_mm = FurthestOff(estimate.state, problem.observed);
+  const auto consider = [&](bool is_there, const ShellState& state) {
+    if (!is_there || off_mm < kStillReachMm * unit) return;
+    const double mm = FurthestOff(state, problem.observed);
+    if (mm >= off_mm) return;
+    off_mm = mm;
+    estimate.state = state;
+  };
+  consider(past_.has_last, past_.last);
+  consider(past_.has_next, past_.next);
+  local_n.resize(0);
+  if (off_mm < kAssimilateMm * unit) return true;
+  Eigen::VectorXd pulls;
+  AssimilationSummary done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
+  if (!done.converged && past_.has_last) {
+    estimate.state = problem.inflated.state;
+    done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
+  }
+  estimate.assimilation_steps = done.iterations;
+  const int markers = mechanics_.marker_count();
+  Eigen::VectorXd sizes(markers);
+  for (int m = 0; m < markers; ++m) {
+    const double trace = problem.observed.information[static_cast<size_t>(m)].trace();
+    const double noise = trace > 0 ? 3 * kNoiseDeviations / std::sqrt(trace / 3) : 0;
+    sizes[m] = std::max(0.0, pulls.segment<3>(3 * m).norm() - noise);
+  }
+  local_n = touched_->loads.covariance().LocalOfMarkers(sizes);
+  start_ = estimate.state;
+  // What springs could not settle may still be near enough for the steps to come.
+  return FurthestOff(estimate.state, problem.observed) < kLongestStepMm * unit;
+}
+
+// A marker that is somewhere else must not cost the frame: where there is no answer, or one that does not
+// come to rest, those that are isolated are left out. What came of all markers stands if that leads nowhere.
+bool SkinEstimator::SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& estimate) {
+  bool is_solved = Solve(problem, estimate);
+  for (const double most : {kSurelyIsolated, kPerhapsIsolated}) {
+    if (is_solved && estimate.unsettled_mm == 0) return true;
+    SkinProblem without = problem;
+    const int hidden = HideIsolated(mechanics_.model(), problem.inflated.markers_mm, most,
+                                    mechanics_.length_unit(), without.observed);
+    if (hidden == 0) continue;
+    const bool was_solved = is_solved;
+    is_solved = Solve(without, estimate);
+    if (was_solved && !is_solved) return Solve(problem, estimate);
+    problem.observed = without.observed;
+  }
+  return is_solved;
+}
+
+}  // namespace taclink
