@@ -213,7 +213,8 @@ Result<void> LogLinkSolver::SolveMarkers(v1::LinkFrame& solved) {
 
 void LogLinkSolver::SolveForces(const PressurePair& pressure) {
   const auto start = std::chrono::steady_clock::now();
-  estimator_->Estimate(pressure, *finder_, state_.shape, state_.forces, state_.contacts);
+  estimator_->Estimate(pressure, state_.shape, state_.forces);
+  estimator_->FindContacts(*finder_, state_.shape, state_.forces, state_.contacts);
   const double seconds = SecondsSince(start);
   state_.stage_ms.force = seconds * 1e3;
   report_.solve_s += seconds;
