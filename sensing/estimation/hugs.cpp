@@ -6,10 +6,10 @@
 namespace taclink {
 namespace {
 
-constexpr double kWidestGap = 0.25;  // of the way around, between the loads of a hug
+constexpr double kMostFree = 0.25;  // of the way around, between the loads of a hug
 
 // Of the way around, the widest stretch without a load.
-double WidestGap(const std::vector<char>& is_loaded) {
+double WidestFree(const std::vector<char>& is_loaded) {
   const size_t around = is_loaded.size();
   size_t widest = 0, free = 0;
   for (size_t i = 0; i < 2 * around; ++i) {
@@ -63,7 +63,7 @@ void LoadEstimator::JoinHug(std::vector<Hill>& hills, const std::vector<size_t>&
       last = std::max(last, site / around);
     }
   }
-  if (WidestGap(is_loaded) > kWidestGap) return;
+  if (WidestFree(is_loaded) > kMostFree) return;
   std::vector<Hill> with_hug = {{}};
   for (int row = first; row <= last; ++row) with_hug.front().push_back(sites + row);
   for (size_t i = 0; i < hills.size(); ++i) {

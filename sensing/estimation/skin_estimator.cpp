@@ -63,6 +63,7 @@ SkinEstimator::~SkinEstimator() = default;
 
 void SkinEstimator::Restart() {
   Forget();
+  is_same_frame_ = false;
   still_->Forget();
   touched_->Forget();
   if (!maker_) return;

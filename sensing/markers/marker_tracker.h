@@ -21,6 +21,10 @@ struct MarkerTrackerOptions {
   double max_motion_mm = 1.5;  ///< of a marker from frame to frame, beside what its last motion predicts
   /// More of the markers seen in the frame before lost at once: look at the full picture.
   double max_loss = 0.12;
+  /// So many lost at once where the skin was displaced by that part of the pitch: it may have let go, and a
+  /// spot that is still found where the prediction has the skin may be the next ring's. Likewise.
+  int max_loss_displaced = 8;
+  double displaced_part = 0.3;
   /// Fewer than this part of all markers seen: look at the full picture after 8 frames, then 16, 32 ...
   double retry_below = 0.7;
   int max_retry_frames = 256;
@@ -170,6 +174,7 @@ class MarkerTracker {
   std::optional<Vec3> OnItsRing(int marker) const;
   bool IsOnAnother(CameraId id, int marker) const;
   bool SingleHolds(CameraId id, int marker) const;
+  int CountLostDisplaced(const Camera& camera) const;
   void JudgeLoss();
   void Take(Camera& camera, const cv::Mat& gray, int marker, const MarkerObservation& label);
 

@@ -116,18 +116,32 @@ void MarkerTracker::CheckMarker(int marker) {
   }
 }
 
+// Lost in this frame, and off their places at rest when seen last.
+int MarkerTracker::CountLostDisplaced(const Camera& camera) const {
+  int count = 0;
+  for (size_t i = 0; i < camera.tracks.size(); ++i) {
+    const Track& track = camera.tracks[i];
+    const double displaced_px = options_.displaced_part * camera.rest_pitch_px[i];
+    if (track.lost_now && (track.pixel - camera.rest_px[i]).squaredNorm() > displaced_px * displaced_px)
+      ++count;
+  }
+  return count;
+}
+
 void MarkerTracker::JudgeLoss() {
   ++since_acquire_;
   wants_ = AcquireReason::kNone;
-  int before = 0, now = 0;
+  int before = 0, now = 0, displaced = 0;
   for (const Camera& camera : cameras_) {
     if (!camera.has_picture) continue;
     if (!camera.had_picture) wants_ = AcquireReason::kCamera;
     before += camera.seen_before;
     now += CountSeen(camera);
+    displaced += CountLostDisplaced(camera);
   }
   if (wants_ != AcquireReason::kNone) return;
-  if (before - now > std::max<double>(kFewLost, options_.max_loss * before)) {
+  if (before - now > std::max<double>(kFewLost, options_.max_loss * before) ||
+      displaced > options_.max_loss_displaced) {
     wants_ = AcquireReason::kLoss;
     return;
   }

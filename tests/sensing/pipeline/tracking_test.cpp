@@ -162,6 +162,32 @@ TEST_P(TrackingTest, LossIsAcquiredAnewInTheSameFrame) {
   EXPECT_GE(skin_->Judge(jumped).labelled, 0.75 * skin_->Judge(jumped).visible);
 }
 
+// Few markers are lost then, but what the prediction has there is a dent that is gone, and the next ring's
+// spots are where its markers were.
+TEST_P(TrackingTest, ABodyThatLetsGoWithinAFrameLeavesNothing) {
+  force_model_.reset();
+  Scene scene = SceneOf(GetParam());
+  scene.skin = SkinKind::kNonlinear;
+  scene.pressure = {{0, 1}};
+  SceneContact body;
+  body.at = {.angle_rad = RadFromDeg(23.8), .z_mm = 81.9};
+  body.patch_diameter_mm = 8;
+  body.force_n = 0.59;
+  body.begin_s = 1;
+  body.end_s = 2;
+  body.ramp_s = 0.02;
+  scene.contacts = {body};
+  Start(scene);
+  for (int tap = 0; tap < 8; ++tap) {
+    for (const double s : {1.3, 1.4, 1.5, 1.6}) Step(s);
+    EXPECT_EQ(state_.contacts.size(), 1u) << "tap " << tap;
+    Step(2.5);
+    EXPECT_EQ(skin_->Judge(pipeline_->labels()).wrong, 0) << "tap " << tap;
+    EXPECT_EQ(state_.contacts.size(), 0u) << "tap " << tap;
+    for (int k = 0; k < 3; ++k) Step(2.5);
+  }
+}
+
 TEST_P(TrackingTest, GapAndReturnOfACameraAreAcquired) {
   Start(SceneOf(GetParam()));
   Play(0, 0.1);
