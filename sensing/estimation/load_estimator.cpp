@@ -385,7 +385,6 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
   }
   estimate.converged = solution_.converged;
   if (!estimate.converged) return;
-  estimate.chi2 = solution_.chi2;
   Finish(skin, hills, slipping, estimate);
 }
 

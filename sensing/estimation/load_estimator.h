@@ -45,7 +45,6 @@ struct LoadEstimate {
   double pressure_error_mpa = 0;  ///< true less told
   double baseline_error_mpa = 0;  ///< likewise, of the pressure under which the baseline was taken
   double pressure_sigma_mpa = 0;  ///< of the corrected pressure
-  double chi2 = 0;                ///< of what is left unexplained
   double chi2_per_dof = 0;
   double region_chi2_per_dof = 0;  ///< the largest of 3 x 3 markers
   bool converged = true;
@@ -64,9 +63,6 @@ struct PressurePrior {
 /// and a tangential force for each hill that needs one. See estimation.md. One thread.
 class LoadEstimator {
  public:
-  /// What a contact has to explain, of chi^2.
-  static constexpr double kHillGain = 20;
-
   /// Both are referred to.
   LoadEstimator(const SkinMechanics& mechanics, const Neighborhoods& near);
 
@@ -97,6 +93,8 @@ class LoadEstimator {
   static constexpr double kTangentialN = 1;
   /// And of a couple, N mm: that force on an arm of a patch's size.
   static constexpr double kCoupleNmm = 10;
+  /// What a contact has to explain, of chi^2.
+  static constexpr double kHillGain = 20;
   /// Columns of the problem that are one contact: sites or, of a hug, bands.
   using Hill = HillFinder::Hill;
 

@@ -10,12 +10,6 @@ namespace {
 
 constexpr double kAssimilateMm = 2.5;   // farther off, a marker is pulled to its place first
 constexpr double kNoiseDeviations = 2;  // of a spring's pull, that noise alone makes
-constexpr double kLeftOutChi2 = 36;     // of a marker: six standard deviations
-
-// Of an answer: what is left unexplained, and what each contact has to explain.
-double CostOf(const LoadEstimate& loads) {
-  return loads.chi2 + LoadEstimator::kHillGain * static_cast<double>(loads.loads.size());
-}
 
 }  // namespace
 
@@ -70,27 +64,19 @@ bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Ei
   return FurthestOff(estimate.state, problem.observed) < kLongestStepMm * unit;
 }
 
-// A marker that is somewhere else must not cost the frame, nor be explained by loads around it. Isolated ones
-// are left out where all markers have no answer, or none that comes to rest; and those that surely are, where
-// the answer without them is cheaper.
+// A marker that is somewhere else must not cost the frame: where there is no answer, or one that does not
+// come to rest, those that are isolated are left out. What came of all markers stands if that leads nowhere.
 bool SkinEstimator::SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& estimate) {
   bool is_solved = Solve(problem, estimate);
   for (const double most : {kSurelyIsolated, kPerhapsIsolated}) {
-    if (is_solved && estimate.unsettled_mm == 0 && (most < kSurelyIsolated || estimate.loads.loads.empty()))
-      return true;
+    if (is_solved && estimate.unsettled_mm == 0) return true;
     SkinProblem without = problem;
     const int hidden = HideIsolated(mechanics_.model(), problem.inflated.markers_mm, most,
                                     mechanics_.length_unit(), without.observed);
     if (hidden == 0) continue;
-    const bool was_answer = is_solved, was_settled = is_solved && estimate.unsettled_mm == 0;
-    const double cost = CostOf(estimate.loads);
+    const bool was_solved = is_solved;
     is_solved = Solve(without, estimate);
-    const bool is_better =
-        is_solved && (!was_settled || CostOf(estimate.loads) + kLeftOutChi2 * hidden < cost);
-    if (was_answer && !is_better) {
-      is_solved = Solve(problem, estimate);
-      continue;
-    }
+    if (was_solved && !is_solved) return Solve(problem, estimate);
     problem.observed = without.observed;
   }
   return is_solved;
