@@ -5,6 +5,7 @@
 #include <spdlog/formatter.h>
 #include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/dist_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -191,10 +192,13 @@ Result<void> SetUpLog(const LogOptions& options) {
   } else {
     sink->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %v");
   }
-  auto logger = std::make_shared<spdlog::logger>("taclinkd", LimitRate(std::move(sink), options.rate_limit));
-  logger->set_level(spdlog::level::from_str(options.level));
-  logger->flush_on(options.file.empty() ? spdlog::level::off : spdlog::level::info);
-  spdlog::set_default_logger(std::move(logger));
+  // The logger stays, for other threads may be in it: only where it writes to changes, under a lock.
+  static const auto kOutlet = std::make_shared<spdlog::sinks::dist_sink_mt>();
+  static const auto kLogger = std::make_shared<spdlog::logger>("taclinkd", kOutlet);
+  kOutlet->set_sinks({LimitRate(std::move(sink), options.rate_limit)});
+  kLogger->set_level(spdlog::level::from_str(options.level));
+  kLogger->flush_on(options.file.empty() ? spdlog::level::off : spdlog::level::info);
+  if (spdlog::default_logger() != kLogger) spdlog::set_default_logger(kLogger);
   return {};
 }
 

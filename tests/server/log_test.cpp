@@ -4,9 +4,13 @@
 #include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <filesystem>
 #include <limits>
 #include <sstream>
+#include <thread>
 
 namespace taclink::server {
 namespace {
@@ -100,6 +104,27 @@ TEST_F(LogTest, WhatWasSwallowedIsToldAtTheNextFlush) {
 
 TEST_F(LogTest, NoLimitPassesAll) {
   EXPECT_EQ(LimitRate(plain_, 0), plain_);
+}
+
+TEST_F(LogTest, MayBeSetUpAnewWhileThreadsTell) {
+  const auto before = spdlog::default_logger();
+  const std::string file = testing::TempDir() + "set_up_anew." + std::to_string(::getpid());
+  ASSERT_TRUE(SetUpLog({.file = file, .rate_limit = 0}).ok());
+  std::atomic<int> told = 0;
+  std::atomic<bool> stop = false;
+  {
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < 3; ++i) {
+      threads.emplace_back([&] {
+        while (!stop) spdlog::info("told {}", ++told);
+      });
+    }
+    for (int round = 0; round < 200 || told < 1000; ++round)
+      EXPECT_TRUE(SetUpLog({.file = file, .rate_limit = round % 2}).ok());
+    stop = true;
+  }
+  spdlog::set_default_logger(before);
+  std::filesystem::remove(file);
 }
 
 TEST_F(LogTest, AFileThatCannotBeWrittenIsAnError) {
