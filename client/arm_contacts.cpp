@@ -37,6 +37,7 @@ ArmContact From(const v1::ArmContact& message) {
 LinkContacts From(const v1::LinkContactsStatus& message) {
   return {.link = message.link(),
           .status = FromMessage(message.status()),
+          .forces_unknown = message.forces_unknown(),
           .sequence = message.sequence(),
           .base_from_link = FromMessage(message.base_from_link()),
           .validity = From(message.validity()),
@@ -49,8 +50,10 @@ ArmContacts FromMessage(const v1::StreamContactsResponse& message) {
   ArmContacts out;
   for (const auto& link : message.links()) out.links.push_back(From(link));
   for (const auto& contact : message.contacts()) out.contacts.push_back(From(contact));
-  out.total_force_n = FromMessage(message.total().force_n());
-  out.total_moment_nm = FromMessage(message.total().moment_nm());
+  if (message.has_total()) {
+    out.total_force_n = FromMessage(message.total().force_n());
+    out.total_moment_nm = FromMessage(message.total().moment_nm());
+  }
   const int joints = std::min(message.joint_names_size(), message.joint_torques_size());
   const bool sigmas = message.joint_torque_sigmas_size() == joints;
   for (int i = 0; i < joints; ++i) {

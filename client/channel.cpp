@@ -5,10 +5,10 @@
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/client_interceptor.h>
 
-#include <fstream>
-#include <sstream>
 #include <utility>
 #include <vector>
+
+#include "sensing/core/read_file.h"
 
 namespace taclink::client {
 namespace {
@@ -52,13 +52,8 @@ bool StaysHere(const std::string& address) {
   return inet_pton(AF_INET, host.c_str(), &ip) == 1 && ntohl(ip.s_addr) >> 24 == 127;
 }
 
-Result<std::string> ReadFile(const std::string& path) {
-  if (path.empty()) return std::string();
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  if (in) text << in.rdbuf();
-  if (!in || !text) return Error{ErrorCode::kNotFound, path + " cannot be read; check the path"};
-  return text.str();
+Result<std::string> ReadFileIfAny(const std::string& path) {
+  return path.empty() ? Result<std::string>(std::string()) : ReadFile(path);
 }
 
 Result<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const Credentials& credentials) {
@@ -73,7 +68,7 @@ Result<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const Credenti
   for (const auto& [file, text] : {std::pair(&credentials.ca_file, &options.pem_root_certs),
                                    std::pair(&credentials.certificate_file, &options.pem_cert_chain),
                                    std::pair(&credentials.key_file, &options.pem_private_key)}) {
-    auto read = ReadFile(*file);
+    auto read = ReadFileIfAny(*file);
     if (!read) return read.error();
     *text = std::move(*read);
   }

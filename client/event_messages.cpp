@@ -10,10 +10,6 @@ constexpr std::array<const char*, 13> kKindNames = {
     "unknown",     "contact_begin", "contact_update", "contact_end", "force_level", "link_status", "tare",
     "calibration", "baseline",      "drift",          "thresholds",  "frames_lost", "recording"};
 
-std::array<double, 3> From(const v1::Vector3& v) {
-  return {v.x(), v.y(), v.z()};
-}
-
 ForceLevel From(v1::ForceLevel level) {
   switch (level) {
     case v1::FORCE_LEVEL_NORMAL:
@@ -34,8 +30,8 @@ Thresholds From(const v1::Thresholds& message) {
 
 void TakeContact(const v1::ContactEvent& message, Event& event) {
   event.contact_id = message.contact_id();
-  event.center_m = From(message.center_m());
-  event.force_vector_n = From(message.force_n());
+  event.center_m = FromMessage(message.center_m());
+  event.force_vector_n = FromMessage(message.force_n());
   event.force_n = std::hypot(event.force_vector_n[0], event.force_vector_n[1], event.force_vector_n[2]);
   event.peak_force_n = message.peak_force_n();
   event.duration_s = message.duration_s();
@@ -49,7 +45,7 @@ void TakeLevel(const v1::ForceLevelEvent& message, Event& event) {
   event.force_n = message.force_n();
   event.thresholds = From(message.thresholds());
   event.contact_id = message.contact_id();
-  event.center_m = From(message.center_m());
+  event.center_m = FromMessage(message.center_m());
 }
 
 void TakeDetail(const v1::Event& message, Event& event) {

@@ -1,6 +1,7 @@
 #include "client/messages.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 namespace taclink::client {
@@ -52,6 +53,24 @@ LinkStatus From(v1::LinkStatus status) {
     default:
       return LinkStatus::kUnknown;
   }
+}
+
+static_assert(static_cast<int>(Reason::kFewMarkers) == v1::REASON_FEW_MARKERS &&
+              static_cast<int>(Reason::kForcedBaseline) == v1::REASON_FORCED_BASELINE &&
+              v1::Reason_MAX == v1::REASON_FORCED_BASELINE);
+StatusReason From(const v1::StatusReason& message) {
+  StatusReason reason;
+  reason.id = message.id();
+  reason.text = message.text();
+  // All versions send the name.
+  std::string name = "REASON_" + message.id();
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  if (v1::Reason known; v1::Reason_Parse(name, &known)) reason.reason = static_cast<Reason>(known);
+  if (message.has_value()) reason.value = message.value();
+  if (message.has_limit()) reason.limit = message.limit();
+  reason.unit = message.unit();
+  return reason;
 }
 
 ForceModel From(v1::ForceModel model) {
@@ -354,15 +373,14 @@ Frame FromMessage(const v1::LinkFrame& message) {
   frame.status_reason = message.status_reason();
   if (message.has_pressure_pa()) frame.pressure_pa = message.pressure_pa();
   frame.pressure = From(message.pressure());
-  for (const auto& reason : message.status_reasons())
-    frame.status_reasons.push_back({reason.id(), reason.text()});
+  for (const auto& reason : message.status_reasons()) frame.status_reasons.push_back(From(reason));
   if (message.has_pressure_estimate())
     frame.pressure_estimate = {message.pressure_estimate().pressure_pa(),
                                message.pressure_estimate().sigma_pa()};
   frame.markers_seen = static_cast<int>(message.markers_seen());
   frame.markers_inferred = static_cast<int>(message.markers_inferred());
   for (const auto& contact : message.contacts()) frame.contacts.push_back(From(contact));
-  frame.total_force_n = From(message.total_force_n());
+  if (message.has_total_force_n()) frame.total_force_n = From(message.total_force_n());
   frame.unchanged = message.unchanged();
   frame.replayed = message.replayed();
   frame.force_model = From(message.force_model());
@@ -385,7 +403,12 @@ Frame FromMessage(const v1::LinkFrame& message) {
                                     message.nodal_force_sigmas_n().end());
   for (const int source : message.marker_sources())
     frame.marker_sources.push_back(From(static_cast<v1::MarkerSource>(source)));
-  frame.force_residual = message.force_residual();
+  frame.detection_limits_n.assign(message.detection_limits_n().begin(), message.detection_limits_n().end());
+  if (message.has_detection_limit_n()) frame.detection_limit_n = message.detection_limit_n();
+  if (message.has_detection_limit_around_n())
+    frame.detection_limit_around_n = message.detection_limit_around_n();
+  if (message.has_force_residual()) frame.force_residual = message.force_residual();
+  if (message.has_camera_shift_m()) frame.camera_shift_m = message.camera_shift_m();
   frame.force_converged = !message.force_not_converged();
   return frame;
 }

@@ -21,6 +21,8 @@ RecorderState FromMessage(v1::RecorderState state) {
 RecorderStatus FromMessage(const v1::RecorderStatus& message) {
   return {.state = FromMessage(message.state()),
           .trouble = message.trouble(),
+          .last_trouble = message.last_trouble(),
+          .last_trouble_utc_ns = message.last_trouble_utc_ns(),
           .log = message.log(),
           .folder = message.folder(),
           .started_utc_ns = message.started_utc_ns(),

@@ -1,4 +1,8 @@
-# Everything comes from Debian 12's packages (deploy/packages lists them).
+# Everything comes from the packages of Debian 12 or 13 (deploy/packages lists them); what can't be installed beside
+# other packages, deploy/install-packages has unpacked here.
+file(GLOB unpacked LIST_DIRECTORIES true "${PROJECT_SOURCE_DIR}/build/packages/*/usr")
+list(FILTER unpacked EXCLUDE REGEX "\\.new/usr$")  # cut off
+list(PREPEND CMAKE_PREFIX_PATH ${unpacked})
 find_package(Threads REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(Ceres 2.1 REQUIRED)
@@ -18,7 +22,10 @@ find_package(spdlog REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
-find_package(Boost 1.81 REQUIRED)
+find_package(Boost 1.81 REQUIRED CONFIG)
+# By name: another version's headers may be where the compiler looks anyway.
+get_target_property(BOOST_INCLUDE_DIR Boost::headers INTERFACE_INCLUDE_DIRECTORIES)
+include_directories(SYSTEM BEFORE ${BOOST_INCLUDE_DIR})
 find_package(OpenSSL 3 REQUIRED)
 find_package(prometheus-cpp CONFIG REQUIRED COMPONENTS core)
 find_package(PkgConfig REQUIRED)
@@ -40,8 +47,11 @@ find_library(OROCOS_KDL_LIBRARY orocos-kdl REQUIRED)
 find_library(URDFDOM_LIBRARY urdfdom_model REQUIRED)
 find_library(CONSOLE_BRIDGE_LIBRARY console_bridge REQUIRED)
 find_path(OROCOS_KDL_INCLUDE_DIR kdl/tree.hpp REQUIRED)
-find_path(URDFDOM_INCLUDE_DIR urdf_parser/urdf_parser.h REQUIRED)
+# Since Debian 13 in folders of their own.
+find_path(URDFDOM_INCLUDE_DIR urdf_parser/urdf_parser.h PATH_SUFFIXES urdfdom REQUIRED)
+find_path(URDFDOM_HEADERS_INCLUDE_DIR urdf_model/model.h PATH_SUFFIXES urdfdom_headers REQUIRED)
 add_library(taclink_urdf_kdl INTERFACE)
 target_link_libraries(taclink_urdf_kdl INTERFACE ${URDFDOM_LIBRARY} ${OROCOS_KDL_LIBRARY} ${CONSOLE_BRIDGE_LIBRARY}
                                                  Eigen3::Eigen)
-target_include_directories(taclink_urdf_kdl SYSTEM INTERFACE ${OROCOS_KDL_INCLUDE_DIR} ${URDFDOM_INCLUDE_DIR})
+target_include_directories(taclink_urdf_kdl SYSTEM INTERFACE ${OROCOS_KDL_INCLUDE_DIR} ${URDFDOM_INCLUDE_DIR}
+                                                             ${URDFDOM_HEADERS_INCLUDE_DIR})

@@ -36,7 +36,7 @@ struct LinkParts {
   std::unique_ptr<FrameSource> source;
   std::unique_ptr<LinkProcessor> processor;
   std::shared_ptr<PressureSource> pressure =
-      nullptr;                   ///< null: taken as 0 where the source does not measure it
+      nullptr;                   ///< null: not known where the source does not measure it
   LinkFactories factories = {};  ///< of the next source and processor; none: a link that dies stays so
   RealtimeOptions realtime = {};
 };

@@ -58,6 +58,7 @@ LinkContacts ToArm(size_t link, const LinkState& state, const ArmPoses& poses) {
                    .sequence = state.sequence,
                    .times = state.times,
                    .status = state.status,
+                   .forces_unknown = !state.has_forces(),
                    .pose = motion.pose,
                    .contacts = {},
                    .joints = std::vector<JointLoad>(motion.positions.size())};

@@ -39,7 +39,8 @@ struct LinkContacts {
   uint64_t sequence = 0;
   FrameTimes times;
   LinkStatus status = LinkStatus::kStarting;
-  LinkPose pose;  ///< at the exposure
+  bool forces_unknown = true;  ///< it may be pressed; see LinkState::has_forces
+  LinkPose pose;               ///< at the exposure
   std::vector<ArmContact> contacts;
   std::vector<JointLoad> joints;  ///< by joint; of this link's contacts
 };

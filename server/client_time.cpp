@@ -10,7 +10,7 @@ namespace {
 constexpr int64_t kMostAheadNs = 1'000'000'000;
 constexpr int64_t kMostBehindNs = 10'000'000'000;
 
-Error Invalid(std::string what) {
+Error InvalidTime(std::string what) {
   return {ErrorCode::kInvalidArgument, std::move(what)};
 }
 
@@ -26,14 +26,14 @@ Result<int64_t> MonotonicOf(int64_t utc_ns, int64_t monotonic_ns, const Clock& c
   const bool utc = utc_ns != 0;
   const int64_t stamp_ns = utc ? utc_ns : monotonic_ns;
   if (stamp_ns <= 0)
-    return Invalid("no time; give utc_ns (since 1970) or monotonic_ns (of the server's machine)");
+    return InvalidTime("no time; give utc_ns (since 1970) or monotonic_ns (of the server's machine)");
   const int64_t now_ns = clock.MonotonicNs();
   const int64_t ahead_ns = stamp_ns - (utc ? clock.UtcNs() : now_ns);
   const std::string clocks = utc ? "; synchronise the clocks" : "; is it the server's monotonic clock?";
   if (ahead_ns > kMostAheadNs)
-    return Invalid("its time is " + SecondsText(ahead_ns) + " ahead of the server's clock" + clocks);
+    return InvalidTime("its time is " + SecondsText(ahead_ns) + " ahead of the server's clock" + clocks);
   if (ahead_ns < -kMostBehindNs)
-    return Invalid("its time is " + SecondsText(-ahead_ns) + " behind the server's clock" + clocks);
+    return InvalidTime("its time is " + SecondsText(-ahead_ns) + " behind the server's clock" + clocks);
   return now_ns + ahead_ns;
 }
 

@@ -1,14 +1,13 @@
 #include "server/config.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
-#include <fstream>
 #include <set>
 #include <span>
-#include <sstream>
 
 #include "sensing/core/embedded_file.h"
+#include "sensing/core/name.h"
+#include "sensing/core/read_file.h"
 #include "sensing/yaml/yaml_reader.h"
 #include "server/config_drift.h"
 #include "server/config_events.h"
@@ -88,25 +87,36 @@ SourceConfig Reader::ReadSource(YamlMap& link) const {
   }
 }
 
-bool GoodName(const std::string& name) {
-  const auto good = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.'; };
-  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), good);
+std::string ReadName(YamlMap& map) {
+  std::string name = map.Text("name");
+  if (const auto good = CheckName(name); !good && map.Has("name")) map.Fail("name", good.error().message);
+  return name;
 }
 
-LinkConfig Reader::ReadLink(YamlMap link) const {
-  LinkConfig config;
-  config.name = link.Text("name");
-  if (link.Has("name") && !GoodName(config.name))
-    link.Fail("name", "must be 1 to 64 letters, digits, '_', '-' or '.'");
-  config.model = NameOrPath(link.Text("model"));
-  config.source = ReadSource(link);
-  if (link.Has("calibration")) config.calibration = Path(link.Text("calibration"));
-  config.pressure = ReadPressure(link, std::holds_alternative<SimulatedSourceConfig>(config.source), folder);
+bool MayBeInflated(const LinkConfig& link) {
+  if (!link.pressure) return false;
+  const auto* constant = std::get_if<ConstantPressureConfig>(&link.pressure->source);
+  return constant == nullptr || constant->kpa != 0;
+}
+
+void ReadForceModel(YamlMap& link, LinkConfig& config) {
   if (link.Has("force_model")) {
     const size_t model = link.Choice("force_model", {kForceModelNames.begin(), kForceModelNames.end()});
     config.force_model = model == 0 ? std::nullopt : std::optional<ForceModel>(kForceModels[model - 1]);
   }
+  config.force_model_anyway = link.Bool("force_model_anyway", false);
+  if (const auto good = CheckForceModel(config); !good) link.Fail("force_model", good.error().message);
   config.force_refinement = link.Integer("force_refinement", config.force_refinement, {.min = 0, .max = 3});
+}
+
+LinkConfig Reader::ReadLink(YamlMap link) const {
+  LinkConfig config;
+  config.name = ReadName(link);
+  config.model = NameOrPath(link.Text("model"));
+  config.source = ReadSource(link);
+  if (link.Has("calibration")) config.calibration = Path(link.Text("calibration"));
+  config.pressure = ReadPressure(link, std::holds_alternative<SimulatedSourceConfig>(config.source), folder);
+  ReadForceModel(link, config);
   config.drift = ReadDrift(link);
   config.rules = ReadRules(link);
   if (YamlMap pose = link.Map("pose"); link.Has("pose")) {
@@ -134,12 +144,18 @@ void ReadServer(YamlMap& root, Config& config) {
 
 void ReadArm(YamlMap& root, const Reader& reader, Config& config) {
   YamlMap arm = root.Map("arm");
-  config.arm_name = arm.Text("name");
-  if (arm.Has("name") && !GoodName(config.arm_name))
-    arm.Fail("name", "must be 1 to 64 letters, digits, '_', '-' or '.'");
+  config.arm_name = ReadName(arm);
   config.kinematics = ReadKinematics(arm, reader.folder);
   std::set<std::string> names;
-  for (YamlMap& link : arm.Maps("links")) {
+  std::vector<YamlMap> links = arm.Maps("links");
+  if (links.size() > static_cast<size_t>(config.limits.max_links)) {
+    arm.Fail("links", "has " + std::to_string(links.size()) + ", more than limits.max_links, which is " +
+                          std::to_string(config.limits.max_links) +
+                          "; each takes some 100 MB, so these some " +
+                          std::to_string((links.size() + 9) / 10) + " GB: raise it where there is that much");
+    links.clear();
+  }
+  for (YamlMap& link : links) {
     config.links.push_back(reader.ReadLink(link));
     if (!config.links.back().frame.empty() && !config.kinematics.urdf)
       link.Fail("pose", "has a 'frame', so the arm must have a 'urdf' that holds it");
@@ -150,6 +166,15 @@ void ReadArm(YamlMap& root, const Reader& reader, Config& config) {
 }
 
 }  // namespace
+
+Result<void> CheckForceModel(const LinkConfig& link, bool is_inflated) {
+  if (link.force_model != ForceModel::kLinear || link.force_model_anyway) return {};
+  if (!is_inflated && !MayBeInflated(link)) return {};
+  return Error{
+      ErrorCode::kFailedPrecondition,
+      "is 'linear', which does not hold on an inflated skin, and the link has a pressure: choose 'auto', "
+      "or say 'force_model_anyway: true'"};
+}
 
 Result<Config> ParseConfig(const std::string& name, std::string_view text, const std::string& folder) {
   auto file = YamlFile::Parse(name, text);
@@ -177,13 +202,9 @@ Result<Config> ParseConfig(const std::string& name, std::string_view text, const
 }
 
 Result<Config> LoadConfig(const std::string& path) {
-  const std::ifstream in(path);
-  if (!in || std::filesystem::is_directory(path)) {
-    return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
-  }
-  std::ostringstream text;
-  text << in.rdbuf();
-  return ParseConfig(path, text.str(), std::filesystem::absolute(path).parent_path().string());
+  const auto text = ReadFile(path);
+  if (!text) return text.error();
+  return ParseConfig(path, *text, std::filesystem::absolute(path).parent_path().string());
 }
 
 std::string_view DemoConfigText() {

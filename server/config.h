@@ -56,8 +56,9 @@ struct LinkConfig {
   std::string model;  ///< name of a shipped one or path
   SourceConfig source;
   std::optional<std::string> calibration;  ///< path; none: from the first rest picture
-  std::optional<PressureConfig> pressure;  ///< none: the source's, or 0
+  std::optional<PressureConfig> pressure;  ///< none: the source's, or nobody tells it
   std::optional<ForceModel> force_model;   ///< none: the cheapest that is good enough, frame by frame
+  bool force_model_anyway = false;         ///< `linear` though the skin is inflated, for comparison
   int force_refinement =
       0;  ///< elements per interval of the marker grid, 1 to 3; 0: what the model does best with
   LinkRules rules;
@@ -100,6 +101,11 @@ std::string_view DemoConfigText();
 
 /// As a file that reads back to the same.
 std::string ConfigText(const Config& config);
+
+/// Whether the link's force model holds on it. The error's message follows the model's name or key.
+/// Errors: kFailedPrecondition (`linear` on a skin that may be inflated).
+/// `is_inflated`: by what is simulated.
+Result<void> CheckForceModel(const LinkConfig& link, bool is_inflated = false);
 
 /// Errors: kInvalidArgument (no such form of address).
 Result<void> CheckListenAddress(const std::string& address);

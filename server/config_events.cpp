@@ -4,6 +4,7 @@
 #include <set>
 #include <sstream>
 
+#include "sensing/core/name.h"
 #include "server/config_names.h"
 
 namespace taclink::server {
@@ -25,7 +26,7 @@ Thresholds ReadThresholds(YamlMap& map) {
 Region ReadRegion(YamlMap& map) {
   Region region;
   region.name = map.Text("name");
-  if (region.name.empty() || region.name.size() > 64) map.Fail("name", "must have 1 to 64 letters");
+  if (const auto good = CheckName(region.name); !good) map.Fail("name", good.error().message);
   const auto rings = map.Integers("rings", 2, kGridNumber), paths = map.Integers("paths", 2, kGridNumber);
   region.first_ring = rings[0] - 1;
   region.last_ring = rings[1] - 1;

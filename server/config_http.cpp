@@ -8,6 +8,7 @@
 namespace taclink::server {
 namespace {
 
+constexpr Range kConnections{.min = 1, .max = 10000};
 constexpr Range kTimeouts{.min = 0.01, .max = 3600};
 
 }  // namespace
@@ -28,7 +29,9 @@ HttpConfig ReadHttp(YamlMap& root, const std::function<std::string(const std::st
   }
   const std::string web_root = http.Text("web_root", "");
   if (!web_root.empty()) config.web_root = path(web_root);
-  config.max_connections = http.Integer("max_connections", config.max_connections, {.min = 1, .max = 10000});
+  config.max_connections = http.Integer("max_connections", config.max_connections, kConnections);
+  config.max_connections_per_peer =
+      http.Integer("max_connections_per_peer", config.max_connections_per_peer, kConnections);
   config.header_timeout_s = http.Number("header_timeout_s", config.header_timeout_s, kTimeouts);
   config.idle_timeout_s = http.Number("idle_timeout_s", config.idle_timeout_s, kTimeouts);
   config.write_timeout_s = http.Number("write_timeout_s", config.write_timeout_s, kTimeouts);
@@ -47,6 +50,7 @@ std::string HttpText(const HttpConfig& config) {
   }
   if (!config.web_root.empty()) out << "  web_root: " << Quoted(config.web_root) << "\n";
   out << "  max_connections: " << config.max_connections << "\n"
+      << "  max_connections_per_peer: " << config.max_connections_per_peer << "\n"
       << "  header_timeout_s: " << config.header_timeout_s << "\n"
       << "  idle_timeout_s: " << config.idle_timeout_s << "\n"
       << "  write_timeout_s: " << config.write_timeout_s << "\n";

@@ -14,8 +14,9 @@ inline constexpr const char* kDefaultHttpListen = "127.0.0.1:8080";
 struct HttpConfig {
   /// host:port or [ip6]:port; port 0: any free one; empty: off; none: kDefaultHttpListen if it is free.
   std::optional<std::string> listen;
-  std::string web_root;       ///< folder of the web page; empty: the one built in
-  int max_connections = 128;  ///< at a time
+  std::string web_root;               ///< folder of the web page; empty: the one built in
+  int max_connections = 128;          ///< at a time; a quarter is kept for this machine
+  int max_connections_per_peer = 32;  ///< of one address
   double header_timeout_s =
       10;  ///< from the first byte of a request to its last, and for the first byte of all
   double idle_timeout_s = 60;    ///< between two requests

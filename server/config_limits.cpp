@@ -12,7 +12,8 @@ struct Entry {
   Range range;
 };
 
-constexpr std::array<Entry, 11> kEntries = {{
+constexpr std::array<Entry, 13> kEntries = {{
+    {"max_links", &LimitsConfig::max_links, {.min = 1, .max = 10000}},
     {"max_streams", &LimitsConfig::max_streams, {.min = 1, .max = 10000}},
     {"max_streams_per_peer", &LimitsConfig::max_streams_per_peer, {.min = 1, .max = 10000}},
     {"max_calls_per_connection", &LimitsConfig::max_calls_per_connection, {.min = 1, .max = 10000}},
@@ -20,6 +21,7 @@ constexpr std::array<Entry, 11> kEntries = {{
     {"memory_mb", &LimitsConfig::memory_mb, {.min = 16, .max = 65536}},
     {"queue_messages", &LimitsConfig::queue_messages, {.min = 1, .max = 100000}},
     {"queue_mb", &LimitsConfig::queue_mb, {.min = 1, .max = 65536}},
+    {"queue_mb_per_peer", &LimitsConfig::queue_mb_per_peer, {.min = 1, .max = 65536}},
     {"keepalive_s", &LimitsConfig::keepalive_s, {.min = 1, .max = 86400}},
     {"keepalive_timeout_s", &LimitsConfig::keepalive_timeout_s, {.min = 1, .max = 86400}},
     {"handshake_timeout_s", &LimitsConfig::handshake_timeout_s, {.min = 1, .max = 3600}},

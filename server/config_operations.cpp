@@ -4,6 +4,11 @@
 #include <filesystem>
 
 namespace taclink::server {
+namespace {
+
+constexpr Range kRates{.min = 0, .max = 1'000'000};
+
+}  // namespace
 
 LogOptions ReadLog(YamlMap& root) {
   LogOptions options;
@@ -13,7 +18,8 @@ LogOptions ReadLog(YamlMap& root) {
   options.file = map.Text("file", options.file);
   if (!options.file.empty() && !std::filesystem::path(options.file).is_absolute())
     map.Fail("file", "must be an absolute path");
-  options.rate_limit = map.Integer("rate_limit", options.rate_limit, {.min = 0, .max = 1'000'000});
+  options.rates.per_site = map.Integer("rate_limit", options.rates.per_site, kRates);
+  options.rates.total = map.Integer("rate_limit_total", options.rates.total, kRates);
   map.Done();
   return options;
 }
@@ -26,7 +32,8 @@ void WriteLog(std::ostream& out, const LogOptions& options) {
     for (const char c : options.file) out << (c == '"' || c == '\\' ? "\\" : "") << c;
     out << "\"\n";
   }
-  out << "  rate_limit: " << options.rate_limit << "\n";
+  out << "  rate_limit: " << options.rates.per_site << "\n  rate_limit_total: " << options.rates.total
+      << "\n";
 }
 
 ShutdownConfig ReadShutdown(YamlMap& root) {

@@ -3,18 +3,13 @@
 #include <algorithm>
 #include <array>
 
+#include "sensing/core/name.h"
 #include "server/config_names.h"
 
 namespace taclink::server {
 namespace {
 
 constexpr std::array<std::string_view, 3> kDetails = {"contacts", "geometry", "full"};
-
-bool IsToken(const std::string& text) {
-  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
-  });
-}
 
 void CheckUrl(YamlMap& map, const char* key, const std::string& urls) {
   for (const std::string& url : SplitUrls(urls)) {
@@ -54,9 +49,9 @@ PublishConfig ReadPublish(YamlMap& root, const std::function<std::string(const s
   config.url = map.Text("url");
   if (!config.url.empty()) CheckUrl(map, "url", config.url);
   config.site = map.Text("site", config.site);
-  if (!IsToken(config.site)) map.Fail("site", "must be letters, digits, '-' and '_'");
+  if (const auto good = CheckSubjectPart(config.site); !good) map.Fail("site", good.error().message);
   config.stream = map.Text("stream", "TACLINK_" + config.site);
-  if (!IsToken(config.stream)) map.Fail("stream", "must be letters, digits, '-' and '_'");
+  if (const auto good = CheckSubjectPart(config.stream); !good) map.Fail("stream", good.error().message);
   config.stream_mb = map.Number("stream_mb", config.stream_mb, {.min = 1, .max = 1e9});
   config.tls_ca = file("tls_ca");
   config.certificate = file("certificate");

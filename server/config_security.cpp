@@ -14,6 +14,12 @@ constexpr std::array<std::pair<const char*, std::string SecurityConfig::*>, 4> k
      {"client_ca", &SecurityConfig::client_ca},
      {"tokens", &SecurityConfig::tokens}}};
 
+constexpr const char* kOnError = "tokens_on_error";
+constexpr std::array<std::string_view, 2> kOnErrorWords = {"refuse", "keep"};
+constexpr const char* kPermissions = "tokens_permissions";
+constexpr std::array<std::string_view, 2> kPermissionWords = {"strict", "any"};
+constexpr const char* kFailedTries = "max_failed_tries_per_minute";
+
 }  // namespace
 
 SecurityConfig ReadSecurity(YamlMap& root, const std::function<std::string(const std::string&)>& path) {
@@ -28,6 +34,11 @@ SecurityConfig ReadSecurity(YamlMap& root, const std::function<std::string(const
                   "is of no use alone: 'certificate' and 'key' need each other");
   if (!config.client_ca.empty() && config.certificate.empty())
     security.Fail("client_ca", "needs 'certificate' and 'key': it is asked for within TLS");
+  config.tokens_keep = security.Choice(kOnError, {kOnErrorWords.begin(), kOnErrorWords.end()}, 0) == 1;
+  config.tokens_open =
+      security.Choice(kPermissions, {kPermissionWords.begin(), kPermissionWords.end()}, 0) == 1;
+  config.max_failed_tries =
+      security.Integer(kFailedTries, config.max_failed_tries, {.min = 0, .max = 1'000'000});
   security.Done();
   return config;
 }
@@ -37,7 +48,11 @@ std::string SecurityText(const SecurityConfig& config) {
   for (const auto& [name, member] : kFiles) {
     if (!(config.*member).empty()) out += std::string("  ") + name + ": " + Quoted(config.*member) + "\n";
   }
-  return out.empty() ? out : "security:\n" + out;
+  const std::string indent = "  ";
+  out += indent + kOnError + ": " + std::string(kOnErrorWords[config.tokens_keep ? 1 : 0]) + "\n";
+  out += indent + kPermissions + ": " + std::string(kPermissionWords[config.tokens_open ? 1 : 0]) + "\n";
+  out += indent + kFailedTries + ": " + std::to_string(config.max_failed_tries) + "\n";
+  return "security:\n" + out;
 }
 
 }  // namespace taclink::server

@@ -81,6 +81,7 @@ std::string ConfigText(const Config& config) {
     if (link.calibration) out << "      calibration: " << Quoted(*link.calibration) << "\n";
     out << PressureText(link.pressure);
     out << "      force_model: " << (link.force_model ? Name(*link.force_model) : "auto") << "\n";
+    if (link.force_model_anyway) out << "      force_model_anyway: true\n";
     out << "      force_refinement: " << link.force_refinement << "\n";
     out << DriftText(link.drift) << RulesText(link.rules);
     out << "      pose: {";

@@ -38,6 +38,7 @@ bool MarkersWithin(double move_mm, const LinkState& before, const LinkState& now
 
 bool Within(const Deadband& deadband, const LinkState& before, const LinkState& now) {
   if (!deadband.on() || before.status != now.status) return false;
+  if (before.has_forces() != now.has_forces()) return false;
   if (before.shape.positions_mm.size() != now.shape.positions_mm.size()) return false;
   if (deadband.force_n > 0 && !ForcesWithin(deadband.force_n, before, now)) return false;
   return deadband.move_mm <= 0 || MarkersWithin(deadband.move_mm, before, now);

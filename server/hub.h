@@ -11,6 +11,7 @@
 
 #include "sensing/core/link_state.h"
 #include "sensing/core/markers.h"
+#include "server/byte_budget.h"
 #include "server/deadband.h"
 #include "wire/detail.h"
 
@@ -83,6 +84,8 @@ struct SubscriberOptions {
   size_t queue_capacity = 256;  ///< with kEvery, states of all links together
   /// With kEvery: what waits costs no more (Publication::Cost), but for the newest state, which always waits.
   size_t queue_bytes = size_t{32} << 20;
+  /// Likewise what waits for all subscribers that share it; null: shared with nobody.
+  std::shared_ptr<ByteBudget> party_bytes = {};
   Detail detail = Detail::kContacts;  ///< that the subscriber will read at, for the cost
   Deadband deadband = {};
   bool pictures = false;  ///< also what the states were made of; counts in the cost
@@ -91,7 +94,7 @@ struct SubscriberOptions {
 struct DeliveryCounts {
   uint64_t taken = 0;
   uint64_t dropped = 0;            ///< wanted, but replaced or pushed out before they were taken
-  uint64_t dropped_for_bytes = 0;  ///< of these, pushed out because of queue_bytes
+  uint64_t dropped_for_bytes = 0;  ///< of these, pushed out because of queue_bytes or party_bytes
   uint64_t unchanged = 0;          ///< left out because of the deadband
 };
 

@@ -8,7 +8,7 @@
 namespace taclink::server {
 namespace {
 
-Error Invalid(std::string what) {
+Error InvalidJoints(std::string what) {
   return {ErrorCode::kInvalidArgument, std::move(what)};
 }
 
@@ -22,11 +22,13 @@ std::string List(const std::vector<JointInfo>& joints) {
 
 Result<void> JointStateIntake::Take(const JointMessage& message) {
   const auto good = Check(message);
-  if (good) return {};
+  return good ? good : AtNextMessage(good.error());
+}
+
+Error JointStateIntake::AtNextMessage(const Error& error) const {
   const uint64_t number = counts_.accepted + counts_.refused + 1;
-  return Error{good.error().code, "joint states, message " + std::to_string(number) +
-                                      " of this call: " + good.error().message + "; " +
-                                      std::to_string(counts_.accepted) + " before it were accepted"};
+  return {error.code, "joint states, message " + std::to_string(number) + " of this call: " + error.message +
+                          "; " + std::to_string(counts_.accepted) + " before it were accepted"};
 }
 
 Result<void> JointStateIntake::Check(const JointMessage& message) {
@@ -35,13 +37,13 @@ Result<void> JointStateIntake::Check(const JointMessage& message) {
   if (!message.names.empty()) {
     if (const auto named = SetNames(message.names); !named) return named.error();
   }
-  if (!named_) return Invalid("the first message must name the joints");
+  if (!named_) return InvalidJoints("the first message must name the joints");
   if (message.positions.size() != names_)
-    return Invalid(std::to_string(message.positions.size()) + " positions for " + std::to_string(names_) +
-                   " joints");
+    return InvalidJoints(std::to_string(message.positions.size()) + " positions for " +
+                         std::to_string(names_) + " joints");
   if (!message.velocities.empty() && message.velocities.size() != names_)
-    return Invalid(std::to_string(message.velocities.size()) + " velocities for " + std::to_string(names_) +
-                   " joints; give one for each, or none");
+    return InvalidJoints(std::to_string(message.velocities.size()) + " velocities for " +
+                         std::to_string(names_) + " joints; give one for each, or none");
   const auto time_ns = TimeOf(message);
   if (!time_ns) return time_ns.error();
 
@@ -70,10 +72,10 @@ Result<void> JointStateIntake::SetNames(const std::vector<std::string>& names) {
   std::vector<size_t> places, joints;
   for (size_t place = 0; place < names.size(); ++place) {
     const std::string& name = names[place];
-    if (!seen.insert(name).second) return Invalid("joint '" + name + "' is named twice");
+    if (!seen.insert(name).second) return InvalidJoints("joint '" + name + "' is named twice");
     const auto joint = kinematics.FindJoint(name);
     if (!joint && kinematics.IsDependent(name)) continue;  // follows from the others
-    if (!joint) return Invalid("no joint '" + name + "'; there are: " + List(kinematics.joints()));
+    if (!joint) return InvalidJoints("no joint '" + name + "'; there are: " + List(kinematics.joints()));
     places.push_back(place);
     joints.push_back(*joint);
   }
@@ -92,7 +94,8 @@ Result<int64_t> JointStateIntake::TimeOf(const JointMessage& message) const {
   constexpr int64_t kJitterNs = 100'000;
   if (time_ns >= last_ns_ || last_ns_ == 0) return time_ns;
   if (message.utc_ns != 0 && last_ns_ - time_ns < kJitterNs) return last_ns_;
-  return Invalid("its time is " + SecondsText(last_ns_ - time_ns) + " before that of the message before");
+  return InvalidJoints("its time is " + SecondsText(last_ns_ - time_ns) +
+                       " before that of the message before");
 }
 
 void JointStateIntake::Refuse(std::string why) {

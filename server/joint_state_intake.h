@@ -33,6 +33,8 @@ class JointStateIntake {
   /// Errors: kFailedPrecondition (no URDF), kInvalidArgument (which message and what is wrong with it);
   /// then nothing of the message was taken.
   Result<void> Take(const JointMessage& message);
+  /// What is wrong with the message that would be next, with its place in the call.
+  Error AtNextMessage(const Error& error) const;
   const JointCounts& counts() const { return counts_; }
 
  private:

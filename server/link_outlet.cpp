@@ -4,7 +4,9 @@
 
 namespace taclink::server {
 
-void ResetTo(LinkState& state, LinkStatus status, std::string reason) {
+void ResetTo(LinkState& state, LinkStatus status, std::string reason, std::optional<ReasonId> id) {
+  state.reasons.clear();
+  if (id) state.reasons.push_back({*id, reason});
   state.times = {};
   state.status = status;
   state.status_reason = std::move(reason);
@@ -58,11 +60,11 @@ bool LinkOutlet::PublishReport(uint64_t life, std::unique_ptr<LinkState> state) 
   return true;
 }
 
-bool LinkOutlet::PublishStatus(LinkStatus status, const std::string& reason) {
+bool LinkOutlet::PublishLost(const Reason& reason) {
   const std::unique_lock lock(mutex_, std::try_to_lock);  // the watchdog must not hang with a worker
   if (!lock || hub_ == nullptr) return false;
   auto state = pool_.Acquire();
-  ResetTo(*state, status, reason);
+  ResetTo(*state, LinkStatus::kLost, reason.text, reason.id);
   state->sequence = last_sequence_;
   Send(std::move(state));
   return true;

@@ -15,8 +15,8 @@
 
 namespace taclink::server {
 
-/// Turns `state` into one that says nothing but its status; its buffers stay.
-void ResetTo(LinkState& state, LinkStatus status, std::string reason);
+/// Turns `state` into one that says nothing but its status and why; its buffers stay.
+void ResetTo(LinkState& state, LinkStatus status, std::string reason, std::optional<ReasonId> id = {});
 
 /// Where a link's states leave. It outlasts the workers that the link has one after the other: only the
 /// newest may publish, so that one that was given up can do no harm when it comes back. Also the hub may go
@@ -39,7 +39,7 @@ class LinkOutlet {
   /// The same for a mere report of the worker's, which bears the last frame's number.
   bool PublishReport(uint64_t life, std::unique_ptr<LinkState> state);
   /// In place of the worker. False: the worker is publishing at this moment.
-  bool PublishStatus(LinkStatus status, const std::string& reason);
+  bool PublishLost(const Reason& reason);
 
   /// While somebody else reports the link's trouble its worker sends no mere reports.
   void SetTrouble(bool trouble) { trouble_ = trouble; }

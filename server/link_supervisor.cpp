@@ -121,7 +121,7 @@ void LinkSupervisor::Check() {
 void LinkSupervisor::TakeOrder(int64_t now_ns) {
   const Order order = order_.exchange(Order::kNone);
   if (order == Order::kNone || (order == Order::kWake && phase_ != Phase::kResting)) return;
-  spdlog::info("link {}: is started again by order", name_);
+  SPDLOG_INFO("link {}: is started again by order", name_);
   deaths_ = 0;
   if (phase_ == Phase::kRunning) {
     restart_at_once_ = true;
@@ -157,7 +157,7 @@ void LinkSupervisor::Judge(int64_t now_ns) {
   const bool fem_late = JudgeThread(1, worker->fem_mark(), now_ns);
   if (phase_ != Phase::kRunning || capture_late || fem_late) return;
   if (supervision().state != Supervision::State::kOverdue) return;
-  spdlog::info("link {}: goes on", name_);
+  SPDLOG_INFO("link {}: goes on", name_);
   Enter(Phase::kRunning, Supervision::State::kRunning, "", now_ns);
 }
 
@@ -175,7 +175,7 @@ bool LinkSupervisor::JudgeThread(size_t thread, const StageMark& mark, int64_t n
       ++supervision_.overruns;
     }
     const LogEvent event("stage_overdue", {{"limit_s", Seconds(deadline_ns)}});
-    spdlog::warn("link {}: {}", name_, what);
+    SPDLOG_WARN("link {}: {}", name_, what);
     Enter(Phase::kRunning, Supervision::State::kOverdue, what, now_ns);
   }
   if (age_ns > std::max(Ns(limits_.abandon), deadline_ns))
@@ -186,7 +186,7 @@ bool LinkSupervisor::JudgeThread(size_t thread, const StageMark& mark, int64_t n
 void LinkSupervisor::Died(const std::string& reason, int64_t now_ns) {
   deaths_ = now_ns - started_ns_ >= Ns(limits_.proven) ? 1 : deaths_ + 1;
   const LogEvent event("worker_failed", {{"deaths", deaths_}});
-  spdlog::error("link {}: its worker failed, {} in a row: {}", name_, deaths_, reason);
+  SPDLOG_ERROR("link {}: its worker failed, {} in a row: {}", name_, deaths_, reason);
   {
     const std::lock_guard lock(mutex_);
     supervision_.last_failure = reason;
@@ -221,7 +221,7 @@ void LinkSupervisor::GiveUp(const std::string& reason, int64_t now_ns) {
 void LinkSupervisor::Abandon(LinkWorker& worker) {
   worker.Abandon();
   const LogEvent event("worker_abandoned");
-  spdlog::error("link {}: its worker hangs and is given up; its memory stays in use until it returns", name_);
+  SPDLOG_ERROR("link {}: its worker hangs and is given up; its memory stays in use until it returns", name_);
   {
     const std::lock_guard lock(mutex_);
     ++supervision_.abandoned;
@@ -248,7 +248,7 @@ void LinkSupervisor::AfterWorker(int64_t now_ns) {
         "--link {}' or SIGHUP to the server starts it again",
         deaths_, failure, name_);
     const LogEvent event("link_rests", {{"deaths", deaths_}});
-    spdlog::error("link {}: {}", name_, reason);
+    SPDLOG_ERROR("link {}: {}", name_, reason);
     return Enter(Phase::kResting, Supervision::State::kResting, reason, now_ns);
   }
   const int doublings = std::clamp(deaths_ - 1, 0, 16);
@@ -298,7 +298,7 @@ void LinkSupervisor::AwaitBuild(int64_t now_ns) {
     ++supervision_.restarts;
   }
   const LogEvent event("worker_restarted");
-  spdlog::info("link {}: a fresh worker runs", name_);
+  SPDLOG_INFO("link {}: a fresh worker runs", name_);
   Enter(Phase::kRunning, Supervision::State::kRunning, "", now_ns);
 }
 
@@ -320,7 +320,7 @@ void LinkSupervisor::Report(int64_t now_ns) {
     return;
   }
   if (!news_ && now_ns - outlet_->last_published_ns() < Ns(limits_.heartbeat)) return;
-  if (outlet_->PublishStatus(LinkStatus::kLost, now.reason)) news_ = false;
+  if (outlet_->PublishLost({ReasonId::kWorker, now.reason})) news_ = false;
 }
 
 Supervision LinkSupervisor::supervision() const {
@@ -370,7 +370,10 @@ Result<void> LinkSupervisor::SetForceModel(std::optional<ForceModel> model) {
   const auto worker = current();
   if (!worker) return NoWorker();
   try {
-    worker->UseEstimator(factories_.estimator(model));
+    auto estimator = factories_.estimator(model);
+    if (!estimator)
+      return Error{estimator.error().code, "link '" + name_ + "': " + estimator.error().message};
+    worker->UseEstimator(std::move(*estimator));
   } catch (const std::exception& e) {
     return Error{ErrorCode::kInternal, std::string("the force model can't be made: ") + e.what()};
   }

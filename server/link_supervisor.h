@@ -43,8 +43,8 @@ struct LinkFactories {
   std::function<Result<std::unique_ptr<FrameSource>>()> source = {};
   std::function<Result<std::unique_ptr<LinkProcessor>>()> processor = {};
   /// Makes the forces' part of a processor by another model (none: by tolerance, frame by frame). Empty: the
-  /// link has no forces to compute.
-  std::function<std::shared_ptr<StateEstimator>(std::optional<ForceModel>)> estimator = {};
+  /// link has no forces to compute. Errors: a model that does not hold on this link.
+  std::function<Result<std::shared_ptr<StateEstimator>>(std::optional<ForceModel>)> estimator = {};
   /// Processors that are made from now on compute so.
   std::function<void(std::optional<ForceModel>)> choose = {};
 };

@@ -182,7 +182,7 @@ void LinkWorker::TakeEstimator() {
   }
   if (!estimator) return;
   if (const auto used = processor_->UseEstimator(std::move(estimator)); !used)
-    spdlog::error("link {}: force model: {}", name_, used.error().message);
+    SPDLOG_ERROR("link {}: force model: {}", name_, used.error().message);
 }
 
 void LinkWorker::TakeCalibrationOrder() {
@@ -201,11 +201,11 @@ void LinkWorker::TellCalibration() {
   job_frame_ns_ = clock_.MonotonicNs();
   const CalibrationProgress progress = processor_->PollCalibration();
   if (progress.end) {
-    spdlog::info("link {}: calibration: {}", name_, *progress.end ? "done" : progress.end->error().message);
+    SPDLOG_INFO("link {}: calibration: {}", name_, *progress.end ? "done" : progress.end->error().message);
     if (const auto observer = ForgetCalibration()) observer(progress);
   } else if (!job_->observer(progress)) {
     processor_->CancelCalibration();
-    spdlog::info("link {}: calibration: cancelled", name_);
+    SPDLOG_INFO("link {}: calibration: cancelled", name_);
     ForgetCalibration();
   }
 }
@@ -220,7 +220,7 @@ CalibrationObserver LinkWorker::ForgetCalibration() {
 
 void LinkWorker::EndCalibrationWithout(const Error& error) {
   processor_->CancelCalibration();
-  spdlog::info("link {}: calibration: {}", name_, error.message);
+  SPDLOG_INFO("link {}: calibration: {}", name_, error.message);
   if (const auto observer = ForgetCalibration()) observer({.end = error});
 }
 
@@ -244,10 +244,10 @@ void LinkWorker::SolveOne(StereoFrame& frame) {
     settled_ = state->status == LinkStatus::kOk || state->status == LinkStatus::kDegraded;
   } catch (const std::exception& e) {
     if (failing_ == 0)
-      spdlog::error("link {}: frame {} could not be processed: {}", name_, frame.sequence, e.what());
+      SPDLOG_ERROR("link {}: frame {} could not be processed: {}", name_, frame.sequence, e.what());
     if (++failing_ >= options_.failures)
       throw std::runtime_error(std::to_string(failing_) + " frames in a row failed: " + e.what());
-    ResetTo(*state, LinkStatus::kLost, std::string("processing failed: ") + e.what());
+    ResetTo(*state, LinkStatus::kLost, std::string("processing failed: ") + e.what(), ReasonId::kWorker);
     state->times = frame.times;
   }
   state->sequence = frame.sequence;
@@ -276,7 +276,8 @@ void LinkWorker::PublishStatusIfDue() {
   if (condition.state == SourceCondition::State::kStarting) {
     ResetTo(*state, LinkStatus::kStarting, "waiting for the first frame");
   } else {
-    ResetTo(*state, LinkStatus::kLost, running ? "no new frame; waiting" : condition.reason);
+    ResetTo(*state, LinkStatus::kLost, running ? "no new frame; waiting" : condition.reason,
+            ReasonId::kNoFrames);
   }
   outlet_->PublishReport(life_, std::move(state));
 }

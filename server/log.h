@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sensing/core/result.h"
+#include "server/log_limit.h"
 
 namespace taclink::server {
 
@@ -20,23 +21,21 @@ struct LogOptions {
   std::string level = "info";  ///< one of kLogLevels
   LogFormat format = LogFormat::kText;
   std::string file = {};  ///< appended to; empty: standard error
-  int rate_limit = 10;    ///< messages a minute that differ in their numbers only; 0: no limit
+  LogRates rates = {};
 };
 inline constexpr std::array<std::string_view, 4> kLogLevels = {"debug", "info", "warning", "error"};
 
-/// Sends what spdlog's functions are told where `options` say. A message that begins with "link NAME: " is
-/// that link's. May be called again; a file is opened anew, as log rotation wants it. Errors: kUnavailable
-/// (file).
+/// Sends what spdlog's macros (SPDLOG_INFO and so on, which tell where they stand) are told where `options`
+/// say. May be called again; a file is opened anew, as log rotation wants it. Errors: kUnavailable (file).
 Result<void> SetUpLog(const LogOptions& options);
 
-/// Before a sink: lets `a_minute` messages through that differ in their numbers only, then counts, and tells
-/// the count when their minute is over, with the next message of any kind or a flush.
-std::shared_ptr<spdlog::sinks::sink> LimitRate(std::shared_ptr<spdlog::sinks::sink> sink, int a_minute);
-
-/// One JSON object a line: ts (UTC, RFC 3339), level, link, event, message, numbers.
+/// A line for each message, whatever is in it: what a terminal or a reader of lines could take for more than
+/// text is escaped, and a message of more than 4 KiB cut. TextLines: time, level, message. JsonLines: an
+/// object with ts (UTC, RFC 3339), level, link, event, message, numbers.
+std::unique_ptr<spdlog::formatter> TextLines();
 std::unique_ptr<spdlog::formatter> JsonLines();
 
-/// What this thread logs while it lives is about this event and carries these numbers.
+/// What this thread logs while it lives is about this event (null: none) and carries these numbers.
 class LogEvent {
  public:
   using Number = std::pair<const char*, double>;

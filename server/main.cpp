@@ -2,19 +2,25 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <optional>
 #include <string>
+#include <thread>
+#include <vector>
 
+#include "sensing/core/file_modes.h"
+#include "sensing/core/printable.h"
 #include "server/assembly/arm_builder.h"
 #include "server/assembly/config_check.h"
 #include "server/assembly/log_preamble.h"
 #include "server/assembly/replayed_arm.h"
 #include "server/config.h"
 #include "server/gateway/setup.h"
+#include "server/gateway/static_files.h"
 #include "server/log.h"
 #include "server/publish/nats_connection.h"
 #include "server/publish/publisher.h"
@@ -45,8 +51,8 @@ struct Options {
 };
 
 int Complain(std::string message, int code) {
-  for (char& c : message) c = c == '\n' ? ' ' : c;
-  std::fprintf(stderr, "taclinkd: %s\n", message.c_str());
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::fprintf(stderr, "taclinkd: %s\n", Printable(message).c_str());
   return code;
 }
 
@@ -83,7 +89,7 @@ void AddReloads(Reloader& reloader, RpcServer& server, Arm& arm) {
   reloader.Add("log", [](const Config&) { return Result<void>(); });
   reloader.Add("limits", [&server](const Config& next) {
     server.SetLimits(ToServiceLimits(next.limits));
-    spdlog::info(
+    SPDLOG_INFO(
         "of the limits, those of streams and their queues hold from now on, the others from the next start");
     return Result<void>();
   });
@@ -93,19 +99,33 @@ void AddReloads(Reloader& reloader, RpcServer& server, Arm& arm) {
   });
 }
 
-void Reload(const Options& options, Reloader& reloader, const SystemdNotifier& systemd) {
+std::string Joined(const std::vector<std::string>& words) {
+  return words.empty() ? "nothing" : fmt::format("{}", fmt::join(words, ", "));
+}
+
+// Logged by who calls.
+void Audit(Arm& arm, const std::string& what, bool accepted, const std::string& outcome) {
+  arm.events().Audit(what, {.who = "server", .accepted = accepted, .outcome = outcome, .values = {}});
+}
+
+void Reload(const Options& options, Reloader& reloader, Security& security, Arm& arm,
+            const SystemdNotifier& systemd) {
   const int64_t now_us = SystemClock().MonotonicNs() / 1000;
   systemd.Send("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(now_us));
   if (const auto next = Configure(options); !next) {
-    spdlog::error("SIGHUP: the configuration in use stays: {}", next.error().message);
+    const std::string text = "the configuration in use stays: " + next.error().message;
+    SPDLOG_ERROR("SIGHUP: {}", text);
+    Audit(arm, "configuration", false, text);
   } else {
     const Reloader::Outcome outcome = reloader.Reload(*next);
-    for (const auto& error : outcome.errors) spdlog::error("SIGHUP: {}", error);
-    const std::string none = "nothing";
-    spdlog::info(
-        "SIGHUP: taken over: {}; needs a restart: {}",
-        outcome.applied.empty() ? none : fmt::format("{}", fmt::join(outcome.applied, ", ")),
-        outcome.needs_restart.empty() ? none : fmt::format("{}", fmt::join(outcome.needs_restart, ", ")));
+    for (const auto& error : outcome.errors) SPDLOG_ERROR("SIGHUP: {}", error);
+    security.Reload();
+    const std::string text = fmt::format("taken over: {}; needs a restart: {}; changed keys: {}; access: {}",
+                                         Joined(outcome.applied), Joined(outcome.needs_restart),
+                                         Joined(outcome.keys), Joined(security.TakeChanges()));
+    SPDLOG_INFO("SIGHUP: {}", text);
+    Audit(arm, "configuration", outcome.errors.empty(),
+          outcome.errors.empty() ? text : Joined(outcome.errors) + "; " + text);
   }
   systemd.Send("READY=1");
 }
@@ -131,14 +151,14 @@ Result<ReplayedArm> MakeArm(const Options& options, const Config& config) {
   }
   const auto log = OpenReplayedLog(options.replay);
   if (!log) return log.error();
-  spdlog::info("playing {} in place of cameras, again and again", options.replay);
+  SPDLOG_INFO("playing {} in place of cameras, again and again", options.replay);
   return BuildReplayedArm(*log, config, TACLINK_VERSION, SystemClock());
 }
 
 // Null: nothing is to be published.
 Result<std::unique_ptr<Publisher>> StartPublisher(Arm& arm, const PublishConfig& config) {
   if (config.url.empty()) return std::unique_ptr<Publisher>();
-  spdlog::info("publishing to {} as taclink.{}.>", config.url, config.site);
+  SPDLOG_INFO("publishing to {} as taclink.{}.>", config.url, config.site);
   return Publisher::Start(arm, config);
 }
 
@@ -150,6 +170,7 @@ Result<void> Run(const Options& options, const Config& config) {
   const auto made = MakeArm(options, config);
   if (!made) return made.error();
   Arm& arm = *made->arm;
+  (*security)->Listen([&arm](bool good, const std::string& what) { Audit(arm, "access", good, what); });
   Recorder recorder(arm, config.recording, made->preamble);
   const auto server =
       RpcServer::Start(config.listen, arm, ToServiceLimits(config.limits), *security, &recorder);
@@ -158,24 +179,24 @@ Result<void> Run(const Options& options, const Config& config) {
   if (!publisher) return publisher.error();
   const auto gateway = StartGateway(config.http, arm, **server, *security, publisher->get());
   if (!gateway) return gateway.error();
-  (*security)->Watch();
+  const std::jthread watch = (*security)->Watch();
   PingSystemd(arm, systemd);
   recorder.Open();  // before the first frame
   arm.Start();
   Reloader reloader(config);
   AddReloads(reloader, **server, arm);
-  signals.OnReload([&] { Reload(options, reloader, systemd); });
-  spdlog::info("taclinkd {}: arm {} with {} links, listening on {}", TACLINK_VERSION, config.arm_name,
-               config.links.size(), (*server)->address());
+  signals.OnReload([&] { Reload(options, reloader, **security, arm, systemd); });
+  SPDLOG_INFO("taclinkd {}: arm {} with {} links, listening on {}", TACLINK_VERSION, config.arm_name,
+              config.links.size(), (*server)->address());
   systemd.Send("READY=1\nSTATUS=listening on " + (*server)->address());
-  spdlog::info("{}: shutting down", signals.WaitForStop());
+  SPDLOG_INFO("{}: shutting down", signals.WaitForStop());
   systemd.Send("STOPPING=1");
   if (*gateway) (*gateway)->Drain();
   (*server)->Shutdown("server is shutting down", config.shutdown.limit);
   arm.Stop();
   if (*publisher) (*publisher)->Close(config.shutdown.limit);
   recorder.Close();
-  spdlog::info("stopped");
+  SPDLOG_INFO("stopped");
   for (size_t link = 0; link < config.links.size(); ++link) {
     if (!arm.worker(link).LeavesThreads()) continue;
     spdlog::default_logger()->flush();
@@ -190,7 +211,10 @@ int Check(const Options& options, const Config& config) {
   if (!config.publish.url.empty())
     if (const auto publish = CheckPublish(config.publish); !publish)
       findings.errors.push_back(publish.error().message);
-  for (const auto& note : findings.notes) std::fprintf(stderr, "taclinkd: note: %s\n", note.c_str());
+  if (const auto page = StaticFiles::Open(config.http.web_root); !page)
+    findings.errors.push_back(page.error().message);
+  for (const auto& note : findings.notes)
+    std::fprintf(stderr, "taclinkd: note: %s\n", Printable(note).c_str());
   for (const auto& error : findings.errors) Complain(error, kFailed);
   if (!findings.errors.empty()) return kFailed;
   std::printf("OK\n");
@@ -226,7 +250,9 @@ int Main(int argc, char** argv) {
     return Complain(std::string(e.what()) + "; see taclinkd --help", kUsage);
   }
   // gRPC's own messages are for its developers.
-  gpr_set_log_function([](gpr_log_func_args* args) { spdlog::debug("grpc: {}", args->message); });
+  gpr_set_log_function([](gpr_log_func_args* args) {
+    spdlog::log({args->file, args->line, ""}, spdlog::level::debug, "grpc: {}", args->message);
+  });
   const auto config = Configure(options);
   if (!config) return Complain(config.error().message, kFailed);
   if (options.print_config) {
@@ -238,7 +264,7 @@ int Main(int argc, char** argv) {
   spdlog::flush_every(kLogFlush);  // also tells what the rate limit swallowed
   const auto exposure = CheckExposure(*config, options.insecure_open);
   if (!exposure) return Complain(exposure.error().message, kFailed);
-  for (const std::string& warning : *exposure) spdlog::warn("{}", warning);
+  for (const std::string& warning : *exposure) SPDLOG_WARN("{}", warning);
   const auto ran = Run(options, *config);
   return ran ? 0 : Complain(ran.error().message, kFailed);
 }
@@ -247,10 +273,11 @@ int Main(int argc, char** argv) {
 }  // namespace taclink::server
 
 int main(int argc, char** argv) {
+  taclink::KeepFilesFromOthers();
   try {
     return taclink::server::Main(argc, argv);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "taclinkd: failed unexpectedly: %s\n", e.what());
+    std::fprintf(stderr, "taclinkd: failed unexpectedly: %s\n", taclink::Printable(e.what()).c_str());
     return 1;
   }
 }

@@ -4,6 +4,8 @@
 #include <sstream>
 #include <utility>
 
+#include "server/config_changes.h"
+
 namespace taclink::server {
 
 std::vector<std::pair<std::string, std::string>> Sections(const std::string& config_text) {
@@ -16,7 +18,7 @@ std::vector<std::pair<std::string, std::string>> Sections(const std::string& con
   return sections;
 }
 
-Reloader::Reloader(const Config& running) : running_(ConfigText(running)) {}
+Reloader::Reloader(const Config& running) : running_(ConfigText(running)), last_(running_) {}
 
 void Reloader::Add(const std::string& section, Apply apply) {
   const std::lock_guard lock(mutex_);
@@ -33,7 +35,9 @@ Reloader::Outcome Reloader::Reload(const Config& next) {
   Outcome outcome;
   const auto before = Sections(running_);
   std::string running;
-  const auto after = Sections(ConfigText(next));
+  const std::string next_text = ConfigText(next);
+  outcome.keys = ChangedKeys(std::exchange(last_, next_text), next_text);
+  const auto after = Sections(next_text);
   // A section that is not there is an empty one.
   const auto text_in = [](const auto& sections, const std::string& name) {
     const auto at =

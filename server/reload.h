@@ -18,6 +18,7 @@ class Reloader {
     std::vector<std::string> applied;        ///< sections that changed and are in use now
     std::vector<std::string> needs_restart;  ///< sections that changed and are not
     std::vector<std::string> errors;         ///< what could not be taken over; the old stays in use
+    std::vector<std::string> keys;           ///< that changed since the last reload, see ChangedKeys
   };
 
   explicit Reloader(const Config& running);
@@ -38,8 +39,8 @@ class Reloader {
   std::mutex mutex_;
   // Guarded by mutex_.
   std::vector<Hook> sections_, always_;
-  std::string
-      running_;  // text of the configuration in use, where a section was not taken over still the old one
+  std::string running_;  // text of the configuration in use; where a section was not taken over, the old one
+  std::string last_;     // text of the last one that was read
 };
 
 /// Top-level sections of a printed configuration: name and text, in their order.

@@ -41,7 +41,7 @@ void Signals::AwaitStop() {
     if (error) return;
     const char* const name = number == SIGTERM ? "SIGTERM" : "SIGINT";
     if (stopping_) {
-      spdlog::warn("{} again: ending at once", name);
+      SPDLOG_WARN("{} again: ending at once", name);
       spdlog::default_logger()->flush();
       std::_Exit(1);
     }

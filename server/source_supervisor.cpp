@@ -65,9 +65,9 @@ void SourceSupervisor::TryStart() {
   Observe();
   if (!result) return Failed(result.error());
   started_ = true;
-  alive_at_ns_ = clock_.MonotonicNs();
   SourceInfo info = source_->Info();
-  spdlog::info("link {}: source started: {}", name_, info.description);
+  alive_at_ns_ = std::max(clock_.MonotonicNs(), info.begins_at_ns);
+  SPDLOG_INFO("link {}: source started: {}", name_, info.description);
   const std::lock_guard lock(mutex_);
   condition_.info = std::move(info);
   condition_.counters = source_->Counters();
@@ -138,9 +138,9 @@ void SourceSupervisor::SetCondition(SourceCondition::State state, std::string re
     ++condition_.changes;
   }
   if (state == SourceCondition::State::kRunning) {
-    spdlog::info("link {}: frames arrive", name_);
+    SPDLOG_INFO("link {}: frames arrive", name_);
   } else {
-    spdlog::warn("link {}: {}", name_, reason);
+    SPDLOG_WARN("link {}: {}", name_, reason);
   }
 }
 

@@ -17,7 +17,8 @@ size_t StateBytes(const LinkState& state) {
   bytes += Bytes(state.shape.positions_mm) + Bytes(state.shape.displacements_mm) +
            Bytes(state.shape.covariances_mm2) + Bytes(state.shape.sources) + Bytes(state.shape.measured) +
            Bytes(state.shape.rejected);
-  bytes += Bytes(state.forces.forces_n) + Bytes(state.forces.sigmas_n) + Bytes(state.forces.loaded);
+  bytes += Bytes(state.forces.forces_n) + Bytes(state.forces.sigmas_n) + Bytes(state.forces.loaded) +
+           Bytes(state.forces.limits_n);
   bytes += Bytes(state.contacts);
   for (const Contact& contact : state.contacts) bytes += Bytes(contact.markers);
   return bytes;

@@ -1,6 +1,7 @@
 #include "server/subscriber_queue.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace taclink::server {
@@ -22,6 +23,8 @@ size_t Bytes(const FramePictures& pictures) {
 SubscriberQueue::SubscriberQueue(size_t links, SubscriberOptions options, std::function<void()> notify)
     : delivery_(options.delivery),
       most_bytes_(options.queue_bytes),
+      party_bytes_(options.party_bytes ? options.party_bytes
+                                       : std::make_shared<ByteBudget>(std::numeric_limits<size_t>::max())),
       detail_(options.detail),
       deadband_(options.deadband),
       pictures_(options.pictures),
@@ -30,6 +33,15 @@ SubscriberQueue::SubscriberQueue(size_t links, SubscriberOptions options, std::f
       ring_(Capacity(links, options)) {
   for (PerLink& link : links_) link.rate = RateLimit(options.max_rate_hz);
   for (size_t i = 0; i < links && i < options.links.size(); ++i) links_[i].wanted = options.links[i];
+}
+
+SubscriberQueue::~SubscriberQueue() {
+  party_bytes_->Give(bytes_);
+}
+
+void SubscriberQueue::Release(size_t bytes) {
+  bytes_ -= bytes;
+  party_bytes_->Give(bytes);
 }
 
 // A link within its deadband is let in once in a while, so that its silence means something.
@@ -98,17 +110,20 @@ SubscriberQueue::Place SubscriberQueue::PopFirst() {
   Place first = std::exchange(At(0), Place{});
   first_ = (first_ + 1) % ring_.size();
   --count_;
-  bytes_ -= first.cost;
+  Release(first.cost);
   return first;
 }
 
 void SubscriberQueue::PushEvery(Place place, std::vector<Place>& fallen) {
-  while (count_ > 0 && (count_ == ring_.size() || bytes_ + place.cost > most_bytes_)) {
+  bool paid = party_bytes_->TryTake(place.cost);
+  while (count_ > 0 && (count_ == ring_.size() || bytes_ + place.cost > most_bytes_ || !paid)) {
     const bool for_bytes = count_ < ring_.size();
     Place oldest = PopFirst();
     Drop(oldest, for_bytes, place);
     fallen.push_back(std::move(oldest));
+    paid = paid || party_bytes_->TryTake(place.cost);
   }
+  if (!paid) party_bytes_->Take(place.cost);  // the newest always waits
   bytes_ += place.cost;
   At(count_++) = std::move(place);
 }
@@ -116,10 +131,11 @@ void SubscriberQueue::PushEvery(Place place, std::vector<Place>& fallen) {
 // The newest takes the place of the older one, so that a fast link can't push a slow one back.
 void SubscriberQueue::PushLatest(Place place, Place& replaced) {
   bytes_ += place.cost;
+  party_bytes_->Take(place.cost);
   for (size_t i = 0; i < count_; ++i) {
     Place& older = At(i);
     if (older.publication->link() != place.publication->link()) continue;
-    bytes_ -= older.cost;
+    Release(older.cost);
     replaced = std::exchange(older, Place{});
     Drop(replaced, false, place);
     older = std::move(place);

@@ -15,6 +15,9 @@ namespace taclink::server {
 class SubscriberQueue {
  public:
   SubscriberQueue(size_t links, SubscriberOptions options, std::function<void()> notify);
+  ~SubscriberQueue();
+  SubscriberQueue(const SubscriberQueue&) = delete;
+  SubscriberQueue& operator=(const SubscriberQueue&) = delete;
 
   /// True: the subscriber waits and is to be notified.
   bool Offer(const PublicationPtr& publication, const PicturesPtr& pictures);
@@ -48,6 +51,7 @@ class SubscriberQueue {
   enum class News { kNone, kUnchanged, kChanged };
   News Judge(PerLink& link, const LinkState& state) const;
   Place PopFirst();
+  void Release(size_t bytes);
   void Drop(const Place& place, bool for_bytes, Place& incoming);
   void ReferTo(const Place& dropped, Place& next);
   void PushEvery(Place place, std::vector<Place>& fallen);
@@ -57,6 +61,7 @@ class SubscriberQueue {
   // Constant after construction.
   const Delivery delivery_;
   const size_t most_bytes_;
+  const std::shared_ptr<ByteBudget> party_bytes_;
   const Detail detail_;
   const Deadband deadband_;
   const bool pictures_;
@@ -70,7 +75,7 @@ class SubscriberQueue {
   std::vector<Place> ring_;  // count_ of them from first_ on, oldest first
   size_t first_ = 0;
   size_t count_ = 0;
-  size_t bytes_ = 0;    // cost of all places
+  size_t bytes_ = 0;    // cost of all places, taken from party_bytes_
   bool armed_ = false;  // Take found nothing since the last notification
 };
 

@@ -25,12 +25,12 @@ void SetPriority(int priority) {
   if (error == 0 || !FirstTime(told)) return;
   const std::string reason = std::generic_category().message(error);
   if (error == EPERM) {
-    spdlog::warn(
+    SPDLOG_WARN(
         "no right to real-time priority {}: links run as usual. Grant CAP_SYS_NICE (setcap cap_sys_nice+ep "
         "taclinkd) or, under systemd, LimitRTPRIO={}",
         priority, priority);
   } else {
-    spdlog::warn("real-time priority {} can't be set: {}; links run as usual", priority, reason);
+    SPDLOG_WARN("real-time priority {} can't be set: {}; links run as usual", priority, reason);
   }
 }
 
@@ -45,7 +45,7 @@ void SetCpus(const std::vector<int>& cpus) {
   const int error = pthread_setaffinity_np(pthread_self(), sizeof(set), &set);
   static std::atomic<bool> told = false;
   if (error == 0 || !FirstTime(told)) return;
-  spdlog::warn(
+  SPDLOG_WARN(
       "threads can't be bound to CPUs {}: {}; they run on all. This machine, or the service's AllowedCPUs, "
       "has "
       "none of them",

@@ -36,7 +36,7 @@ void Watchdog::Round() {
     const std::lock_guard lock(mutex_);
     if (hook_) hook_();
   } catch (const std::exception& e) {  // no memory, no thread: the next round may do better
-    spdlog::error("the watchdog could not look after the links: {}", e.what());
+    SPDLOG_ERROR("the watchdog could not look after the links: {}", e.what());
   }
 }
 

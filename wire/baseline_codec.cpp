@@ -4,7 +4,7 @@
 namespace taclink::wire {
 namespace {
 
-v1::BaselineOrigin ToWire(BaselineOrigin origin) {
+v1::BaselineOrigin OriginToWire(BaselineOrigin origin) {
   switch (origin) {
     case BaselineOrigin::kStart:
       return v1::BASELINE_ORIGIN_START;
@@ -20,15 +20,15 @@ v1::BaselineOrigin ToWire(BaselineOrigin origin) {
   return v1::BASELINE_ORIGIN_UNSPECIFIED;
 }
 
-BaselineOrigin FromWire(v1::BaselineOrigin origin) {
+BaselineOrigin OriginFromWire(v1::BaselineOrigin origin) {
   for (const auto known : {BaselineOrigin::kStart, BaselineOrigin::kCalibration, BaselineOrigin::kTare,
                            BaselineOrigin::kForcedTare}) {
-    if (ToWire(known) == origin) return known;
+    if (OriginToWire(known) == origin) return known;
   }
   return BaselineOrigin::kNone;
 }
 
-v1::DriftState ToWire(DriftState state) {
+v1::DriftState DriftToWire(DriftState state) {
   switch (state) {
     case DriftState::kFollowing:
       return v1::DRIFT_STATE_FOLLOWING;
@@ -40,9 +40,9 @@ v1::DriftState ToWire(DriftState state) {
   return v1::DRIFT_STATE_UNSPECIFIED;
 }
 
-DriftState FromWire(v1::DriftState state) {
+DriftState DriftFromWire(v1::DriftState state) {
   for (const auto known : {DriftState::kFollowing, DriftState::kHeld}) {
-    if (ToWire(known) == state) return known;
+    if (DriftToWire(known) == state) return known;
   }
   return DriftState::kOff;
 }
@@ -50,17 +50,17 @@ DriftState FromWire(v1::DriftState state) {
 }  // namespace
 
 void Fill(const Baseline& baseline, v1::Baseline& out) {
-  out.set_origin(ToWire(baseline.origin));
+  out.set_origin(OriginToWire(baseline.origin));
   out.set_taken_utc_ns(baseline.taken_utc_ns);
   out.set_drift_m(baseline.drift_mm * kMetresPerMm);
-  out.set_drift_state(ToWire(baseline.drift_state));
+  out.set_drift_state(DriftToWire(baseline.drift_state));
 }
 
 Baseline FromWire(const v1::Baseline& baseline) {
-  return {.origin = FromWire(baseline.origin()),
+  return {.origin = OriginFromWire(baseline.origin()),
           .taken_utc_ns = baseline.taken_utc_ns(),
           .drift_mm = baseline.drift_m() / kMetresPerMm,
-          .drift_state = FromWire(baseline.drift_state())};
+          .drift_state = DriftFromWire(baseline.drift_state())};
 }
 
 }  // namespace taclink::wire

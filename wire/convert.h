@@ -16,6 +16,7 @@ namespace taclink::wire {
 
 v1::Detail ToWire(Detail detail);
 v1::LinkStatus ToWire(LinkStatus status);
+v1::Reason ToWire(ReasonId reason);
 v1::TrackingMode ToWire(TrackingMode mode);
 TrackingMode FromWire(v1::TrackingMode mode);
 v1::AcquireReason ToWire(AcquireReason reason);

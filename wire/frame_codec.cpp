@@ -2,6 +2,7 @@
 
 #include <google/protobuf/io/coded_stream.h>
 
+#include <algorithm>
 #include <array>
 
 #include "taclink/v1/tactile.pb.h"
@@ -115,9 +116,11 @@ void FillFull(const LinkState& state, v1::LinkFrame& out) {
     }
   }
   for (const MarkerSource source : state.shape.sources) out.add_marker_sources(ToWire(source));
-  FillVectors(state.forces.forces_n, 1, *out.mutable_nodal_forces_n());
-  for (const double sigma : state.forces.sigmas_n) out.add_nodal_force_sigmas_n(static_cast<float>(sigma));
-  out.set_force_residual(state.forces.residual);
+  if (state.has_forces()) {
+    FillVectors(state.forces.forces_n, 1, *out.mutable_nodal_forces_n());
+    for (const double sigma : state.forces.sigmas_n) out.add_nodal_force_sigmas_n(static_cast<float>(sigma));
+    for (const double limit : state.forces.limits_n) out.add_detection_limits_n(static_cast<float>(limit));
+  }
   out.set_force_not_converged(!state.forces.converged);
 }
 
@@ -138,7 +141,7 @@ void ReadFull(const v1::LinkFrame& frame, LinkState& state) {
   }
   state.forces.forces_n = VectorsFrom(frame.nodal_forces_n(), 1);
   state.forces.sigmas_n.assign(frame.nodal_force_sigmas_n().begin(), frame.nodal_force_sigmas_n().end());
-  state.forces.residual = frame.force_residual();
+  state.forces.limits_n.assign(frame.detection_limits_n().begin(), frame.detection_limits_n().end());
   state.forces.converged = !frame.force_not_converged();
 }
 
@@ -152,7 +155,54 @@ bool LengthsFit(const v1::LinkFrame& frame) {
   return frame.positions_m_size() % 3 == 0 && Fits(frame.displacements_m_size(), 3, markers) &&
          Fits(frame.displacement_covariances_m2_size(), 6, markers) &&
          Fits(frame.nodal_forces_n_size(), 3, markers) &&
-         Fits(frame.nodal_force_sigmas_n_size(), 1, markers) && Fits(frame.marker_sources_size(), 1, markers);
+         Fits(frame.nodal_force_sigmas_n_size(), 1, markers) &&
+         Fits(frame.marker_sources_size(), 1, markers) && Fits(frame.detection_limits_n_size(), 1, markers);
+}
+
+double SiPer(ReasonUnit unit) {
+  switch (unit) {
+    case ReasonUnit::kMillimeters:
+      return kMetresPerMm;
+    case ReasonUnit::kMegapascals:
+      return kPascalsPerMpa;
+    default:
+      return 1;
+  }
+}
+
+const char* SiName(ReasonUnit unit) {
+  switch (unit) {
+    case ReasonUnit::kMillimeters:
+      return "m";
+    case ReasonUnit::kMegapascals:
+      return "Pa";
+    case ReasonUnit::kSeconds:
+      return "s";
+    case ReasonUnit::kNone:
+      break;
+  }
+  return "";
+}
+
+void FillReason(const Reason& reason, v1::StatusReason& out) {
+  out.set_id(Name(reason.id));
+  out.set_text(reason.text);
+  out.set_reason(ToWire(reason.id));
+  const ReasonUnit unit = UnitOf(reason.id);
+  if (reason.value) out.set_value(*reason.value * SiPer(unit));
+  if (reason.limit) out.set_limit(*reason.limit * SiPer(unit));
+  out.set_unit(SiName(unit));
+}
+
+// By its name, which all versions have. None: another version's.
+std::optional<Reason> ReasonFrom(const v1::StatusReason& message) {
+  const auto id = ReasonNamed(message.id());
+  if (!id) return std::nullopt;
+  Reason reason{*id, message.text()};
+  const double per = SiPer(UnitOf(*id));
+  if (message.has_value()) reason.value = message.value() / per;
+  if (message.has_limit()) reason.limit = message.limit() / per;
+  return reason;
 }
 
 void FillCamera(const CameraCounts& counts, const CameraTracking& tracking, v1::CameraCounts& out) {
@@ -192,12 +242,17 @@ void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFra
   out.set_markers_seen(static_cast<uint32_t>(state.shape.seen()));
   out.set_markers_inferred(static_cast<uint32_t>(state.shape.CountOf(MarkerSource::kInferred)));
   for (const Contact& contact : state.contacts) FillContact(contact, detail, *out.add_contacts());
-  Fill(state.total_force_n, 1, *out.mutable_total_force_n());
-  for (const Reason& reason : state.reasons) {
-    v1::StatusReason& added = *out.add_status_reasons();
-    added.set_id(Name(reason.id));
-    added.set_text(reason.text);
+  if (state.has_forces()) {
+    Fill(state.total_force_n, 1, *out.mutable_total_force_n());
+    out.set_force_residual(state.forces.residual);
+    out.set_camera_shift_m(state.forces.camera_shift_mm * kMetresPerMm);
+    if (!state.forces.limits_n.empty()) {
+      out.set_detection_limit_n(
+          *std::max_element(state.forces.limits_n.begin(), state.forces.limits_n.end()));
+      out.set_detection_limit_around_n(state.forces.limit_around_n);
+    }
   }
+  for (const Reason& reason : state.reasons) FillReason(reason, *out.add_status_reasons());
   if (state.pressure_estimate) {
     out.mutable_pressure_estimate()->set_pressure_pa(state.pressure_estimate->mpa * kPascalsPerMpa);
     out.mutable_pressure_estimate()->set_sigma_pa(state.pressure_estimate->sigma_mpa * kPascalsPerMpa);
@@ -262,13 +317,16 @@ Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
   if (frame.has_pressure_pa()) state.pressure_mpa = frame.pressure_pa() / kPascalsPerMpa;
   for (const auto& contact : frame.contacts()) state.contacts.push_back(ContactFrom(contact));
   for (const v1::StatusReason& reason : frame.status_reasons()) {
-    if (const auto id = ReasonNamed(reason.id())) state.reasons.push_back({*id, reason.text()});
+    if (auto known = ReasonFrom(reason)) state.reasons.push_back(*std::move(known));
   }
   if (frame.has_pressure_estimate())
     state.pressure_estimate = {frame.pressure_estimate().pressure_pa() / kPascalsPerMpa,
                                frame.pressure_estimate().sigma_pa() / kPascalsPerMpa};
   state.total_force_n = FromWire(frame.total_force_n(), 1);
   state.forces.model = FromWire(frame.force_model());
+  state.forces.residual = frame.force_residual();
+  state.forces.camera_shift_mm = frame.camera_shift_m() / kMetresPerMm;
+  state.forces.limit_around_n = frame.detection_limit_around_n();
   state.baseline_age_s = frame.baseline_age_s();
   state.baseline = FromWire(frame.baseline());
   state.stage_ms = StageTimesFrom(frame.stage_times());
@@ -280,6 +338,8 @@ Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
   state.replayed = frame.replayed();
   state.shape.positions_mm = VectorsFrom(frame.positions_m(), 1 / kMetresPerMm);
   ReadFull(frame, state);
+  const bool is_measured = state.status == LinkStatus::kOk || state.status == LinkStatus::kDegraded;
+  if (is_measured && !frame.has_total_force_n()) state.forces.converged = false;
   return decoded;
 }
 

@@ -133,6 +133,7 @@ std::string Settings(const std::vector<EvaluationScene>& scenes, const VisionOpt
 }
 
 Result<void> Vision(const VisionOptions& options) {
+  if (auto good = CheckWritable({options.markdown, options.svg, options.json}); !good) return good;
   const auto models = LoadBenchModels(options.model);
   if (!models) return models.error();
   const auto methods = ChooseMethods(options.methods);
@@ -203,6 +204,7 @@ void AddBench(const Arguments& app, Selected& selected) {
   vision.OnChosen([options, &selected] { selected = [options] { return Vision(*options); }; });
   AddBenchAccuracy(bench, selected);
   AddBenchStability(bench, selected);
+  AddBenchWhole(bench, selected);
   AddBenchServer(bench, selected);
   AddBenchLog(bench, selected);
 }

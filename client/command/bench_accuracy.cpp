@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "client/command/bench_files.h"
+#include "client/command/bench_methods.h"
 #include "client/command/json.h"
 #include "sensing/evaluation/accuracy_report.h"
 #include "sensing/model/model_file.h"
@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kDetailNoiseMm = 0.05;
 
-struct Options {
+struct BenchAccuracyOptions {
   std::string model = "cylinder";
   std::vector<std::string> force_models;
   std::vector<int> refinements = {0, 1, 2};
@@ -32,28 +32,7 @@ struct Options {
   std::string markdown, svg, json;
 };
 
-Result<std::vector<AccuracyMethod>> Methods(const Options& options) {
-  std::vector<std::optional<ForceModel>> known(std::begin(kForceModels), std::end(kForceModels));
-  known.emplace_back();
-  std::vector<AccuracyMethod> methods;
-  for (const auto& model : known) {
-    const std::string name = AccuracyMethod{model, 1}.name();
-    const auto& chosen = options.force_models;
-    if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), name) == chosen.end()) continue;
-    for (const int refinement : options.refinements) methods.push_back({model, refinement});
-  }
-  for (const std::string& name : options.force_models) {
-    const bool there =
-        std::any_of(methods.begin(), methods.end(), [&](const auto& m) { return m.name() == name; });
-    if (!there)
-      return Error{ErrorCode::kInvalidArgument, "no force model '" + name +
-                                                    "'; there are literal, linear, pressurised, nonlinear "
-                                                    "and auto"};
-  }
-  return methods;
-}
-
-Result<std::vector<PressPath>> Paths(const LinkModel& model, const Options& options) {
+Result<std::vector<PressPath>> Paths(const LinkModel& model, const BenchAccuracyOptions& options) {
   std::vector<double> pressures = options.pressures_kpa;
   if (options.quick) pressures = {0, 1};
   for (double& pressure : pressures) pressure *= 1e-3;
@@ -125,8 +104,8 @@ struct Run {
   std::vector<AccuracyOutcome> outcomes;
 };
 
-Result<Run> Play(const std::vector<LinkModel>& models, const Options& options) {
-  auto methods = Methods(options);
+Result<Run> Play(const std::vector<LinkModel>& models, const BenchAccuracyOptions& options) {
+  auto methods = ForceMethods(options.force_models, options.refinements);
   if (!methods) return methods.error();
   Run run;
   for (const LinkModel& model : models) {
@@ -148,7 +127,7 @@ Result<Run> Play(const std::vector<LinkModel>& models, const Options& options) {
   return run;
 }
 
-std::string Settings(const Run& run, const Options& options) {
+std::string Settings(const Run& run, const BenchAccuracyOptions& options) {
   int scenes = 0, left_out = 0, paths = 0;
   double cpu_s = 0;
   for (const auto& truths : run.truths) {
@@ -169,13 +148,14 @@ std::string Settings(const Run& run, const Options& options) {
   return text;
 }
 
-double DetailNoise(const Options& options) {
+double DetailNoise(const BenchAccuracyOptions& options) {
   const auto& noises = options.noises_mm;
   const bool there = std::find(noises.begin(), noises.end(), kDetailNoiseMm) != noises.end();
   return there ? kDetailNoiseMm : noises.back();
 }
 
-Result<void> Accuracy(const Options& options) {
+Result<void> Accuracy(const BenchAccuracyOptions& options) {
+  if (auto good = CheckWritable({options.markdown, options.svg, options.json}); !good) return good;
   const auto models = LoadBenchModels(options.model);
   if (!models) return models.error();
   // Outcomes point into the truths, whose places moving a Run does not change.
@@ -203,7 +183,7 @@ Result<void> Accuracy(const Options& options) {
   return WriteText(options.json, json.dump(1) + "\n");
 }
 
-void AddScenes(const Arguments& command, Options& options) {
+void AddScenes(const Arguments& command, BenchAccuracyOptions& options) {
   command.AddOption("--model", options.model, "cylinder, barrel, all, or a YAML file").ShowDefault();
   command.AddOption("--pressures-kpa", options.pressures_kpa, "Gauge pressures of the scenes")
       .Delimiter(',')
@@ -221,7 +201,7 @@ void AddScenes(const Arguments& command, Options& options) {
 }  // namespace
 
 void AddBenchAccuracy(const Arguments& bench, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BenchAccuracyOptions>();
   const Arguments accuracy = bench.AddCommand(
       "accuracy", "From marker displacements to contact forces, against the nonlinear forward solver");
   AddScenes(accuracy, *options);

@@ -8,5 +8,7 @@ namespace taclink::command {
 void AddBenchAccuracy(const Arguments& bench, Selected& selected);
 /// `taclink bench stability`.
 void AddBenchStability(const Arguments& bench, Selected& selected);
+/// `taclink bench whole`.
+void AddBenchWhole(const Arguments& bench, Selected& selected);
 
 }  // namespace taclink::command

@@ -7,6 +7,13 @@
 #include "sensing/model/model_file.h"
 
 namespace taclink::command {
+namespace {
+
+Error NotWritable(const std::string& path) {
+  return {ErrorCode::kUnavailable, path + ": cannot be written; check the folder and the disk"};
+}
+
+}  // namespace
 
 Result<std::vector<LinkModel>> LoadBenchModels(const std::string& name) {
   const std::vector<std::string> names =
@@ -20,13 +27,19 @@ Result<std::vector<LinkModel>> LoadBenchModels(const std::string& name) {
   return models;
 }
 
+Result<void> CheckWritable(const std::vector<std::string>& paths) {
+  for (const std::string& path : paths) {
+    if (!path.empty() && !std::ofstream(path, std::ios::app)) return NotWritable(path);
+  }
+  return {};
+}
+
 Result<void> WriteText(const std::string& path, const std::string& text) {
   if (path.empty()) return {};
   std::ofstream file(path, std::ios::trunc);
   file << text;
   file.close();
-  if (!file)
-    return Error{ErrorCode::kUnavailable, path + ": cannot be written; check the folder and the disk"};
+  if (!file) return NotWritable(path);
   return {};
 }
 

@@ -13,6 +13,9 @@ namespace taclink::command {
 /// A shipped model's name, a file, or "all": the shipped ones.
 Result<std::vector<LinkModel>> LoadBenchModels(const std::string& name);
 
+/// Before a run, so that hours of it are not lost. Empty paths are left out. Errors: kUnavailable.
+Result<void> CheckWritable(const std::vector<std::string>& paths);
+
 /// Empty path: nothing. Errors: kUnavailable.
 Result<void> WriteText(const std::string& path, const std::string& text);
 

@@ -14,7 +14,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct BenchLogOptions {
   bool quick = false;
   double megabytes = 1000;
   double max_gb = 10;
@@ -27,7 +27,7 @@ const char* Word(mcap::Compression compression) {
 }
 
 Result<ReportTable> Writing(const std::vector<LogContent>& contents, const std::string& folder,
-                            const Options& options) {
+                            const BenchLogOptions& options) {
   ReportTable table{
       "Writing, until it is on the disk",
       {"messages", "compression", "MB/s", "plain write, MB/s", "of plain", "size", "CPU, us/message"},
@@ -46,7 +46,7 @@ Result<ReportTable> Writing(const std::vector<LogContent>& contents, const std::
 }
 
 Result<ReportTable> Reading(const std::vector<LogContent>& contents, const std::string& folder,
-                            const Options& options) {
+                            const BenchLogOptions& options) {
   ReportTable table{"Reading, uncompressed, from the page cache as far as it reaches",
                     {"GB", "hours", "messages", "open, ms", "seek p50, ms", "p99, ms", "MB/s"},
                     {}};
@@ -63,7 +63,7 @@ Result<ReportTable> Reading(const std::vector<LogContent>& contents, const std::
 }
 
 Result<ReportTable> Recording(const LoadPictures& pictures, const std::string& folder,
-                              const Options& options) {
+                              const BenchLogOptions& options) {
   ReportTable table{"A server of 6 links at 30 frames a second, 640x480",
                     {"recorded", "s", "frames", "lost", "skipped by the links", "MB/s", "server, cores",
                      "without recording, cores"},
@@ -78,7 +78,8 @@ Result<ReportTable> Recording(const LoadPictures& pictures, const std::string& f
   return table;
 }
 
-Result<void> Run(const Options& options) {
+Result<void> RunBenchLog(const BenchLogOptions& options) {
+  if (auto good = CheckWritable({options.markdown}); !good) return good;
   const auto scratch = Scratch::Make(options.folder);
   if (!scratch) return scratch.error();
   const std::string folder = scratch->path.string();
@@ -106,7 +107,7 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddBenchLog(const Arguments& bench, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BenchLogOptions>();
   const Arguments log = bench.AddCommand("log", "Writing, reading and recording of logs");
   log.AddFlag("--quick", options->quick, "One round of each");
   log.AddOption("--megabytes", options->megabytes, "Of messages, for each way of writing")
@@ -122,7 +123,7 @@ void AddBenchLog(const Arguments& bench, Selected& selected) {
   log.AddOption("--taclinkd", options->taclinkd, "The server's program (default: beside this one)");
   log.AddOption("--markdown", options->markdown,
                 "File for the tables, or a page with marks to put them between");
-  log.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  log.OnChosen([options, &selected] { selected = [options] { return RunBenchLog(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -21,7 +21,7 @@ namespace {
 
 using client::Detail;
 
-struct Options {
+struct BenchServerOptions {
   bool quick = false;
   double seconds = 10;
   ServerLoad one = {.links = 0};  // no links: the whole program
@@ -95,7 +95,7 @@ ReportTable Table(const std::string& title, const std::vector<LoadResult>& resul
   return table;
 }
 
-Json ToJson(const LoadResult& r) {
+Json LoadJson(const LoadResult& r) {
   return {{"links", r.load.links},
           {"rate_hz", r.load.rate_hz},
           {"clients", r.load.clients},
@@ -115,8 +115,9 @@ Json ToJson(const LoadResult& r) {
 }
 
 // Loads of the same links and rate share a server, in the order given.
-Result<std::vector<LoadResult>> Run(const std::vector<ServerLoad>& loads, const LoadPictures& pictures,
-                                    const Options& options) {
+Result<std::vector<LoadResult>> RunBenchServer(const std::vector<ServerLoad>& loads,
+                                               const LoadPictures& pictures,
+                                               const BenchServerOptions& options) {
   std::vector<LoadResult> results;
   for (size_t begin = 0; begin < loads.size();) {
     size_t end = begin;
@@ -135,12 +136,12 @@ Result<std::vector<LoadResult>> Run(const std::vector<ServerLoad>& loads, const 
   return results;
 }
 
-std::string Settings(const Options& options) {
+std::string Settings(const BenchServerOptions& options) {
   return "Machine of " + std::to_string(std::thread::hardware_concurrency()) + " cores; " +
          Number("%g", options.seconds) + " s for each row.\n\n";
 }
 
-std::vector<Series> ChooseSeries(const Options& options) {
+std::vector<Series> ChooseSeries(const BenchServerOptions& options) {
   if (options.one.links == 0) return AllSeries(options.quick);
   ServerLoad load = options.one;
   for (const Detail detail : {Detail::kContacts, Detail::kGeometry, Detail::kFull}) {
@@ -149,7 +150,8 @@ std::vector<Series> ChooseSeries(const Options& options) {
   return {{"One load", "", {load}}};
 }
 
-Result<void> Server(Options options) {
+Result<void> Server(BenchServerOptions options) {
+  if (auto good = CheckWritable({options.markdown, options.svg, options.json}); !good) return good;
   if (options.quick) options.seconds = std::min(options.seconds, 3.0);
   const auto scratch = Scratch::Make({});
   if (!scratch) return scratch.error();
@@ -161,14 +163,14 @@ Result<void> Server(Options options) {
   std::vector<PlotPoint> points;
   size_t curve = 0;
   for (const Series& series : ChooseSeries(options)) {
-    const auto results = Run(series.loads, *pictures, options);
+    const auto results = RunBenchServer(series.loads, *pictures, options);
     if (!results) return results.error();
     const ReportTable table = Table(series.title, *results);
     std::printf("%s\n", AlignedText(table).c_str());
     std::fflush(stdout);
     markdown += Markdown(table) + "\n";
     for (const LoadResult& result : *results) {
-      json.push_back(ToJson(result));
+      json.push_back(LoadJson(result));
       if (series.curve.empty()) continue;
       const int x = curve == 0 ? result.load.links : result.load.clients;
       const bool last = &result == &results->back();
@@ -188,7 +190,7 @@ Result<void> Server(Options options) {
 }  // namespace
 
 void AddBenchServer(const Arguments& bench, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BenchServerOptions>();
   const Arguments server = bench.AddCommand(
       "server", "A server of its own under links x clients x detail: rates, drops, latency, CPU, memory");
   server.AddFlag("--quick", options->quick, "Fewer rows of 3 s");

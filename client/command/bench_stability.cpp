@@ -19,7 +19,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct BenchStabilityOptions {
   std::string markdown, only;
   int refinement = 2, jobs = 1;
 };
@@ -85,7 +85,8 @@ std::string Count(const std::vector<StabilityRow>& rows, const char* what) {
   return text;
 }
 
-Result<void> Stability(const Options& options) {
+Result<void> Stability(const BenchStabilityOptions& options) {
+  if (auto good = CheckWritable({options.markdown}); !good) return good;
   const auto base = LoadLinkModel("cylinder");
   if (!base) return base.error();
   const auto chosen = [&](std::vector<SkinCase> cases) {
@@ -117,7 +118,7 @@ Result<void> Stability(const Options& options) {
 }  // namespace
 
 void AddBenchStability(const Arguments& bench, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BenchStabilityOptions>();
   const Arguments stability =
       bench.AddCommand("stability", "The mechanics at extreme skins, loads and inputs, case by case");
   stability.AddOption("--only", options->only, "Skins whose name holds this; without the inputs");

@@ -8,11 +8,10 @@
 
 #include "client/command/connect.h"
 #include "client/command/json.h"
+#include "client/command/units.h"
 
 namespace taclink::command {
 namespace {
-
-constexpr double kMmPerMetre = 1e3;
 
 void PrintText(const client::CalibrationResult& result) {
   fmt::print(

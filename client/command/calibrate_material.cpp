@@ -14,12 +14,12 @@
 #include "client/command/material_report.h"
 #include "client/command/picture_solver.h"
 #include "client/command/probe_csv.h"
+#include "sensing/core/units.h"
 #include "sensing/model/model_file.h"
 
 namespace taclink::command {
 namespace {
 
-constexpr double kMpaPerKpa = 1e-3;
 constexpr size_t kInflationWords = 2, kPictureWords = 3;
 
 struct MaterialOptions {

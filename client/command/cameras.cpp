@@ -14,7 +14,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct CamerasOptions {
   bool json = false;
 };
 
@@ -69,7 +69,7 @@ void PrintJson(const std::vector<FoundCamera>& cameras) {
 }  // namespace
 
 void AddCameras(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CamerasOptions>();
   const Arguments command =
       app.AddCommand("cameras", "List this machine's cameras, as the configuration can name them");
   command.AddFlag("--json", options->json, "One JSON list");

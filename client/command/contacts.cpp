@@ -1,14 +1,13 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 
 #include "client/command/commands.h"
 #include "client/command/connect.h"
 #include "client/command/contacts_view.h"
+#include "client/command/interrupt.h"
 #include "client/taclink/arm_contacts.h"
 
 namespace taclink::command {
@@ -16,33 +15,29 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPoll{100};       // how soon Ctrl-C is noticed
 constexpr milliseconds kPatience{5000};  // the server says something once a second
 constexpr const char* kHomeAndClear = "\x1b[H\x1b[2J";
 
-struct Options {
+struct ContactsOptions {
   std::string server = "127.0.0.1:50051";
   double rate_hz = 10;
   bool json = false;
   uint64_t count = 0;
 };
 
-std::atomic<bool> interrupted = false;
-
-Result<void> Run(const Options& options) {
+Result<void> RunContacts(const ContactsOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   auto reader = connection->StreamContacts(options.rate_hz);
   if (!reader) return reader.error();
-  std::signal(SIGINT, [](int) { interrupted = true; });
-  std::signal(SIGTERM, [](int) { interrupted = true; });
+  CatchInterrupts();
   const bool live = !options.json && isatty(STDOUT_FILENO) == 1;
   milliseconds silence{0};
-  for (uint64_t taken = 0; !interrupted && (options.count == 0 || taken < options.count);) {
-    const auto arm = (*reader)->Next(kPoll);
+  for (uint64_t taken = 0; !IsInterrupted() && (options.count == 0 || taken < options.count);) {
+    const auto arm = (*reader)->Next(kInterruptPoll);
     if (!arm) {
       if (arm.error().code != ErrorCode::kTimeout) return arm.error();
-      if ((silence += kPoll) > kPatience + milliseconds(static_cast<int64_t>(3e3 / options.rate_hz)))
+      if ((silence += kInterruptPoll) > kPatience + milliseconds(static_cast<int64_t>(3e3 / options.rate_hz)))
         return Error{ErrorCode::kUnavailable, "nothing from the server at " + options.server +
                                                   " for some seconds; check server and network"};
       continue;
@@ -60,7 +55,7 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddContacts(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ContactsOptions>();
   const Arguments command =
       app.AddCommand("contacts", "Show all contacts of the arm in its base frame, and joint torques");
   AddServerOption(command, options->server);
@@ -69,7 +64,7 @@ void AddContacts(const Arguments& app, Selected& selected) {
       .ShowDefault();
   command.AddFlag("--json", options->json, "One JSON object a line");
   command.AddOption("--count", options->count, "End after so many").Must(Positive());
-  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.OnChosen([options, &selected] { selected = [options] { return RunContacts(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -2,19 +2,13 @@
 
 #include <fmt/format.h>
 
-#include "client/command/json.h"
+#include "client/command/frame_json.h"
+#include "client/command/units.h"
 
 namespace taclink::command {
 namespace {
 
-constexpr double kMmPerMetre = 1e3;
-constexpr double kMm2PerSquareMetre = 1e6;
-
-Json SigmasJson(const std::optional<client::Covariance3>& covariance, double scale) {
-  return covariance ? ToJson(client::Sigmas(*covariance), scale) : Json(nullptr);
-}
-
-Json ContactJson(const client::ArmContact& contact) {
+Json ArmContactJson(const client::ArmContact& contact) {
   return {{"id", contact.id},
           {"link", contact.link},
           {"center_mm", ToJson(contact.center_m, kMmPerMetre)},
@@ -42,20 +36,26 @@ std::string ContactsJson(const client::ArmContacts& arm) {
     links.push_back(
         {{"link", link.link},
          {"status", client::Name(link.status)},
+         {"forces_unknown", link.forces_unknown},
          {"sequence", link.sequence},
          {"pose", client::Name(link.validity)},
          {"joint_state_distance_ms",
           link.joint_state_distance_s < 0 ? Json(nullptr) : Json(link.joint_state_distance_s * 1e3)}});
   }
-  for (const auto& contact : arm.contacts) contacts.push_back(ContactJson(contact));
+  for (const auto& contact : arm.contacts) contacts.push_back(ArmContactJson(contact));
   for (const auto& joint : arm.joints) {
     joints[joint.joint] = {{"torque_nm", joint.torque_nm},
                            {"sigma_nm", joint.sigma_nm ? Json(*joint.sigma_nm) : Json(nullptr)}};
   }
-  const Json json = {{"sequence", arm.sequence},           {"utc_ns", arm.utc_ns},
-                     {"pose", client::Name(arm.validity)}, {"contacts", std::move(contacts)},
-                     {"total_force_n", arm.total_force_n}, {"total_moment_nm", arm.total_moment_nm},
-                     {"joints", std::move(joints)},        {"links", std::move(links)}};
+  const auto sum = [](const auto& total) { return total ? Json(*total) : Json(nullptr); };
+  const Json json = {{"sequence", arm.sequence},
+                     {"utc_ns", arm.utc_ns},
+                     {"pose", client::Name(arm.validity)},
+                     {"contacts", std::move(contacts)},
+                     {"total_force_n", sum(arm.total_force_n)},
+                     {"total_moment_nm", sum(arm.total_moment_nm)},
+                     {"joints", std::move(joints)},
+                     {"links", std::move(links)}};
   return json.dump();
 }
 
@@ -67,7 +67,12 @@ std::string ContactsTable(const client::ArmContacts& arm) {
                        Triple(contact.center_m, kMmPerMetre, 1), Triple(contact.force_n, 1, 2),
                        contact.normal_force_n, client::Name(contact.validity));
   }
-  if (arm.contacts.empty()) out += "no contacts\n";
+  std::string unknown;
+  for (const auto& link : arm.links) {
+    if (link.forces_unknown) unknown += (unknown.empty() ? "" : ", ") + link.link;
+  }
+  if (!unknown.empty()) out += "FORCES NOT KNOWN: " + unknown + "\n";
+  if (arm.contacts.empty() && unknown.empty()) out += "no contacts\n";
   if (arm.joints.empty()) return out;
   out += "JOINT TORQUES Nm (N):";
   for (const auto& joint : arm.joints) {

@@ -99,7 +99,7 @@ Result<Labelled> LabelFor(const DetectOptions& options, const LinkModel& model, 
   return Labelled{CameraId::kBottom, 2 * misfits[1] >= misfits[0], *std::move(bottom)};
 }
 
-Json ToJson(const Detection& d) {
+Json DetectionJson(const Detection& d) {
   return {{"x", d.center_px.x()},
           {"y", d.center_px.y()},
           {"width", d.width_px},
@@ -124,7 +124,7 @@ Result<void> DetectLabelled(const DetectOptions& options, const cv::Mat& gray, c
   }
   Json markers = Json::array();
   for (const PictureMarker& m : found->labels.markers) {
-    Json marker = ToJson(m.detection);
+    Json marker = DetectionJson(m.detection);
     marker["path"] = model->PathOf(m.marker) + 1;
     marker["ring"] = model->RingOf(m.marker) + 1;
     markers.push_back(std::move(marker));
@@ -148,7 +148,7 @@ Result<void> Detect(const DetectOptions& options) {
   }
   if (options.json) {
     Json markers = Json::array();
-    for (const Detection& d : detections) markers.push_back(ToJson(d));
+    for (const Detection& d : detections) markers.push_back(DetectionJson(d));
     std::puts(Json({{"markers", markers}}).dump().c_str());
   } else {
     const auto clipped =

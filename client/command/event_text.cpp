@@ -6,11 +6,11 @@
 #include <chrono>
 
 #include "client/command/json.h"
+#include "client/command/units.h"
+#include "sensing/core/printable.h"
 
 namespace taclink::command {
 namespace {
-
-constexpr double kMmPerMetre = 1e3;
 
 using client::EventKind;
 
@@ -104,10 +104,10 @@ std::string EventJson(const client::Event& event, const std::string& run_id) {
 std::string EventText(const client::Event& event) {
   const auto seconds = static_cast<std::time_t>(event.raised_utc_ns / 1'000'000'000);
   const auto latency = event.latency_s();
-  return fmt::format("{:%H:%M:%S}.{:03}  {:<14}  {:<10}  {}{}", fmt::gmtime(seconds),
-                     event.raised_utc_ns / 1'000'000 % 1000, client::Name(event.kind),
-                     event.link.empty() ? "-" : event.link, Detail(event),
-                     latency ? fmt::format("  [{:.0f} ms]", *latency * 1e3) : "");
+  return Printable(fmt::format("{:%H:%M:%S}.{:03}  {:<14}  {:<10}  {}{}", fmt::gmtime(seconds),
+                               event.raised_utc_ns / 1'000'000 % 1000, client::Name(event.kind),
+                               event.link.empty() ? "-" : event.link, Detail(event),
+                               latency ? fmt::format("  [{:.0f} ms]", *latency * 1e3) : ""));
 }
 
 }  // namespace taclink::command

@@ -1,22 +1,19 @@
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 
 #include "client/command/commands.h"
 #include "client/command/connect.h"
 #include "client/command/event_text.h"
+#include "client/command/interrupt.h"
 #include "client/command/json.h"
 #include "client/taclink/client.h"
 
 namespace taclink::command {
 namespace {
 
-constexpr std::chrono::milliseconds kPoll{100};  // how soon Ctrl-C is noticed
-
-struct Options {
+struct EventsOptions {
   std::string server = "127.0.0.1:50051";
   client::EventOptions stream;
   std::vector<std::string> kinds;
@@ -26,8 +23,6 @@ struct Options {
   bool json = false;
   uint64_t count = 0;
 };
-
-std::atomic<bool> interrupted = false;
 
 void PrintLost(bool json, const client::EventReader& reader, uint64_t& told) {
   if (reader.events_lost() == told) return;
@@ -47,7 +42,7 @@ void PrintStart(bool json, const client::EventReader& reader) {
   std::fflush(stdout);
 }
 
-Result<void> Run(const Options& options) {
+Result<void> RunEvents(const EventsOptions& options) {
   client::EventOptions stream = options.stream;
   for (const std::string& name : options.kinds) stream.kinds.push_back(*client::EventKindOf(name));
   if (options.all) stream.resume.emplace();
@@ -56,12 +51,11 @@ Result<void> Run(const Options& options) {
   if (!connection) return connection.error();
   auto reader = connection->StreamEvents(stream);
   if (!reader) return reader.error();
-  std::signal(SIGINT, [](int) { interrupted = true; });
-  std::signal(SIGTERM, [](int) { interrupted = true; });
+  CatchInterrupts();
   PrintStart(options.json, **reader);
   uint64_t lost_told = 0;
-  for (uint64_t taken = 0; !interrupted && (options.count == 0 || taken < options.count);) {
-    const auto event = (*reader)->Next(kPoll);
+  for (uint64_t taken = 0; !IsInterrupted() && (options.count == 0 || taken < options.count);) {
+    const auto event = (*reader)->Next(kInterruptPoll);
     PrintLost(options.json, **reader, lost_told);
     if (event) {
       fmt::print("{}\n", options.json ? EventJson(*event, (*reader)->place().run_id) : EventText(*event));
@@ -78,7 +72,7 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddEvents(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EventsOptions>();
   const Arguments command = app.AddCommand(
       "events", "Show what happens to a server's links: contacts, force levels, status, tares, drift");
   AddServerOption(command, options->server);
@@ -97,7 +91,7 @@ void AddEvents(const Arguments& app, Selected& selected) {
   command.AddFlag("--all", options->all, "Begin with all that the server still has");
   command.AddFlag("--json", options->json, "One JSON object a line for each event");
   command.AddOption("--count", options->count, "End after so many events").Must(Positive());
-  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.OnChosen([options, &selected] { selected = [options] { return RunEvents(*options); }; });
 }
 
 }  // namespace taclink::command

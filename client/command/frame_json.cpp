@@ -1,17 +1,15 @@
 #include "client/command/frame_json.h"
 
 #include "client/command/json.h"
+#include "client/command/units.h"
 
 namespace taclink::command {
-namespace {
-
-constexpr double kMmPerMetre = 1e3;
-constexpr double kMm2PerSquareMetre = 1e6;
-constexpr double kKpaPerPascal = 1e-3;
 
 Json SigmasJson(const std::optional<client::Covariance3>& covariance, double scale) {
   return covariance ? ToJson(client::Sigmas(*covariance), scale) : Json(nullptr);
 }
+
+namespace {
 
 Json ContactJson(const client::Contact& contact) {
   return {{"id", contact.id},
@@ -49,28 +47,38 @@ Json EstimateJson(const std::optional<client::PressureEstimate>& estimate) {
 std::string FrameJson(const client::Frame& frame) {
   Json reasons = Json::array();
   for (const auto& reason : frame.status_reasons)
-    reasons.push_back({{"id", reason.id}, {"text", reason.text}});
+    reasons.push_back({{"id", reason.id},
+                       {"text", reason.text},
+                       {"value", reason.value ? Json(*reason.value) : Json(nullptr)},
+                       {"limit", reason.limit ? Json(*reason.limit) : Json(nullptr)},
+                       {"unit", reason.unit}});
   const auto latency = frame.latency_s();
   Json contacts = Json::array();
   for (const auto& contact : frame.contacts) contacts.push_back(ContactJson(contact));
-  Json json = {{"link", frame.link},
-               {"sequence", frame.sequence},
-               {"exposure_utc_ns", frame.times.exposure_utc_ns},
-               {"latency_ms", latency ? Json(*latency * 1e3) : Json(nullptr)},
-               {"status", client::Name(frame.status)},
-               {"reason", frame.status_reason},
-               {"reasons", std::move(reasons)},
-               {"pressure_kpa", frame.pressure_pa ? Json(*frame.pressure_pa * kKpaPerPascal) : Json(nullptr)},
-               {"pressure", PressureJson(frame.pressure)},
-               {"pressure_estimate_kpa", EstimateJson(frame.pressure_estimate)},
-               {"force_model", client::Name(frame.force_model)},
-               {"markers", {{"seen", frame.markers_seen}, {"inferred", frame.markers_inferred}}},
-               {"tracked", frame.tracked},
-               {"picture_share", frame.picture_share},
-               {"unchanged", frame.unchanged},
-               {"replayed", frame.replayed},
-               {"contacts", std::move(contacts)},
-               {"total_force_n", frame.total_force_n}};
+  Json json = {
+      {"link", frame.link},
+      {"sequence", frame.sequence},
+      {"exposure_utc_ns", frame.times.exposure_utc_ns},
+      {"latency_ms", latency ? Json(*latency * 1e3) : Json(nullptr)},
+      {"status", client::Name(frame.status)},
+      {"reason", frame.status_reason},
+      {"reasons", std::move(reasons)},
+      {"pressure_kpa", frame.pressure_pa ? Json(*frame.pressure_pa * kKpaPerPascal) : Json(nullptr)},
+      {"pressure", PressureJson(frame.pressure)},
+      {"pressure_estimate_kpa", EstimateJson(frame.pressure_estimate)},
+      {"force_model", client::Name(frame.force_model)},
+      {"markers", {{"seen", frame.markers_seen}, {"inferred", frame.markers_inferred}}},
+      {"tracked", frame.tracked},
+      {"picture_share", frame.picture_share},
+      {"unchanged", frame.unchanged},
+      {"replayed", frame.replayed},
+      {"contacts", std::move(contacts)},
+      {"total_force_n", frame.total_force_n ? Json(*frame.total_force_n) : Json(nullptr)},
+      {"detection_limit_n", frame.detection_limit_n ? Json(*frame.detection_limit_n) : Json(nullptr)},
+      {"detection_limit_around_n",
+       frame.detection_limit_around_n ? Json(*frame.detection_limit_around_n) : Json(nullptr)},
+      {"force_residual", frame.force_residual ? Json(*frame.force_residual) : Json(nullptr)},
+      {"camera_shift_mm", frame.camera_shift_m ? Json(*frame.camera_shift_m * kMmPerMetre) : Json(nullptr)}};
   if (!frame.positions_m.empty()) json["positions_mm"] = ToJson(frame.positions_m, kMmPerMetre);
   if (!frame.displacements_m.empty()) json["displacements_mm"] = ToJson(frame.displacements_m, kMmPerMetre);
   if (!frame.nodal_forces_n.empty()) json["nodal_forces_n"] = ToJson(frame.nodal_forces_n, 1);

@@ -7,6 +7,7 @@
 
 #include "client/command/frame_json.h"
 #include "client/command/json.h"
+#include "sensing/core/printable.h"
 
 namespace taclink::command {
 namespace {
@@ -31,7 +32,7 @@ void FrameOutput::Take(const client::Frame& frame, const std::vector<client::Str
   } else if (live_) {
     view_.Take(frame);
   } else {
-    for (const auto& line : log_.Take(frame)) fmt::print("{}\n", line);
+    for (const auto& line : log_.Take(frame)) fmt::print("{}\n", Printable(line));
     std::fflush(stdout);
   }
 }

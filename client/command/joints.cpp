@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
-#include <fstream>
 #include <iostream>
 #include <memory>
+#include <sstream>
 #include <thread>
 #include <utility>
 
@@ -10,6 +10,7 @@
 #include "client/command/connect.h"
 #include "client/command/joint_lines.h"
 #include "client/taclink/arm_contacts.h"
+#include "sensing/core/read_file.h"
 
 namespace taclink::command {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 using std::chrono::nanoseconds;
 using std::chrono::system_clock;
 
-struct Options {
+struct JointsOptions {
   std::string server = "127.0.0.1:50051";
   std::string file;
   bool loop = false;
@@ -63,15 +64,18 @@ class Player {
   bool begun_ = false;
 };
 
-Result<void> Run(const Options& options) {
+Result<void> RunJoints(const JointsOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   const auto writer = connection->UpdateJointStates();
   Player player(*writer);
   do {
-    std::ifstream file;
-    if (options.file != "-") file.open(options.file);
-    if (!file) return Error{ErrorCode::kNotFound, options.file + ": cannot be opened; check the path"};
+    std::istringstream file;
+    if (options.file != "-") {
+      auto text = ReadFile(options.file, kMostTableBytes);
+      if (!text) return text.error();
+      file.str(*std::move(text));
+    }
     const auto played = player.Play(options.file == "-" ? std::cin : file);
     if (!played) return Error{played.error().code, options.file + ": " + played.error().message};
   } while (options.loop && options.file != "-");
@@ -85,7 +89,7 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddJoints(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<JointsOptions>();
   const Arguments command = app.AddCommand("joints", "Tell a server where the arm's joints are");
   AddServerOption(command, options->server);
   command
@@ -97,7 +101,7 @@ void AddJoints(const Arguments& app, Selected& selected) {
           "without time_s each line is of the moment it is read")
       .Required();
   command.AddFlag("--loop", options->loop, "Begin again at the file's end");
-  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.OnChosen([options, &selected] { selected = [options] { return RunJoints(*options); }; });
 }
 
 }  // namespace taclink::command

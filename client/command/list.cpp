@@ -8,11 +8,12 @@
 #include "client/command/connect.h"
 #include "client/command/json.h"
 #include "client/taclink/client.h"
+#include "sensing/core/printable.h"
 
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct ListOptions {
   std::string server = "127.0.0.1:50051";
   bool json = false;
 };
@@ -27,10 +28,10 @@ void PrintTable(const client::Arm& arm) {
   fmt::print("{:<{}}  {:<11}  {:>7}  {:>6}  {:>6}  {:>8}  {}\n", "LINK", width, "STATE", "RATE/s", "P50 ms",
              "P99 ms", "CONTACTS", "REASON");
   for (const auto& link : arm.links) {
-    fmt::print("{:<{}}  {:<11}  {:>7.1f}  {:>6}  {:>6}  {:>8}  {}\n", link.name, width,
+    fmt::print("{:<{}}  {:<11}  {:>7.1f}  {:>6}  {:>6}  {:>8}  {}\n", Printable(link.name), width,
                client::Name(link.status), link.rate_hz, Milliseconds(link.latency_p50_s),
                Milliseconds(link.latency_p99_s), link.contacts,
-               link.status_reason.empty() ? "-" : link.status_reason);
+               link.status_reason.empty() ? "-" : Printable(link.status_reason));
   }
 }
 
@@ -46,10 +47,11 @@ void PrintCameras(const client::Arm& arm) {
              "CAMERA", "FORMAT", "RATE/s", "PICTURES", "LOST", "DAMAGED", "UNREAD", "UNPAIRED", "DEVICE");
   for (const auto& link : arm.links) {
     for (const auto& camera : link.cameras) {
-      fmt::print("{:<{}}  {:<6}  {:<14}  {:>6.1f}  {:>8}  {:>6}  {:>7}  {:>6}  {:>8}  {}\n", link.name, width,
-                 camera.name, camera.format.empty() ? "-" : camera.format, camera.rate_hz, camera.pictures,
+      fmt::print("{:<{}}  {:<6}  {:<14}  {:>6.1f}  {:>8}  {:>6}  {:>7}  {:>6}  {:>8}  {}\n",
+                 Printable(link.name), width, Printable(camera.name),
+                 camera.format.empty() ? "-" : Printable(camera.format), camera.rate_hz, camera.pictures,
                  camera.lost, camera.damaged, camera.undecodable, camera.unpaired,
-                 camera.trouble.empty() ? camera.device : camera.trouble);
+                 Printable(camera.trouble.empty() ? camera.device : camera.trouble));
     }
   }
 }
@@ -97,7 +99,7 @@ void PrintJson(const client::Arm& arm) {
   fmt::print("{}\n", json.dump());
 }
 
-Result<void> Run(const Options& options) {
+Result<void> RunList(const ListOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   const auto arm = connection->GetArm();
@@ -114,11 +116,11 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddList(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ListOptions>();
   const Arguments command = app.AddCommand("list", "Show the links of a server");
   AddServerOption(command, options->server);
   command.AddFlag("--json", options->json, "One JSON object");
-  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.OnChosen([options, &selected] { selected = [options] { return RunList(*options); }; });
 }
 
 }  // namespace taclink::command

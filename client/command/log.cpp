@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -8,6 +9,7 @@
 #include "client/command/json.h"
 #include "client/command/log_text.h"
 #include "client/command/log_tools.h"
+#include "sensing/core/printable.h"
 #include "wire/mcap/check.h"
 #include "wire/mcap/file_sink.h"
 #include "wire/mcap/reader.h"
@@ -16,9 +18,9 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct LogOptions {
   std::string file, output;
-  bool json = false;
+  bool json = false, unverified = false;
 };
 
 Error In(const std::string& file, Error error) {
@@ -42,9 +44,9 @@ std::string SchemaName(const mcap::Reader& reader, const mcap::Channel& channel)
   return at == reader.schemas().end() ? "no schema" : at->second.name;
 }
 
-void PrintText(const std::string& file, uint64_t size, const mcap::Reader& reader) {
+void PrintLogText(const std::string& file, uint64_t size, const mcap::Reader& reader) {
   const mcap::Statistics& statistics = reader.statistics();
-  fmt::print("{}: {}, written by {}\n", file, SizeText(size), reader.header().library);
+  fmt::print("{}: {}, written by {}\n", file, SizeText(size), Printable(reader.header().library));
   if (!reader.summary_problem().empty())
     fmt::print("not closed, or damaged: {}; 'taclink log recover' makes it whole\n",
                reader.summary_problem());
@@ -55,22 +57,23 @@ void PrintText(const std::string& file, uint64_t size, const mcap::Reader& reade
   }
   fmt::print("{} messages in {} chunks\n", statistics.message_count, statistics.chunk_count);
   for (const auto& [id, channel] : reader.channels()) {
-    fmt::print("  {:<32} {:>9}  {}\n", channel.topic, MessagesOf(statistics, id),
-               SchemaName(reader, channel));
+    fmt::print("  {:<32} {:>9}  {}\n", Printable(channel.topic), MessagesOf(statistics, id),
+               Printable(SchemaName(reader, channel)));
   }
   for (const auto& attachment : reader.attachments()) {
-    fmt::print("attachment {}, {}, {}\n", attachment.name, attachment.media_type,
+    fmt::print("attachment {}, {}, {}\n", Printable(attachment.name), Printable(attachment.media_type),
                SizeText(attachment.data_size));
   }
   for (const auto& metadata : reader.metadata()) {
     const auto record = reader.ReadMetadata(metadata);
-    fmt::print("metadata {}\n", metadata.name);
+    fmt::print("metadata {}\n", Printable(metadata.name));
     if (!record) continue;
-    for (const auto& [key, value] : record->metadata) fmt::print("  {}: {}\n", key, value);
+    for (const auto& [key, value] : record->metadata)
+      fmt::print("  {}: {}\n", Printable(key), Printable(value));
   }
 }
 
-void PrintJson(const std::string& file, uint64_t size, const mcap::Reader& reader) {
+void PrintLogJson(const std::string& file, uint64_t size, const mcap::Reader& reader) {
   const mcap::Statistics& statistics = reader.statistics();
   Json channels = Json::array(), attachments = Json::array(), metadata = Json::object();
   for (const auto& [id, channel] : reader.channels()) {
@@ -96,19 +99,19 @@ void PrintJson(const std::string& file, uint64_t size, const mcap::Reader& reade
                            {"channels", std::move(channels)},
                            {"attachments", std::move(attachments)},
                            {"metadata", std::move(metadata)}})
-                         .dump());
+                         .dump(-1, ' ', true, Json::error_handler_t::replace));
 }
 
-Result<void> Info(const Options& options) {
+Result<void> Info(const LogOptions& options) {
   const auto source = OpenBytes(options.file);
   if (!source) return source.error();
   const auto reader = mcap::Reader::Open(*source);
   if (!reader) return In(options.file, reader.error());
-  (options.json ? PrintJson : PrintText)(options.file, (*source)->size(), **reader);
+  (options.json ? PrintLogJson : PrintLogText)(options.file, (*source)->size(), **reader);
   return {};
 }
 
-Result<void> CheckLog(const Options& options) {
+Result<void> CheckLog(const LogOptions& options) {
   const auto source = OpenBytes(options.file);
   if (!source) return source.error();
   const auto report = mcap::Check(**source);
@@ -127,27 +130,39 @@ Result<void> CheckLog(const Options& options) {
       fmt::format("{}: {} errors; 'taclink log recover' saves what is intact", options.file, report->errors)};
 }
 
-Result<void> Recover(const Options& options) {
+Result<void> Recover(const LogOptions& options) {
   const auto source = OpenBytes(options.file);
   if (!source) return source.error();
   auto sink = mcap::FileSink::Create(options.output);
   if (!sink) return sink.error();
   mcap::RecoverOptions recover;
   recover.writer.compression = mcap::Compression::kZstd;
+  recover.scan.keep_unverified = options.unverified;
   const auto report = mcap::Recover(**source, **sink, recover);
   if (!report) return In(options.file, report.error());
+  const mcap::ScanReport& scan = report->scan;
+  const mcap::Statistics& written = report->written;
   if (const auto synced = (*sink)->Sync(); !synced) return synced.error();
-  fmt::print("{}\n", report->scan.Text());
-  for (const mcap::LostRange& lost : report->scan.lost)
+  fmt::print("{}\n", scan.Text());
+  for (const mcap::LostRange& lost : scan.lost)
     fmt::print("  lost: bytes {} to {}: {}\n", lost.offset, lost.offset + lost.length, lost.why);
-  fmt::print("{}: {} messages, {} attachments\n", options.output, report->written.message_count,
-             report->written.attachment_count);
-  return {};
+  const auto size = static_cast<double>((*source)->size());
+  const double share = size > 0 ? 1 - static_cast<double>(scan.lost_bytes) / size : 0;
+  fmt::print("{}: {} messages, {} attachments; {:.1f} % of the bytes were intact\n", options.output,
+             written.message_count, written.attachment_count, 100 * share);
+  if (written.message_count > 0 || (scan.clean() && size > 0)) return {};
+  if (written.attachment_count + written.metadata_count == 0) {
+    std::error_code ignored;
+    std::filesystem::remove(options.output, ignored);
+  }
+  return Error{ErrorCode::kInvalidArgument,
+               options.file + ": no message in it is intact" +
+                   (scan.dropped > 0 ? "; --unverified keeps those whose checksum is wrong" : "")};
 }
 
 Arguments AddOne(const Arguments& log, const std::string& name, const std::string& what,
-                 const std::shared_ptr<Options>& options, Selected& selected,
-                 Result<void> (*run)(const Options&)) {
+                 const std::shared_ptr<LogOptions>& options, Selected& selected,
+                 Result<void> (*run)(const LogOptions&)) {
   const Arguments command = log.AddCommand(name, what);
   command.AddOption("file", options->file, "The log, MCAP").Required();
   command.OnChosen([options, run, &selected] { selected = [options, run] { return run(*options); }; });
@@ -160,15 +175,17 @@ void AddLog(const Arguments& app, Selected& selected) {
   const Arguments log =
       app.AddCommand("log", "Look into logs, check, mend, cut, merge, export and draw them");
   log.RequireCommand();
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LogOptions>();
   AddOne(log, "info", "What a log holds", options, selected, Info)
       .AddFlag("--json", options->json, "One JSON object");
   AddOne(log, "check", "Whether a log is whole: every record, index and checksum", options, selected,
          CheckLog);
-  AddOne(log, "recover", "Write all that is intact in a damaged or unfinished log to a new one", options,
-         selected, Recover)
-      .AddOption("-o,--output", options->output, "The new log")
-      .Required();
+  const Arguments recover =
+      AddOne(log, "recover", "Write all that is intact in a damaged or unfinished log to a new one", options,
+             selected, Recover);
+  recover.AddOption("-o,--output", options->output, "The new log").Required();
+  recover.AddFlag("--unverified", options->unverified,
+                  "Also messages whose checksum is wrong or lost: what they say may be wrong, too");
   AddLogCut(log, selected);
   AddLogMerge(log, selected);
   AddLogExport(log, selected);

@@ -11,7 +11,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct LogCutOptions {
   std::string input, output, compression;
   PartOptions part;
   std::vector<std::string> topics;
@@ -25,7 +25,7 @@ bool IsPicture(const mcap::Reader& reader, const mcap::Channel& channel) {
          schema == "foxglove.RawImage";
 }
 
-Result<std::set<uint16_t>> ChooseChannels(const LogSource& source, const Options& options,
+Result<std::set<uint16_t>> ChooseChannels(const LogSource& source, const LogCutOptions& options,
                                           const LogPart& part) {
   const mcap::Reader& reader = source.reader();
   std::set<std::string> known;
@@ -83,7 +83,7 @@ Result<void> CopyRecords(LogSource& source, mcap::Writer& out) {
   return {};
 }
 
-Result<void> Cut(const Options& options) {
+Result<void> Cut(const LogCutOptions& options) {
   auto source = LogSource::Open(options.input);
   if (!source) return source.error();
   const mcap::Reader& reader = (*source)->reader();
@@ -114,7 +114,7 @@ Result<void> Cut(const Options& options) {
 }  // namespace
 
 void AddLogCut(const Arguments& log, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LogCutOptions>();
   const Arguments cut = log.AddCommand("cut", "Write a part of a log to a new one, message for message");
   cut.AddOption("file", options->input, "The log, MCAP").Required();
   cut.AddOption("-o,--output", options->output, "The new log").Required();

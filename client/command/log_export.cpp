@@ -9,7 +9,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct LogExportOptions {
   std::string input, folder, format;
   PartOptions part;
   bool with_pictures = false;
@@ -24,7 +24,7 @@ Result<void> MakeFolder(const std::string& folder) {
                    "; choose another one"};
 }
 
-Result<void> Export(const Options& options) {
+Result<void> Export(const LogExportOptions& options) {
   auto source = LogSource::Open(options.input);
   if (!source) return source.error();
   const auto part = ChoosePart(**source, options.part);
@@ -40,7 +40,7 @@ Result<void> Export(const Options& options) {
 }  // namespace
 
 void AddLogExport(const Arguments& log, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LogExportOptions>();
   const Arguments command = log.AddCommand("export", "Write a log's content for other programs; SI units");
   command.AddOption("file", options->input, "The log, MCAP").Required();
   command.AddOption("-o,--output", options->folder, "Folder for the new files").Required();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <concepts>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -24,7 +25,7 @@ constexpr const char* kFrameColumns =
     "utc_ns,exposure_utc_ns,link,sequence,status,status_reason,pressure_pa,total_force_x_n,total_force_y_n,"
     "total_force_z_n,contacts,latency_s,markers_seen,markers_inferred,force_model,tracking_mode,baseline_age_"
     "s,"
-    "force_residual";
+    "force_residual,camera_shift_m";
 constexpr const char* kEventColumns =
     "utc_ns,raised_utc_ns,exposure_utc_ns,sequence,kind,link,frame_sequence,contact_id,center_x_m,center_y_m,"
     "center_z_m,"
@@ -73,6 +74,7 @@ class Table {
 
   void Add(const std::string& text) { row_ += CsvCell(text) + ","; }
   void Add(Blank blank) { row_.append(static_cast<size_t>(blank.cells), ','); }
+  void Add(std::optional<int> value) { value ? Add(*value) : Add(Blank{}); }
   void Add(TimeNs time) { time.value == 0 ? Add(Blank{}) : Add(time.value); }
   void Add(bool value) { row_ += value ? "true," : "false,"; }
   void Add(std::integral auto value) { row_ += fmt::format("{},", value); }
@@ -131,12 +133,14 @@ Result<void> AddFrame(Table& out, const v1::LinkFrame& frame, int64_t utc_ns) {
   return out.Row(
       utc_ns, TimeNs{times.exposure_utc_ns()}, frame.link(), frame.sequence(), Text(frame.status()),
       frame.status_reason(), frame.has_pressure_pa() ? frame.pressure_pa() : NAN,
-      IsMeasured(frame) ? frame.total_force_n() : NoVector(), frame.contacts_size(),
+      IsMeasured(frame) ? frame.total_force_n() : NoVector(),
+      IsMeasured(frame) ? std::optional(frame.contacts_size()) : std::nullopt,
       exposed ? static_cast<double>(times.published_ns() - times.exposure_ns()) * 1e-9 : NAN,
       frame.markers_seen(), frame.markers_inferred(),
       EnumText(v1::ForceModel_Name(frame.force_model()), "FORCE_MODEL_", frame.force_model()),
       EnumText(v1::TrackingMode_Name(frame.tracking_mode()), "TRACKING_MODE_", frame.tracking_mode()),
-      frame.baseline_age_s(), frame.force_residual());
+      frame.baseline_age_s(), frame.has_force_residual() ? frame.force_residual() : NAN,
+      frame.has_camera_shift_m() ? frame.camera_shift_m() : NAN);
 }
 
 // Groups of columns that an event of another kind leaves empty; they follow one another in this order.

@@ -20,7 +20,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct LogMergeOptions {
   std::vector<std::string> inputs;
   std::string output, compression;
 };
@@ -155,7 +155,7 @@ Result<void> Report(const Sources& sources) {
   return {};
 }
 
-Result<void> Merge(const Options& options) {
+Result<void> Merge(const LogMergeOptions& options) {
   Sources sources;
   for (const std::string& file : options.inputs) {
     auto source = LogSource::Open(file);
@@ -185,7 +185,7 @@ Result<void> Merge(const Options& options) {
 }  // namespace
 
 void AddLogMerge(const Arguments& log, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LogMergeOptions>();
   const Arguments merge = log.AddCommand("merge", "Write several logs to one, in order of log time");
   merge.AddOption("files", options->inputs, "The logs, MCAP").Required();
   merge.AddOption("-o,--output", options->output, "The new log").Required();

@@ -15,7 +15,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct LogPlotOptions {
   std::string input, output;
   PartOptions part;
 };
@@ -57,7 +57,7 @@ Result<void> Fill(LogSource& source, const LogPart& part, ForcePlot& plot) {
   return Visit(source, part, visitor);
 }
 
-Result<void> Plot(const Options& options) {
+Result<void> Plot(const LogPlotOptions& options) {
   auto source = LogSource::Open(options.input);
   if (!source) return source.error();
   const auto part = ChoosePart(**source, options.part);
@@ -80,7 +80,7 @@ Result<void> Plot(const Options& options) {
 }  // namespace
 
 void AddLogPlot(const Arguments& log, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LogPlotOptions>();
   const Arguments plot = log.AddCommand("plot", "Draw the forces of a log over time, a panel for each link");
   plot.AddOption("file", options->input, "The log, MCAP").Required();
   plot.AddOption("-o,--output", options->output, "The new SVG file").Required();

@@ -14,7 +14,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct LogSolveOptions {
   SolveLogOptions solve;
   std::string force_model;
   int force_refinement = -1;
@@ -85,7 +85,7 @@ void Print(const LinkReport& link) {
     fmt::print("  {} frames were measured only then, {} only now\n", link.only_recorded, link.only_solved);
 }
 
-Json ToJson(const FrameDifferences& off) {
+Json DifferencesJson(const FrameDifferences& off) {
   return {{"frames", off.frames},
           {"marker_mean_mm", off.marker_mm.mean()},
           {"marker_max_mm", off.marker_mm.most},
@@ -94,17 +94,17 @@ Json ToJson(const FrameDifferences& off) {
           {"other_contact_count", off.other_contacts}};
 }
 
-Json ToJson(const Baseline& baseline) {
+Json BaselineJson(const Baseline& baseline) {
   return {{"origin", NameOf(baseline.origin)}, {"taken_utc_ns", baseline.taken_utc_ns}};
 }
 
-Json ToJson(const LinkReport& link) {
+Json LinkJson(const LinkReport& link) {
   Json breaks = Json::array();
   for (const BaselineBreak& at : link.breaks) {
     breaks.push_back({{"sequence", at.sequence},
                       {"after_s", at.after_s},
-                      {"recorded", ToJson(at.recorded)},
-                      {"solved", ToJson(at.solved)}});
+                      {"recorded", BaselineJson(at.recorded)},
+                      {"solved", BaselineJson(at.solved)}});
   }
   return {{"link", link.name},
           {"from", link.from_pictures ? "pictures" : "markers"},
@@ -116,9 +116,9 @@ Json ToJson(const LinkReport& link) {
           {"identical", link.identical},
           {"measured_only_then", link.only_recorded},
           {"measured_only_now", link.only_solved},
-          {"difference", ToJson(link.same_baseline)},
+          {"difference", DifferencesJson(link.same_baseline)},
           {"not_comparable_from", std::move(breaks)},
-          {"difference_of_other_baselines", ToJson(link.other_baseline)},
+          {"difference_of_other_baselines", DifferencesJson(link.other_baseline)},
           {"mean_solve_ms", MeanMs(link)},
           {"speed", Speed(link)}};
 }
@@ -126,7 +126,7 @@ Json ToJson(const LinkReport& link) {
 void Print(const SolveLogOptions& options, const SolveLogSummary& summary, bool json) {
   if (json) {
     Json links = Json::array();
-    for (const LinkReport& link : summary.links) links.push_back(ToJson(link));
+    for (const LinkReport& link : summary.links) links.push_back(LinkJson(link));
     fmt::print("{}\n", Json({{"from", options.input},
                              {"log", options.output},
                              {"bytes", summary.bytes},
@@ -164,7 +164,7 @@ class ProgressLine {
   std::chrono::steady_clock::time_point next_;
 };
 
-Result<void> Solve(const Options& options) {
+Result<void> Solve(const LogSolveOptions& options) {
   SolveLogOptions solve = options.solve;
   if (!options.force_model.empty()) solve.force_model = options.force_model;
   if (options.force_refinement >= 0) solve.force_refinement = options.force_refinement;
@@ -181,7 +181,7 @@ Result<void> Solve(const Options& options) {
 }  // namespace
 
 void AddLogSolve(const Arguments& log, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LogSolveOptions>();
   const Arguments command = log.AddCommand(
       "solve", "Solve a log's pictures again, as they were or in another way, and say what changed");
   command.AddOption("file", options->solve.input, "The log, MCAP").Required();

@@ -67,7 +67,9 @@ Result<void> Visit(LogSource& source, const LogPart& part, const LogVisitor& vis
 }
 
 bool IsMeasured(const v1::LinkFrame& frame) {
-  return frame.markers_seen() > 0 || frame.positions_m_size() > 0;
+  // Older logs have zeros where the forces can't be trusted.
+  return frame.has_total_force_n() && !frame.force_not_converged() &&
+         (frame.markers_seen() > 0 || frame.positions_m_size() > 0);
 }
 
 std::string EnumText(const std::string& name, const std::string& prefix, int number) {

@@ -5,6 +5,8 @@
 #include <string>
 
 #include "client/command/commands.h"
+#include "sensing/core/file_modes.h"
+#include "sensing/core/printable.h"
 
 namespace {
 
@@ -13,13 +15,14 @@ constexpr int kUsage = 2;
 
 int Complain(std::string message, int code) {
   std::replace(message.begin(), message.end(), '\n', ' ');
-  std::fprintf(stderr, "taclink: %s\n", message.c_str());
+  std::fprintf(stderr, "taclink: %s\n", taclink::Printable(message).c_str());
   return code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  taclink::KeepFilesFromOthers();
   CLI::App app("Looks at soft tactile links: live from a server, or offline from files", "taclink");
   app.set_version_flag("--version", std::string(TACLINK_VERSION));
   app.require_subcommand(1);

@@ -2,13 +2,13 @@
 
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <vector>
 
 #include "client/command/csv.h"
 #include "client/command/marker_noise.h"
+#include "sensing/core/read_file.h"
 
 namespace taclink::command {
 namespace {
@@ -65,9 +65,9 @@ void SetNoise(const MarkerNoise& noise, SkinShape& shape) {
 
 Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
                                 std::optional<double> sigma_mm) {
-  std::ifstream in(path);
-  if (!in || std::filesystem::is_directory(path))
-    return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
+  const auto text = ReadFile(path, kMostTableBytes);
+  if (!text) return text.error();
+  std::istringstream in(*text);
   const auto count = static_cast<size_t>(model.markers.count());
   SkinShape shape;
   shape.positions_mm = model.RestMarkers();

@@ -10,6 +10,7 @@ Result<std::unique_ptr<PictureSolver>> PictureSolver::Make(const LinkModel& mode
                                                            const std::vector<std::string>& rest,
                                                            double rest_pressure_mpa) {
   options.rest_frames = 1;
+  options.pictures_may_repeat = true;
   if (!calibration.empty()) {
     auto rig = LoadCalibration(calibration, model);
     if (!rig) return rig.error();
@@ -24,7 +25,8 @@ Result<std::unique_ptr<PictureSolver>> PictureSolver::Make(const LinkModel& mode
   return solver;
 }
 
-Result<LinkState> PictureSolver::Solve(const std::vector<std::string>& pair, double pressure_mpa) {
+Result<LinkState> PictureSolver::Solve(const std::vector<std::string>& pair,
+                                       std::optional<double> pressure_mpa) {
   for (size_t i = 0; i < kCameraCount; ++i) {
     if (auto read = ReadRawImage(pair[i], frame_.images[i]); !read) return read.error();
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,8 +22,8 @@ class PictureSolver {
                                                      const std::vector<std::string>& rest,
                                                      double rest_pressure_mpa = 0);
 
-  /// Whether it was measured is in the state.
-  Result<LinkState> Solve(const std::vector<std::string>& pair, double pressure_mpa);
+  /// Whether it was measured is in the state. `pressure_mpa`: none: nobody tells it.
+  Result<LinkState> Solve(const std::vector<std::string>& pair, std::optional<double> pressure_mpa);
 
  private:
   PictureSolver(const LinkModel& model, const PipelineOptions& options) : pipeline_(model, options) {}

@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -14,6 +12,7 @@
 #include "client/command/contacts_view.h"
 #include "client/command/event_text.h"
 #include "client/command/frame_output.h"
+#include "client/command/interrupt.h"
 #include "client/command/json.h"
 #include "client/taclink/recordings.h"
 #include "client/taclink/replay.h"
@@ -21,10 +20,9 @@
 namespace taclink::command {
 namespace {
 
-constexpr std::chrono::milliseconds kPoll{100};  // how soon Ctrl-C is noticed
 constexpr double kSlowest = 0.1, kFastest = 100;
 
-struct Options {
+struct PlayOptions {
   std::string server = "127.0.0.1:50051";
   client::ReplayOptions replay;
   std::string detail = "contacts";
@@ -32,14 +30,12 @@ struct Options {
   bool events = false, contacts = false, json = false;
 };
 
-std::atomic<bool> interrupted = false;
-
 int64_t Ns(double seconds) {
   return static_cast<int64_t>(seconds * 1e9);
 }
 
 /// Seconds of the log become times.
-Result<client::ReplayOptions> ToReplay(const Options& options, client::Recordings& recordings) {
+Result<client::ReplayOptions> ToReplay(const PlayOptions& options, client::Recordings& recordings) {
   client::ReplayOptions replay = options.replay;
   replay.detail = options.detail == "full"       ? client::Detail::kFull
                   : options.detail == "geometry" ? client::Detail::kGeometry
@@ -65,7 +61,7 @@ Result<client::ReplayOptions> ToReplay(const Options& options, client::Recording
 /// Prints what is played; tells at the end what was not as it should be.
 class Output {
  public:
-  explicit Output(const Options& options)
+  explicit Output(const PlayOptions& options)
       : json_(options.json),
         frames_("taclink record play " + options.replay.log + "   (Ctrl-C ends)", options.json) {}
 
@@ -108,7 +104,7 @@ class Output {
   double lateness_s_ = 0;
 };
 
-Result<void> Run(const Options& options) {
+Result<void> RunPlay(const PlayOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   auto recordings = connection->RecordingCalls();
@@ -116,11 +112,10 @@ Result<void> Run(const Options& options) {
   if (!replay) return replay.error();
   auto reader = recordings.Replay(*replay);
   if (!reader) return reader.error();
-  std::signal(SIGINT, [](int) { interrupted = true; });
-  std::signal(SIGTERM, [](int) { interrupted = true; });
+  CatchInterrupts();
   Output output(options);
-  while (!interrupted) {
-    const auto message = (*reader)->Next(kPoll);
+  while (!IsInterrupted()) {
+    const auto message = (*reader)->Next(kInterruptPoll);
     if (message) {
       std::visit(output, message->content);
     } else if (message.error().code == ErrorCode::kEndOfData) {
@@ -138,7 +133,7 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddPlay(const Arguments& record, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PlayOptions>();
   const Arguments command =
       record.AddCommand("play", "Show a log of the server at its pace, as 'watch' does");
   AddServerOption(command, options->server);
@@ -161,7 +156,7 @@ void AddPlay(const Arguments& record, Selected& selected) {
   command.AddFlag("--events", options->events, "Also events, as 'events' prints them");
   command.AddFlag("--contacts", options->contacts, "Also the arm's contacts, as 'contacts' prints them");
   command.AddFlag("--json", options->json, "One JSON object a line");
-  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.OnChosen([options, &selected] { selected = [options] { return RunPlay(*options); }; });
 }
 
 }  // namespace taclink::command

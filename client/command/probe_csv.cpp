@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <optional>
 
 #include "client/command/csv.h"
+#include "sensing/core/read_file.h"
 
 namespace taclink::command {
 namespace {
@@ -68,9 +68,9 @@ Result<ProbeRecord> ParseRow(const std::string& line, const Header& header, cons
 
 Result<std::vector<ProbeRecord>> ReadProbeCsv(const std::string& path, const LinkModel& model,
                                               double diameter_mm) {
-  std::ifstream in(path);
-  if (!in || std::filesystem::is_directory(path))
-    return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
+  const auto text = ReadFile(path, kMostTableBytes);
+  if (!text) return text.error();
+  std::istringstream in(*text);
   std::vector<ProbeRecord> records;
   std::optional<Header> header;
   std::string line;

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -11,9 +10,11 @@
 
 #include "client/command/commands.h"
 #include "client/command/connect.h"
+#include "client/command/interrupt.h"
 #include "client/command/json.h"
 #include "client/command/log_text.h"
 #include "client/taclink/recordings.h"
+#include "sensing/core/printable.h"
 
 namespace taclink::command {
 namespace {
@@ -22,7 +23,7 @@ using client::LogCompression;
 using client::RecorderStatus;
 using client::Recordings;
 
-struct Options {
+struct RecordOptions {
   std::string server = "127.0.0.1:50051";
   client::RecordingOptions recording;
   std::string compression = "configured";
@@ -31,17 +32,17 @@ struct Options {
   bool json = false;
 };
 
-volatile std::sig_atomic_t interrupted = 0;
-
-Result<Recordings> Connect(const Options& options) {
+Result<Recordings> Connect(const RecordOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   return connection->RecordingCalls();
 }
 
-Json ToJson(const RecorderStatus& status) {
+Json RecorderJson(const RecorderStatus& status) {
   return {{"state", client::Name(status.state)},
           {"trouble", status.trouble},
+          {"last_trouble", status.last_trouble},
+          {"last_trouble_utc_ns", status.last_trouble_utc_ns},
           {"log", status.log},
           {"folder", status.folder},
           {"started_utc_ns", status.started_utc_ns},
@@ -57,11 +58,13 @@ Json ToJson(const RecorderStatus& status) {
 
 void Print(const RecorderStatus& status, bool json) {
   if (json) {
-    fmt::print("{}\n", ToJson(status).dump());
+    fmt::print("{}\n", RecorderJson(status).dump());
     return;
   }
   fmt::print("{}{}{}\n", client::Name(status.state), status.log.empty() ? "" : ": ", status.log);
   if (!status.trouble.empty()) fmt::print("  {}\n", status.trouble);
+  if (status.last_trouble != status.trouble && !status.last_trouble.empty())
+    fmt::print("  before, at {}: {}\n", UtcText(status.last_trouble_utc_ns), status.last_trouble);
   if (status.started_utc_ns != 0) {
     fmt::print("  {} frames, {} lost, {} events, {} in {} logs\n", status.frames, status.frames_lost,
                status.events, SizeText(status.bytes), status.logs);
@@ -73,22 +76,20 @@ void Print(const RecorderStatus& status, bool json) {
   }
 }
 
-Result<void> PrintStatus(const Result<RecorderStatus>& status, const Options& options) {
+Result<void> PrintStatus(const Result<RecorderStatus>& status, const RecordOptions& options) {
   if (!status) return status.error();
   Print(*status, options.json);
   return {};
 }
 
 void WaitFor(double duration_s) {
-  interrupted = 0;
-  std::signal(SIGINT, [](int) { interrupted = 1; });
-  std::signal(SIGTERM, [](int) { interrupted = 1; });
+  CatchInterrupts();
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(duration_s);
-  while (interrupted == 0 && std::chrono::steady_clock::now() < end)
+  while (!IsInterrupted() && std::chrono::steady_clock::now() < end)
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
 
-Result<void> Start(const Options& options) {
+Result<void> Start(const RecordOptions& options) {
   auto recordings = Connect(options);
   if (!recordings) return recordings.error();
   client::RecordingOptions recording = options.recording;
@@ -101,19 +102,19 @@ Result<void> Start(const Options& options) {
   return PrintStatus(recordings->Stop(), options);
 }
 
-Result<void> Stop(const Options& options) {
+Result<void> Stop(const RecordOptions& options) {
   auto recordings = Connect(options);
   if (!recordings) return recordings.error();
   return PrintStatus(recordings->Stop(), options);
 }
 
-Result<void> Status(const Options& options) {
+Result<void> Status(const RecordOptions& options) {
   auto recordings = Connect(options);
   if (!recordings) return recordings.error();
   return PrintStatus(recordings->Status(), options);
 }
 
-Json ToJson(const client::Log& log) {
+Json LogJson(const client::Log& log) {
   return {{"name", log.name},
           {"bytes", log.bytes},
           {"start_utc_ns", log.start_utc_ns},
@@ -137,11 +138,11 @@ void PrintRow(const client::Log& log) {
     if (log.contacts) fmt::print(", {} contacts", *log.contacts);
     if (log.pictures) fmt::print(", pictures");
   }
-  fmt::print("{}{}\n", log.note.empty() ? "" : "  ", log.note);
-  if (!log.problem.empty()) fmt::print("  {}\n", log.problem);
+  fmt::print("{}{}\n", log.note.empty() ? "" : "  ", Printable(log.note));
+  if (!log.problem.empty()) fmt::print("  {}\n", Printable(log.problem));
 }
 
-Result<void> List(const Options& options) {
+Result<void> List(const RecordOptions& options) {
   auto recordings = Connect(options);
   if (!recordings) return recordings.error();
   const auto logs = recordings->List();
@@ -149,7 +150,7 @@ Result<void> List(const Options& options) {
   if (!options.json && logs->empty()) fmt::print("no logs\n");
   for (const client::Log& log : *logs) {
     if (options.json) {
-      fmt::print("{}\n", ToJson(log).dump());
+      fmt::print("{}\n", LogJson(log).dump());
     } else {
       PrintRow(log);
     }
@@ -158,7 +159,7 @@ Result<void> List(const Options& options) {
 }
 
 // What is there already stays, and the rest is fetched.
-Result<void> Download(const Options& options) {
+Result<void> Download(const RecordOptions& options) {
   auto recordings = Connect(options);
   if (!recordings) return recordings.error();
   std::string path = options.output.empty() ? options.log : options.output;
@@ -186,15 +187,15 @@ Result<void> Download(const Options& options) {
   return {};
 }
 
-Result<void> Delete(const Options& options) {
+Result<void> Delete(const RecordOptions& options) {
   auto recordings = Connect(options);
   if (!recordings) return recordings.error();
   return recordings->Delete(options.log);
 }
 
 Arguments AddOne(const Arguments& record, const char* name, const char* what,
-                 const std::shared_ptr<Options>& options, Selected& selected,
-                 Result<void> (*run)(const Options&)) {
+                 const std::shared_ptr<RecordOptions>& options, Selected& selected,
+                 Result<void> (*run)(const RecordOptions&)) {
   const Arguments command = record.AddCommand(name, what);
   AddServerOption(command, options->server);
   command.OnChosen([options, run, &selected] { selected = [options, run] { return run(*options); }; });
@@ -206,7 +207,7 @@ Arguments AddOne(const Arguments& record, const char* name, const char* what,
 void AddRecord(const Arguments& app, Selected& selected) {
   const Arguments record = app.AddCommand("record", "Record what a server's links feel, on the server");
   record.RequireCommand();
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RecordOptions>();
   const Arguments start = AddOne(record, "start", "Begin a recording", options, selected, Start);
   start.AddOption("--name", options->recording.name, "Part of the logs' names (default: the arm's name)");
   start.AddOption("--link", options->recording.links, "Names of links (default: all)");

@@ -9,12 +9,12 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct RestartOptions {
   std::string server = "127.0.0.1:50051";
   std::string link;
 };
 
-Result<void> Run(const Options& options) {
+Result<void> RunRestart(const RestartOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   const auto ordered = connection->RestartLink(options.link);
@@ -26,11 +26,11 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddRestart(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RestartOptions>();
   const Arguments command = app.AddCommand("restart", "Give a link of a server a fresh source and processor");
   AddServerOption(command, options->server);
   command.AddOption("--link", options->link, "Name of the link").Required();
-  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.OnChosen([options, &selected] { selected = [options] { return RunRestart(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -10,7 +10,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct SetOptions {
   std::string server = "127.0.0.1:50051";
   std::string link, camera;
   std::optional<std::string> force_model;
@@ -29,7 +29,7 @@ client::ForceModel ForceModelOf(const std::string& name) {
   return client::ForceModel::kUnknown;
 }
 
-Result<void> Run(const Options& options) {
+Result<void> RunSet(const SetOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   if (options.any_camera()) {
@@ -51,7 +51,7 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddSet(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SetOptions>();
   const Arguments command =
       app.AddCommand("set", "Set a link's cameras or its force model until the server ends");
   AddServerOption(command, options->server);
@@ -72,7 +72,7 @@ void AddSet(const Arguments& app, Selected& selected) {
       RefuseMissing("--camera also needs --exposure, --auto-exposure or --gain");
     if (!options->any_camera() && !options->force_model)
       RefuseMissing("what to set: --force-model, --exposure, --auto-exposure or --gain");
-    selected = [options] { return Run(*options); };
+    selected = [options] { return RunSet(*options); };
   });
 }
 

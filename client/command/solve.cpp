@@ -18,7 +18,8 @@ struct SolveOptions {
   std::string markers;
   std::vector<std::string> rest, images;
   std::string calibration;
-  double pressure_kpa = 0, baseline_pressure_kpa = 0;
+  std::optional<double> pressure_kpa;
+  double baseline_pressure_kpa = 0;
   std::optional<double> pressure_sigma_pa;
   std::optional<double> sigma_mm;
   std::string force_model = "auto";
@@ -57,10 +58,24 @@ bool IsInvalid(const LinkState& state) {
   return !state.measured() || !state.forces.converged;
 }
 
+// In this command's units.
+Json ReasonJson(const Reason& reason) {
+  const ReasonUnit unit = UnitOf(reason.id);
+  const double kpa = unit == ReasonUnit::kMegapascals ? 1e3 : 1;
+  const char* name = unit == ReasonUnit::kMillimeters   ? "mm"
+                     : unit == ReasonUnit::kMegapascals ? "kPa"
+                     : unit == ReasonUnit::kSeconds     ? "s"
+                                                        : "";
+  return {{"id", Name(reason.id)},
+          {"text", reason.text},
+          {"value", reason.value ? Json(kpa * *reason.value) : Json(nullptr)},
+          {"limit", reason.limit ? Json(kpa * *reason.limit) : Json(nullptr)},
+          {"unit", name}};
+}
+
 Json ValidityJson(const LinkState& state) {
   Json reasons = Json::array();
-  for (const Reason& reason : state.reasons)
-    reasons.push_back({{"id", Name(reason.id)}, {"text", reason.text}});
+  for (const Reason& reason : state.reasons) reasons.push_back(ReasonJson(reason));
   const char* status = IsInvalid(state) ? "invalid" : state.reasons.empty() ? "ok" : "degraded";
   return {{"status", status}, {"reasons", reasons}};
 }
@@ -90,25 +105,32 @@ void PrintJson(const LinkModel& model, const LinkState& state) {
   Json contacts = Json::array();
   for (const auto& contact : state.contacts) contacts.push_back(ContactJson(contact));
   const StageTimes& t = state.stage_ms;
-  const Json out = {{"model", model.name},
-                    {"force_model", Name(state.forces.model)},
-                    {"markers",
-                     {{"seen", state.shape.seen()},
-                      {"inferred", state.shape.CountOf(MarkerSource::kInferred)},
-                      {"rejected", RejectedJson(model, state.shape)}}},
-                    {"validity", ValidityJson(state)},
-                    {"converged", state.forces.converged},
-                    {"residual_chi2_per_dof", state.forces.residual * state.forces.residual},
-                    {"pressure_estimate_kpa", PressureJson(state)},
-                    {"contacts", contacts},
-                    {"total_force_n", ToJson(state.total_force_n)},
-                    {"positions_mm", ToJson(state.shape.positions_mm)},
-                    {"nodal_forces_n", ToJson(state.forces.forces_n)},
-                    {"time_ms",
-                     {{"detect", t.decode + t.detect},
-                      {"register", t.register_},
-                      {"reconstruct", t.reconstruct},
-                      {"force", t.force}}}};
+  const Json out = {
+      {"model", model.name},
+      {"force_model", Name(state.forces.model)},
+      {"markers",
+       {{"seen", state.shape.seen()},
+        {"inferred", state.shape.CountOf(MarkerSource::kInferred)},
+        {"rejected", RejectedJson(model, state.shape)}}},
+      {"validity", ValidityJson(state)},
+      {"converged", state.forces.converged},
+      {"residual_chi2_per_dof",
+       state.has_forces() ? Json(state.forces.residual * state.forces.residual) : Json(nullptr)},
+      {"camera_shift_mm", state.has_forces() ? Json(state.forces.camera_shift_mm) : Json(nullptr)},
+      {"pressure_estimate_kpa", PressureJson(state)},
+      {"contacts", contacts},
+      {"total_force_n", state.has_forces() ? ToJson(state.total_force_n) : Json(nullptr)},
+      {"detection_limits_n", state.has_forces() ? Json(state.forces.limits_n) : Json(nullptr)},
+      {"detection_limit_around_n", state.has_forces() && !state.forces.limits_n.empty()
+                                       ? Json(state.forces.limit_around_n)
+                                       : Json(nullptr)},
+      {"positions_mm", ToJson(state.shape.positions_mm)},
+      {"nodal_forces_n", state.has_forces() ? ToJson(state.forces.forces_n) : Json(nullptr)},
+      {"time_ms",
+       {{"detect", t.decode + t.detect},
+        {"register", t.register_},
+        {"reconstruct", t.reconstruct},
+        {"force", t.force}}}};
   std::puts(out.dump().c_str());
 }
 
@@ -132,11 +154,13 @@ Result<LinkState> SolveMarkerFile(const SolveOptions& options, const LinkModel& 
   if (!shape) return shape.error();
   const auto estimator = MakeStateEstimator(
       model, {.model = ForceModelNamed(options.force_model), .refinement = options.force_refinement});
-  const PressureReading now{1e-3 * options.pressure_kpa, SigmaMpa(options)};
+  const PressureReading now{1e-3 * options.pressure_kpa.value_or(options.baseline_pressure_kpa),
+                            SigmaMpa(options)};
   const double baseline_kpa = options.baseline_pressure_kpa;
   const PressureReading baseline{1e-3 * baseline_kpa, baseline_kpa == 0 ? 0 : SigmaMpa(options)};
   const int64_t start = SystemClock().MonotonicNs();
-  LinkState state = SolveMarkers(model, *estimator, {.now = now, .baseline = baseline}, std::move(*shape));
+  LinkState state = SolveMarkers(model, *estimator, {.now = now, .baseline = baseline}, std::move(*shape),
+                                 options.pressure_kpa.has_value());
   state.stage_ms.force = static_cast<double>(SystemClock().MonotonicNs() - start) * 1e-6;
   return state;
 }
@@ -149,7 +173,9 @@ Result<LinkState> SolvePictures(const SolveOptions& options, const LinkModel& mo
   const auto solver = PictureSolver::Make(model, pipeline_options, options.calibration, options.rest,
                                           1e-3 * options.baseline_pressure_kpa);
   if (!solver) return solver.error();
-  return (*solver)->Solve(options.images, options.pressure_kpa * 1e-3);
+  std::optional<double> pressure_mpa;
+  if (options.pressure_kpa) pressure_mpa = 1e-3 * *options.pressure_kpa;
+  return (*solver)->Solve(options.images, pressure_mpa);
 }
 
 Result<void> Solve(const SolveOptions& options) {
@@ -194,7 +220,9 @@ void AddSolve(const Arguments& app, Selected& selected) {
       .Needs(rest);
   rest.Needs(images).Excludes(markers);
   images.Needs(rest).Excludes(markers);
-  command.AddOption("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin")
+  command
+      .AddOption("--pressure-kpa", options->pressure_kpa,
+                 "Gauge pressure inside the skin; without, the answer is not quite to be trusted")
       .Must(Within(-20, 20));
   command
       .AddOption(

@@ -52,15 +52,33 @@ void MeasureAgain(SkinShape& shape) {
 // Forces and contacts of `from`; the rest of `to` stays as it was recorded.
 void TakeForces(v1::LinkFrame& from, v1::LinkFrame& to) {
   to.mutable_contacts()->Swap(from.mutable_contacts());
-  *to.mutable_total_force_n() = from.total_force_n();
+  if (from.has_total_force_n())
+    *to.mutable_total_force_n() = from.total_force_n();
+  else
+    to.clear_total_force_n();
   to.set_force_model(from.force_model());
   to.mutable_nodal_forces_n()->Swap(from.mutable_nodal_forces_n());
   to.mutable_nodal_force_sigmas_n()->Swap(from.mutable_nodal_force_sigmas_n());
-  to.set_force_residual(from.force_residual());
+  to.mutable_detection_limits_n()->Swap(from.mutable_detection_limits_n());
+  if (from.has_detection_limit_n())
+    to.set_detection_limit_n(from.detection_limit_n());
+  else
+    to.clear_detection_limit_n();
+  if (from.has_detection_limit_around_n())
+    to.set_detection_limit_around_n(from.detection_limit_around_n());
+  else
+    to.clear_detection_limit_around_n();
+  if (from.has_force_residual())
+    to.set_force_residual(from.force_residual());
+  else
+    to.clear_force_residual();
+  // Of the recorded markers it is off already; older logs do not tell it.
+  if (!to.has_camera_shift_m() && from.has_camera_shift_m()) to.set_camera_shift_m(from.camera_shift_m());
   to.set_force_not_converged(from.force_not_converged());
   to.mutable_stage_times()->set_force_s(from.stage_times().force_s());
   to.set_status(from.status());
   to.set_status_reason(from.status_reason());
+  to.mutable_status_reasons()->Swap(from.mutable_status_reasons());
 }
 
 }  // namespace
@@ -162,9 +180,15 @@ Result<RawImage> LogLinkSolver::Image(CameraId camera, const std::optional<Recor
 }
 
 // As LinkPipeline::Process has it.
+bool LogLinkSolver::IsPressureTold() const {
+  return !recorded_.pressure.stale && (recorded_.pressure_mpa || settings_.options.pressure_mpa ||
+                                       recorded_.pressure.origin != PressureOrigin::kNone);
+}
 double LogLinkSolver::FramePressure() const {
   if (recorded_.pressure.stale) return recorded_.pressure.mpa;
-  return recorded_.pressure_mpa.value_or(settings_.options.pressure_mpa);
+  // Nobody told it: the shape did.
+  if (!IsPressureTold() && recorded_.pressure_estimate) return recorded_.pressure_estimate->mpa;
+  return recorded_.pressure_mpa.value_or(settings_.options.pressure_mpa.value_or(0));
 }
 
 // A baseline is taken with the frame before the first that is measured against it.
@@ -225,11 +249,23 @@ void LogLinkSolver::SolveForces(const PressurePair& pressure) {
   if (state_.forces.converged)
     state_.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
   // What the pictures were like, the log knows.
-  const std::string trouble = state_.status == LinkStatus::kOk ? "" : state_.status_reason;
+  std::optional<Reason> trouble;
+  if (state_.status != LinkStatus::kOk && state_.reasons.empty())
+    trouble = Reason{ReasonId::kCamera, state_.status_reason};
+  for (const Reason& reason : state_.reasons) {
+    const bool is_of_pictures = reason.id == ReasonId::kCamera || reason.id == ReasonId::kFrozen ||
+                                reason.id == ReasonId::kCamerasDisagree || reason.id == ReasonId::kLate ||
+                                reason.id == ReasonId::kCamerasMoved;
+    if (is_of_pictures && !trouble) trouble = reason;
+  }
   Judge({.model = settings_.model,
          .camera_trouble = trouble,
-         .drift_advice = "",
+         .agreement = {},
+         .motion = {},
+         .sees_alone = {},
+         .drift = {},
          .told = pressure.now,
+         .is_told = IsPressureTold(),
          .baseline = pressure.baseline,
          .estimate = estimate},
         state_);

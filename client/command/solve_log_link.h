@@ -48,6 +48,7 @@ class LogLinkSolver {
   Result<void> SolveMarkers(v1::LinkFrame& solved);
   void FollowPressure();
   void SolveForces(const PressurePair& pressure);
+  bool IsPressureTold() const;
   double FramePressure() const;
 
   // Constant after construction.

@@ -56,9 +56,9 @@ void Compare(const v1::LinkFrame& recorded, const std::string& recorded_bytes, d
   FrameDifferences& differences = comparable ? report.same_baseline : report.other_baseline;
   ++differences.frames;
   AddMarkers(recorded, solved, differences.marker_mm);
-  const Vec3 force = wire::FromWire(solved.total_force_n(), 1),
-             old_force = wire::FromWire(recorded.total_force_n(), 1);
-  differences.force_n.Add((force - old_force).norm());
+  if (solved.has_total_force_n() && recorded.has_total_force_n())
+    differences.force_n.Add(
+        (wire::FromWire(solved.total_force_n(), 1) - wire::FromWire(recorded.total_force_n(), 1)).norm());
   if (recorded.contacts_size() != solved.contacts_size()) ++differences.other_contacts;
 }
 

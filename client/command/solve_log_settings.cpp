@@ -1,11 +1,10 @@
 #include "client/command/solve_log_settings.h"
 
 #include <algorithm>
-#include <fstream>
 #include <set>
-#include <sstream>
 
 #include "sensing/camera/calibration.h"
+#include "sensing/core/read_file.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/options_text.h"
 #include "wire/log/topics.h"
@@ -61,11 +60,7 @@ Result<Texts> ByLink(const std::vector<std::string>& arguments, const std::set<s
 }
 
 Result<std::string> FileText(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) return Error{ErrorCode::kNotFound, path + ": cannot be read; check the path"};
-  return text.str();
+  return ReadFile(path);
 }
 
 /// The log's texts that settings are made of.

@@ -7,14 +7,13 @@
 #include "client/command/commands.h"
 #include "client/command/connect.h"
 #include "client/command/json.h"
+#include "client/command/units.h"
 #include "client/taclink/client.h"
 
 namespace taclink::command {
 namespace {
 
-constexpr double kMmPerMetre = 1e3;
-
-struct Options {
+struct TareOptions {
   std::string server = "127.0.0.1:50051";
   client::TareRequest request;
   bool json = false;
@@ -46,7 +45,7 @@ void PrintJson(const std::vector<client::LinkTare>& links) {
   fmt::print("{}\n", Json({{"links", std::move(list)}}).dump());
 }
 
-Result<void> Run(const Options& options) {
+Result<void> RunTare(const TareOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   const auto links = connection->Tare(options.request);
@@ -66,7 +65,7 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddTare(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TareOptions>();
   const Arguments command = app.AddCommand(
       "tare", "Take what links of a server show now as their untouched skins; nothing may touch them");
   AddServerOption(command, options->server);
@@ -76,7 +75,7 @@ void AddTare(const Arguments& app, Selected& selected) {
       .Must(Within(1, 300))
       .ShowDefault();
   command.AddFlag("--json", options->json, "One JSON object");
-  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.OnChosen([options, &selected] { selected = [options] { return RunTare(*options); }; });
 }
 
 }  // namespace taclink::command

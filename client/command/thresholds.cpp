@@ -12,7 +12,7 @@
 namespace taclink::command {
 namespace {
 
-struct Options {
+struct ThresholdsOptions {
   std::string server = "127.0.0.1:50051";
   std::string link, region;
   std::optional<double> warning_n, alarm_n, hysteresis_n;
@@ -51,7 +51,7 @@ void PrintJson(const client::Arm& arm) {
 }
 
 // What is not given stays as it is.
-Result<void> Set(client::Client& connection, const Options& options, const client::Arm& arm) {
+Result<void> Set(client::Client& connection, const ThresholdsOptions& options, const client::Arm& arm) {
   client::Thresholds thresholds;
   for (const auto& link : arm.links) {
     for (const auto& state : link.force_levels) {
@@ -65,7 +65,7 @@ Result<void> Set(client::Client& connection, const Options& options, const clien
   return set ? Result<void>() : set.error();
 }
 
-Result<void> Run(const Options& options) {
+Result<void> RunThresholds(const ThresholdsOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   auto arm = connection->GetArm();
@@ -86,7 +86,7 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddThresholds(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ThresholdsOptions>();
   const Arguments command = app.AddCommand(
       "thresholds",
       "Show the force thresholds of a server's links, or set those of one until the server ends");
@@ -100,7 +100,7 @@ void AddThresholds(const Arguments& app, Selected& selected) {
   force("--alarm", options->alarm_n, "N; 0: none");
   force("--hysteresis", options->hysteresis_n, "N below a threshold where its level is left");
   command.AddFlag("--json", options->json, "One JSON object");
-  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.OnChosen([options, &selected] { selected = [options] { return RunThresholds(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -1,13 +1,12 @@
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 
 #include "client/command/commands.h"
 #include "client/command/connect.h"
 #include "client/command/frame_output.h"
+#include "client/command/interrupt.h"
 #include "client/taclink/client.h"
 
 namespace taclink::command {
@@ -15,9 +14,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPoll{100};  // how soon Ctrl-C is noticed
-
-struct Options {
+struct WatchOptions {
   std::string server = "127.0.0.1:50051";
   std::vector<std::string> links;
   std::string detail = "contacts";
@@ -29,9 +26,7 @@ struct Options {
   uint64_t count = 0;
 };
 
-std::atomic<bool> interrupted = false;
-
-client::StreamOptions ToStream(const Options& options) {
+client::StreamOptions ToStream(const WatchOptions& options) {
   return {.links = options.links,
           .detail = options.detail == "full"       ? client::Detail::kFull
                     : options.detail == "geometry" ? client::Detail::kGeometry
@@ -42,26 +37,25 @@ client::StreamOptions ToStream(const Options& options) {
           .deadband_move_m = options.deadband_mm * 1e-3};
 }
 
-Result<void> Run(const Options& options) {
+Result<void> RunWatch(const WatchOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   auto reader = connection->StreamFrames(ToStream(options));
   if (!reader) return reader.error();
-  std::signal(SIGINT, [](int) { interrupted = true; });
-  std::signal(SIGTERM, [](int) { interrupted = true; });
+  CatchInterrupts();
   FrameOutput output("taclink watch " + options.server + "   (Ctrl-C ends)", options.json);
   // Every link says something once a second, so silence means a server or a network that hangs.
   const double patience_s = std::max(options.patience_s, options.rate_hz > 0 ? 3 / options.rate_hz : 0);
   double silence_s = 0;
-  for (uint64_t taken = 0; !interrupted && (options.count == 0 || taken < options.count);) {
-    const auto frame = (*reader)->Next(kPoll);
+  for (uint64_t taken = 0; !IsInterrupted() && (options.count == 0 || taken < options.count);) {
+    const auto frame = (*reader)->Next(kInterruptPoll);
     if (frame) {
       silence_s = 0;
       output.Take(*frame, (*reader)->counts());
       ++taken;
     } else if (frame.error().code != ErrorCode::kTimeout) {
       return frame.error();
-    } else if (silence_s += std::chrono::duration<double>(kPoll).count(); silence_s > patience_s) {
+    } else if (silence_s += std::chrono::duration<double>(kInterruptPoll).count(); silence_s > patience_s) {
       return Error{ErrorCode::kUnavailable,
                    fmt::format("nothing from the server at {} for {:.0f} s; check server and "
                                "network",
@@ -76,7 +70,7 @@ Result<void> Run(const Options& options) {
 }  // namespace
 
 void AddWatch(const Arguments& app, Selected& selected) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<WatchOptions>();
   const Arguments command = app.AddCommand("watch", "Show contacts and forces live");
   AddServerOption(command, options->server);
   command.AddOption("--links", options->links, "Names of links, separated by commas (all)").Delimiter(',');
@@ -95,7 +89,7 @@ void AddWatch(const Arguments& app, Selected& selected) {
       .Must(Positive())
       .ShowDefault();
   command.AddOption("--count", options->count, "End after so many frames").Must(Positive());
-  command.OnChosen([options, &selected] { selected = [options] { return Run(*options); }; });
+  command.OnChosen([options, &selected] { selected = [options] { return RunWatch(*options); }; });
 }
 
 }  // namespace taclink::command

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sensing/core/printable.h"
+
 namespace taclink::command {
 namespace {
 
@@ -32,6 +34,10 @@ std::string Force(const client::Contact& contact) {
   return fmt::format("{:5.2f} N ({:5.2f}, {:5.2f}, {:5.2f})", Norm(f), f[0], f[1], f[2]);
 }
 
+std::string Total(const client::Frame& frame) {
+  return frame.total_force_n ? fmt::format("{:.2f} N", Norm(*frame.total_force_n)) : "-";
+}
+
 std::string Latency(const client::Frame& frame) {
   const auto latency = frame.latency_s();
   return latency ? fmt::format("{:.1f} ms", *latency * 1e3) : "-";
@@ -57,10 +63,10 @@ std::string LiveView::Draw(const std::vector<client::StreamCounts>& counts, stea
       view.frames = 0;
     }
     const client::Frame& frame = view.frame;
-    out += fmt::format("{}{:<14} {:<11} {:5.1f}/s  latency {:>8}  total {:5.2f} N  markers {}+{}  {}{}",
-                       kClearLine, frame.link, client::Name(frame.status), view.rate_hz, Latency(frame),
-                       Norm(frame.total_force_n), frame.markers_seen, frame.markers_inferred,
-                       frame.status_reason, kClearLine);
+    out += fmt::format("{}{:<14} {:<11} {:5.1f}/s  latency {:>8}  total {:>7}  markers {}+{}  {}{}",
+                       kClearLine, Printable(frame.link), client::Name(frame.status), view.rate_hz,
+                       Latency(frame), Total(frame), frame.markers_seen, frame.markers_inferred,
+                       Printable(frame.status_reason), kClearLine);
     for (const auto& contact : frame.contacts) {
       out += fmt::format("  #{:<4} {}  at {}  area {:.0f} mm2{}", contact.id, Force(contact), Where(contact),
                          contact.area_m2 * 1e6, kClearLine);

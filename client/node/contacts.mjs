@@ -22,9 +22,8 @@ function printLinks(arm) {
 
 function printContacts(message) {
   const { contacts, total } = message;
-  console.log(
-    `${utcText(message.utc_ns)}  ${contacts.length} contacts, total ${vector(total?.force_n, 3)} N`,
-  );
+  const sum = total ? `${vector(total.force_n, 3)} N` : "not known";
+  console.log(`${utcText(message.utc_ns)}  ${contacts.length} contacts, total ${sum}`);
   for (const contact of contacts) {
     const force = vector(contact.wrench.force_n, 3);
     const push = contact.normal_force_n.toFixed(3);

@@ -20,8 +20,8 @@ function printContacts(where, frame) {
   const { contacts, times } = frame;
   const time = times.exposure_utc_ns === "0" ? "without a picture" : utcText(times.exposure_utc_ns);
   const status = name(frame.status, "LINK_STATUS_");
-  const total = vector(frame.total_force_n, 3);
-  console.log(`${time}  ${where}: ${status}, ${contacts.length} contacts, total ${total} N`);
+  const total = frame.total_force_n ? `total ${vector(frame.total_force_n, 3)} N` : "no forces are known";
+  console.log(`${time}  ${where}: ${status}, ${contacts.length} contacts, ${total}`);
   for (const { id, normal_force_n: push, force_n: force, center_m: center } of contacts) {
     console.log(`  #${id}: ${push.toFixed(3)} N, force ${vector(force, 3)} N at ${vector(center, 4)} m`);
   }

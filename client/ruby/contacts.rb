@@ -21,8 +21,8 @@ def print_links(arm)
 end
 
 def print_contacts(message)
-  total = vector(message.total&.force_n, 3)
-  puts "#{Taclink.utc_text(message.utc_ns)}  #{message.contacts.size} contacts, total #{total} N"
+  total = message.total ? "#{vector(message.total.force_n, 3)} N" : 'not known'
+  puts "#{Taclink.utc_text(message.utc_ns)}  #{message.contacts.size} contacts, total #{total}"
   message.contacts.each do |contact|
     puts format('  %<link>s #%<id>d: %<push>.3f N, force %<force>s N at %<place>s m',
                 link: contact.link, id: contact.link_contact_id, push: contact.normal_force_n,

@@ -50,6 +50,9 @@ struct JointTorque {
 struct LinkContacts {
   std::string link;
   LinkStatus status = LinkStatus::kUnknown;
+  /// Nothing is measured, or what was found can't be trusted: it may be pressed, and the total and the joint
+  /// torques are without it.
+  bool forces_unknown = false;
   uint64_t sequence = 0;
   Pose base_from_link;
   PoseValidity validity = PoseValidity::kUnspecified;
@@ -60,9 +63,9 @@ struct LinkContacts {
 struct ArmContacts {
   std::vector<LinkContacts> links;
   std::vector<ArmContact> contacts;
-  Vector3 total_force_n{};
-  Vector3 total_moment_nm{};  ///< about the base frame's origin
-  std::vector<JointTorque> joints;
+  std::optional<Vector3> total_force_n;    ///< of links whose forces are known; none: those of no link are
+  std::optional<Vector3> total_moment_nm;  ///< likewise, about the base frame's origin
+  std::vector<JointTorque> joints;         ///< likewise; empty: not known, or there are none
   PoseValidity validity = PoseValidity::kUnspecified;  ///< the worst of the links with contacts
   uint64_t sequence = 0;                               ///< of this stream's messages
   int64_t utc_ns = 0;                                  ///< when the server made it

@@ -147,9 +147,41 @@ struct Arm {
   std::vector<Joint> joints = {};  ///< from the base to the tips
 };
 
-/// Why a frame is worse than it could be; the id is stable.
+/// What makes a frame worse than it could be, as v1::Reason; `kUnknown`: another version's, see its id.
+enum class Reason {
+  kUnknown,
+  kFewMarkers,
+  kCamera,
+  kFrozen,
+  kLate,
+  kCamerasDisagree,
+  kNotConverged,
+  kImpossible,
+  kNoEquilibrium,
+  kPressureUnknown,
+  kPressureMismatch,
+  kResidual,
+  kLabels,
+  kTooDeep,
+  kBeyondMarkers,
+  kEncircled,
+  kSparseMarkers,
+  kUnsettled,
+  kForceModel,
+  kCamerasMoved,
+  kDrift,
+  kNoFrames,
+  kWorker,
+  kForcedBaseline,
+};
+
+/// Why a frame is worse than it could be.
 struct StatusReason {
-  std::string id, text;
+  Reason reason = Reason::kUnknown;
+  std::string id;                      ///< its name, such as "pressure_mismatch"
+  std::string text;                    ///< for people, with what to do
+  std::optional<double> value, limit;  ///< its number, and where it begins to be told; none: it has none
+  std::string unit;                    ///< "m", "Pa", "s"; empty: a number of markers, or a ratio
 };
 /// Gauge pressure that the skin's shape and the sensor tell together, and its standard deviation.
 struct PressureEstimate {
@@ -191,7 +223,7 @@ struct StageTimes {
 /// How the pressure inside a skin is known.
 struct PressureReport {
   std::string origin = "none";  ///< none, constant, simulated, file, serial, client
-  bool assumed = true;          ///< configured, or taken as 0: not measured
+  bool assumed = true;          ///< configured, or told by nobody: not measured
   bool stale = false;           ///< the sensor's newest reading is too old, or there is none
   double pressure_pa = 0;       ///< the reading, or what is assumed; gauge
   std::optional<double> age_s;  ///< from the reading to the exposure; none: there is no reading
@@ -212,7 +244,9 @@ struct Frame {
   int markers_seen = 0;
   int markers_inferred = 0;
   std::vector<Contact> contacts;
-  Vector3 total_force_n{};
+  /// Sum of the contacts' forces. None: no forces are known, for nothing is measured or what was found can't
+  /// be trusted (status_reason); then there are no contacts either.
+  std::optional<Vector3> total_force_n;
   ForceModel force_model = ForceModel::kUnknown;
   double baseline_age_s = 0;
   Baseline baseline;
@@ -221,6 +255,16 @@ struct Frame {
   double picture_share = 0;  ///< part of both pictures' pixels that were read
   bool unchanged = false;    ///< within the stream's deadband; at kContacts
   bool replayed = false;     ///< from a log: the times are those of then
+  /// A body that presses less may not be found, N; of all markers the largest. None: no forces are known, or
+  /// their model (literal) tells none.
+  std::optional<double> detection_limit_n;
+  /// The same of what presses alike all around at one place along the link: its sum, where it shows least.
+  std::optional<double> detection_limit_around_n;
+  /// RMS of what the forces do not explain, in standard deviations. None: no forces are known.
+  std::optional<double> force_residual;
+  /// How far cameras that have moved or changed since the baseline would put markers off, of the marker that
+  /// they put off most; taken off shape and forces. None: no forces are known, or an older version's log.
+  std::optional<double> camera_shift_m;
 
   // kGeometry
   std::vector<Vector3> positions_m;
@@ -230,7 +274,7 @@ struct Frame {
   std::vector<Vector3> nodal_forces_n;
   std::vector<double> nodal_force_sigmas_n;
   std::vector<MarkerSource> marker_sources;
-  double force_residual = 0;
+  std::vector<double> detection_limits_n;  ///< as detection_limit_n, of each marker
   bool force_converged = true;
 
   /// From exposure to this client; right as far as both machines' clocks agree. None: a frame without a
@@ -346,7 +390,7 @@ class Client {
   Result<void> SetCamera(const std::string& link, const std::string& camera, const CameraSettings& settings,
                          std::chrono::milliseconds timeout = std::chrono::seconds(20));
   /// Computes the link's forces by `model` from the next frame on. Errors: kNotFound, kInvalidArgument,
-  /// kUnavailable.
+  /// kFailedPrecondition (kLinear on a skin that may be inflated), kUnavailable.
   Result<void> SetForceModel(const std::string& link, ForceModel model,
                              std::chrono::milliseconds timeout = std::chrono::seconds(60));
 

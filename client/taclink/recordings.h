@@ -30,9 +30,11 @@ const char* Name(RecorderState state);  ///< "idle", "recording", "trouble"
 /// How the server's recorder does. Times in ns since 1970-01-01 UTC; 0: not yet.
 struct RecorderStatus {
   RecorderState state = RecorderState::kUnknown;
-  std::string trouble;  ///< what is wrong and what to do; empty: nothing
-  std::string log;      ///< that is being written, or was last
-  std::string folder;   ///< on the server; empty: none is configured
+  std::string trouble;              ///< what is wrong and what to do; empty: nothing
+  std::string last_trouble;         ///< of this recording, also when it is over; empty: none
+  int64_t last_trouble_utc_ns = 0;  ///< when it was told
+  std::string log;                  ///< that is being written, or was last
+  std::string folder;               ///< on the server; empty: none is configured
   int64_t started_utc_ns = 0;
   int64_t synced_utc_ns = 0;  ///< what was written before is safe from a power cut
   uint64_t bytes = 0;         ///< of this recording, over all its logs

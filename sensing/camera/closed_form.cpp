@@ -9,8 +9,8 @@
 namespace taclink {
 namespace {
 
-constexpr int kRounds = 10;
-constexpr double kWidestRad = 1.2;  // lenses of another kind are fitted up to here
+constexpr int kDistanceRounds = 10;
+constexpr double kWidestLensRad = 1.2;  // lenses of another kind are fitted up to here
 
 // A camera on the axis. The lens is of the division kind.
 struct Coaxial {
@@ -33,7 +33,7 @@ double AxialZ(CameraId id, const Vec3& p) {
 // Linear least squares of the distance across the lines, n . (pixel - center) = r roll, repeated because n
 // turns with the roll.
 void FindCenterAndRoll(const Mat3& rotation, std::span<const BundleSample> samples, Coaxial& c) {
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kDistanceRounds; ++round) {
     Mat3 normal = Mat3::Zero();
     Vec3 right = Vec3::Zero();
     for (const BundleSample& s : samples) {
@@ -53,7 +53,7 @@ void FindCenterAndRoll(const Mat3& rotation, std::span<const BundleSample> sampl
 
 // (4.37) for f and b with the lens known, then (4.43) for the lens with f and b known, by turns.
 void FindFocalAndLens(CameraId id, std::span<const BundleSample> samples, Coaxial& c) {
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kDistanceRounds; ++round) {
     Mat2 normal = Mat2::Zero();
     Vec2 right = Vec2::Zero();
     for (const BundleSample& s : samples) {
@@ -98,7 +98,7 @@ CameraModel Place(const CameraModel& nominal, CameraId id, const Coaxial& c) {
 CameraStarts FindStarts(const LinkModel& model, CameraId id, std::span<const BundleSample> samples,
                         double place_tolerance_mm) {
   const CameraModel& nominal = model.nominal_rig[id];
-  const LensModel lens = ConvertLens(nominal.lens, LensKind::kDivision, kWidestRad);
+  const LensModel lens = ConvertLens(nominal.lens, LensKind::kDivision, kWidestLensRad);
   const double place = PlaceOnAxis(model, id);
   Coaxial c{lens.principal_point_px, 0, lens.focal_px, place, lens.k1_per_px2, lens.k2_per_px4};
   FindCenterAndRoll(nominal.camera_from_link.rotation, samples, c);

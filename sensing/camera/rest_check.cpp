@@ -99,10 +99,12 @@ std::optional<Dent> FindDent(const LinkModel& model, const CalibrationSummary& s
   return Dent{worst->first, static_cast<int>(moved), worst->second};
 }
 
-std::optional<Dent> FindDent(const LinkModel& model, const StereoRig& rig, const LabelledMarkers& rest,
-                             const Eigen::VectorXd& inflation_mm, double limit_mm) {
+CalibrationSummary ResidualsOf(const LinkModel& model, const StereoRig& rig, const LabelledMarkers& rest,
+                               const Eigen::VectorXd& inflation_mm) {
   CalibrationSummary summary;
   summary.rig = rig;
+  double squares = 0;
+  int used = 0;
   for (const CameraId id : kBothCameras) {
     const Projector projector(rig[id]);
     auto& residuals = summary.cameras[Index(id)].residuals;
@@ -111,11 +113,14 @@ std::optional<Dent> FindDent(const LinkModel& model, const StereoRig& rig, const
       const auto expected = projector.Project(SeenPoint(model, m, projector.center_in_link(), true) +
                                               inflation_mm.segment<3>(3 * m));
       residuals.emplace_back();
-      if (seen.seen && expected)
-        residuals.back() = {MarkerResidual::Kind::kUsed, seen.center_px, seen.center_px - *expected};
+      if (!seen.seen || !expected) continue;
+      residuals.back() = {MarkerResidual::Kind::kUsed, seen.center_px, seen.center_px - *expected};
+      squares += residuals.back().residual_px.squaredNorm();
+      ++used;
     }
   }
-  return FindDent(model, summary, limit_mm);
+  summary.rms_px = std::sqrt(squares / (2.0 * std::max(1, used)));
+  return summary;
 }
 
 std::string Describe(const LinkModel& model, const Dent& dent) {

@@ -20,10 +20,10 @@ struct Dent {
 /// left out of the fit count as well, by their residuals.
 std::optional<Dent> FindDent(const LinkModel& model, const CalibrationSummary& summary, double limit_mm);
 
-/// The same where the cameras were known before these pictures, of a skin that pressure moves by
-/// `inflation_mm` (stacked markers).
-std::optional<Dent> FindDent(const LinkModel& model, const StereoRig& rig, const LabelledMarkers& rest,
-                             const Eigen::VectorXd& inflation_mm, double limit_mm);
+/// Residuals and their RMS where the cameras were known before these pictures, of a skin that pressure moves
+/// by `inflation_mm` (stacked markers); no more of the summary is set.
+CalibrationSummary ResidualsOf(const LinkModel& model, const StereoRig& rig, const LabelledMarkers& rest,
+                               const Eigen::VectorXd& inflation_mm);
 
 /// What a person should know and do.
 std::string Describe(const LinkModel& model, const Dent& dent);

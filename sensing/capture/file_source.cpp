@@ -84,6 +84,7 @@ class FileSource final : public FrameSource {
   Result<void> CheckSizes();
   Result<void> LoadAll();
   Result<void> Load(StereoFrame& frame);
+  Result<void> Take(const std::string& path, CameraId id, RawImage& image);
   Result<void> Read(const std::string& path, RawImage& image) const;
   int64_t DueNs(uint64_t index) const {
     return start_ns_ + std::llround(1e9 * static_cast<double>(index) / options_.frame_rate_hz);
@@ -133,7 +134,7 @@ Result<void> FileSource::LoadAll() {
     auto& images = loaded_.emplace_back();
     for (const CameraId id : kBothCameras) {
       if (pair[Index(id)].empty()) continue;
-      if (auto read = Read(pair[Index(id)], images[Index(id)]); !read) return read;
+      if (auto read = Take(pair[Index(id)], id, images[Index(id)]); !read) return read;
     }
   }
   return {};
@@ -141,11 +142,15 @@ Result<void> FileSource::LoadAll() {
 
 Result<void> FileSource::CheckSizes() {
   width_px_ = height_px_ = 0;
+  std::optional<Error> unreadable;
   for (const PicturePair& pair : pairs_) {
     for (const std::string& path : pair) {
       if (path.empty()) continue;
       const auto info = ReadImageInfo(path);
-      if (!info) return info.error();
+      if (!info) {
+        if (!unreadable) unreadable = info.error();
+        continue;
+      }
       if (width_px_ == 0) {
         width_px_ = info->width_px;
         height_px_ = info->height_px;
@@ -158,6 +163,7 @@ Result<void> FileSource::CheckSizes() {
       }
     }
   }
+  if (width_px_ == 0 && unreadable) return *unreadable;
   return {};
 }
 
@@ -202,14 +208,29 @@ Result<void> FileSource::Load(StereoFrame& frame) {
   for (const CameraId id : kBothCameras) {
     RawImage& image = frame.images[Index(id)];
     image.valid = false;
+    image.why_missing.clear();
     if (pair[Index(id)].empty()) {
       ++counters_.unpaired[Index(id == CameraId::kTop ? CameraId::kBottom : CameraId::kTop)];
     } else if (!loaded_.empty()) {
       image = loaded_[next_ % pairs_.size()][Index(id)];
-    } else if (auto read = Read(pair[Index(id)], image); !read) {
+    } else if (auto read = Take(pair[Index(id)], id, image); !read) {
       return read;
     }
   }
+  return {};
+}
+
+// One picture that is damaged or gone is like one that a camera failed to give. Errors: the folder is gone.
+Result<void> FileSource::Take(const std::string& path, CameraId id, RawImage& image) {
+  const auto read = Read(path, image);
+  if (read) return {};
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(options_.folder, ignored)) {
+    return Error{ErrorCode::kUnavailable, options_.folder + ": the folder is gone; bring it back"};
+  }
+  image.valid = false;
+  image.why_missing = read.error().message;
+  ++counters_.damaged[Index(id)];
   return {};
 }
 
@@ -226,11 +247,21 @@ Result<void> FileSource::Read(const std::string& path, RawImage& image) const {
 }
 
 SourceInfo FileSource::Info() const {
-  return {"files " + options_.folder + ", " + std::to_string(pairs_.size()) + " pairs", width_px_, height_px_,
-          options_.frame_rate_hz};
+  return {"files " + options_.folder + ", " + std::to_string(pairs_.size()) + " pairs",
+          width_px_,
+          height_px_,
+          options_.frame_rate_hz,
+          {},
+          options_.paced ? start_ns_ : 0};
 }
 
 }  // namespace
+
+Result<size_t> CountPicturePairs(const std::string& folder) {
+  const auto pairs = ListPairs(folder);
+  if (!pairs) return pairs.error();
+  return pairs->size();
+}
 
 std::unique_ptr<FrameSource> MakeFileSource(FileOptions options, Clock& clock) {
   return std::make_unique<FileSource>(std::move(options), clock);

@@ -24,8 +24,14 @@ struct FileOptions {
 
 /// Numbered picture pairs in a folder: top_000001.png and bottom_000001.png, also .jpg and .jpeg, any count
 /// of digits, in the order of their numbers. A number with only one picture gives a frame whose other image
-/// is not valid. All must have one size, which Start checks. PNG pictures come as kGray8 (or, with `yuyv`,
-/// kYuyv), JPEG ones as kMjpeg bytes. The time of exposure is when a pair was due, by `clock`.
+/// is not valid; so does a picture that is damaged, which says why and is counted. All must have one size,
+/// which Start checks. PNG pictures come as kGray8 (or, with `yuyv`, kYuyv), JPEG ones as kMjpeg bytes. The
+/// time of exposure is when a pair was due, by `clock`. Start's errors for want of pictures: as
+/// CountPicturePairs.
 std::unique_ptr<FrameSource> MakeFileSource(FileOptions options, Clock& clock);
+
+/// Errors: kUnavailable (no such folder, or it can't be read), kInvalidArgument (no such pictures in it, or
+/// two of one number).
+Result<size_t> CountPicturePairs(const std::string& folder);
 
 }  // namespace taclink

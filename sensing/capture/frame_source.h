@@ -38,6 +38,8 @@ struct SourceInfo {
   int height_px = 0;
   double frame_rate_hz = 0;
   std::vector<SourceCamera> cameras = {};  ///< top, bottom; none: the source has no cameras
+  /// Monotonic: when its first frame is due, which may be long after Start; 0: at once.
+  int64_t begins_at_ns = 0;
 };
 
 /// What became of the pictures since the source was made.

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "sensing/capture/decode.h"
+#include "sensing/core/read_file.h"
 
 namespace taclink {
 namespace {
@@ -31,27 +32,14 @@ Error BadFile(const std::string& path, const std::string& what) {
   return {ErrorCode::kInvalidArgument, path + ": " + what};
 }
 
+Bytes BytesOf(const std::string& content) {
+  return {reinterpret_cast<const uint8_t*>(content.data()), content.size()};
+}
+
 struct FileCloser {
   void operator()(std::FILE* file) const { std::fclose(file); }
 };
 using File = std::unique_ptr<std::FILE, FileCloser>;
-
-/// Up to `limit` bytes from the beginning of the file.
-Result<void> ReadBytes(const std::string& path, size_t limit, std::vector<uint8_t>& bytes) {
-  const auto failed = [&path] { return Error{ErrorCode::kNotFound, path + ": " + std::strerror(errno)}; };
-  const File file(std::fopen(path.c_str(), "rbe"));
-  if (!file) return failed();
-  std::array<uint8_t, 1 << 16> block;
-  bytes.clear();
-  while (bytes.size() < limit) {
-    const size_t wanted = std::min(block.size(), limit - bytes.size());
-    const size_t got = std::fread(block.data(), 1, wanted, file.get());
-    bytes.insert(bytes.end(), block.begin(), block.begin() + static_cast<std::ptrdiff_t>(got));
-    if (got < wanted) break;
-  }
-  if (std::ferror(file.get())) return failed();
-  return {};
-}
 
 /// libpng's simplified interface reports errors by value; this frees what it holds.
 struct PngReader {
@@ -139,26 +127,30 @@ Result<void> DecodePng(const std::string& path, Bytes bytes, std::vector<uint8_t
 }  // namespace
 
 Result<ImageFileInfo> ReadImageInfo(const std::string& path) {
-  std::vector<uint8_t> bytes;
+  Result<ImageFileInfo> info = BadFile(path, "");
   for (const size_t limit : kHeaderBytes) {
-    if (auto read = ReadBytes(path, limit, bytes); !read) return read.error();
-    if (auto info = Info(path, bytes); info || bytes.size() < limit) return info;
+    const auto bytes = ReadBeginning(path, limit);
+    if (!bytes) return bytes.error();
+    info = Info(path, BytesOf(*bytes));
+    if (info || bytes->size() < limit) break;
   }
-  return Info(path, bytes);
+  return info;
 }
 
 Result<void> ReadRawImage(const std::string& path, RawImage& image) {
   image.valid = false;
-  if (auto read = ReadBytes(path, kMaxFileBytes + 1, image.bytes); !read) return read.error();
-  if (image.bytes.size() > kMaxFileBytes) return BadFile(path, "is too large for a picture");
-  const auto info = Info(path, image.bytes);
+  const auto file = ReadFile(path, kMaxFileBytes);
+  if (!file) return file.error();
+  const Bytes bytes = BytesOf(*file);
+  const auto info = Info(path, bytes);
   if (!info) return info.error();
   image.format = info->format;
   image.width_px = info->width_px;
   image.height_px = info->height_px;
   if (info->format == PixelFormat::kGray8) {
-    const std::vector<uint8_t> file = std::exchange(image.bytes, {});
-    if (auto decoded = DecodePng(path, file, image.bytes); !decoded) return decoded;
+    if (auto decoded = DecodePng(path, bytes, image.bytes); !decoded) return decoded;
+  } else {
+    image.bytes.assign(bytes.begin(), bytes.end());
   }
   image.valid = true;
   return {};

@@ -37,9 +37,18 @@ struct NodalForces {
   std::vector<Vec3> forces_n;    ///< by marker index
   std::vector<double> sigmas_n;  ///< by marker index: standard deviation of the force; 0 where there is none
   std::vector<int> loaded;       ///< indices of the markers with a force
-  double residual = 0;           ///< RMS of what the estimate does not explain, in standard deviations
-  double region_residual = 0;    ///< chi^2 per number of the worst region of 3 x 3 markers
-  bool converged = true;         ///< false: there is no estimate, the forces are none
+  /// By marker index: limit of detection, the weakest inward force of a body there that would be found 95
+  /// times in 100, where nothing else presses nearby. Empty: not known.
+  std::vector<double> limits_n;
+  /// Likewise of what presses alike all around at one place along the link: its sum, between the outer rings
+  /// where it shows least. Known where the others are.
+  double limit_around_n = 0;
+  double residual = 0;         ///< RMS of what the estimate does not explain, in standard deviations
+  double region_residual = 0;  ///< chi^2 per number of the worst region of 3 x 3 markers
+  /// How far cameras that have moved or changed since the baseline would put markers off, of the marker that
+  /// they put off most. It is taken off.
+  double camera_shift_mm = 0;
+  bool converged = true;  ///< false: there is no estimate, the forces are none
 };
 
 /// A connected region of the skin that something pushes on. Link frame.

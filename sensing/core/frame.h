@@ -39,7 +39,7 @@ struct FrameTimes {
 
 /// Who says what the pressure inside a skin is.
 enum class PressureOrigin : uint8_t {
-  kNone,       ///< nobody: taken as 0
+  kNone,       ///< nobody: 0 for the baseline; what came since, the skin's shape tells
   kConstant,   ///< the configuration
   kSimulated,  ///< the simulation that makes the pictures
   kFile,       ///< a sensor, through a file or pipe

@@ -34,12 +34,42 @@ const char* Name(ReasonId id) {
       return "unsettled";
     case ReasonId::kForceModel:
       return "force_model";
+    case ReasonId::kFrozen:
+      return "frozen";
+    case ReasonId::kLate:
+      return "late";
+    case ReasonId::kCamerasDisagree:
+      return "cameras_disagree";
     case ReasonId::kCamerasMoved:
       return "cameras_moved";
     case ReasonId::kDrift:
       return "drift";
+    case ReasonId::kForcedBaseline:
+      return "forced_baseline";
+    case ReasonId::kNoFrames:
+      return "no_frames";
+    case ReasonId::kWorker:
+      return "worker";
   }
   return "unknown";
+}
+
+ReasonUnit UnitOf(ReasonId id) {
+  switch (id) {
+    case ReasonId::kLate:
+      return ReasonUnit::kSeconds;
+    case ReasonId::kPressureMismatch:
+      return ReasonUnit::kMegapascals;
+    case ReasonId::kTooDeep:
+    case ReasonId::kSparseMarkers:
+    case ReasonId::kUnsettled:
+    case ReasonId::kForceModel:
+    case ReasonId::kCamerasMoved:
+    case ReasonId::kDrift:
+      return ReasonUnit::kMillimeters;
+    default:
+      return ReasonUnit::kNone;
+  }
 }
 
 std::optional<ReasonId> ReasonNamed(std::string_view name) {

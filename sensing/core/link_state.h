@@ -26,6 +26,9 @@ enum class LinkStatus : uint8_t {
 enum class ReasonId : uint8_t {
   kFewMarkers,        ///< too few markers are seen
   kCamera,            ///< a camera gives no picture, or none that can be read
+  kFrozen,            ///< a camera gives the same picture again and again
+  kLate,              ///< a camera shows the skin's motion later than the other
+  kCamerasDisagree,   ///< the two pictures are not of one skin at one moment
   kNotConverged,      ///< no loads and pressure were found that explain the markers
   kImpossible,        ///< what was found is not physically possible
   kNoEquilibrium,     ///< no skin of this model is stable under the pressure
@@ -39,17 +42,27 @@ enum class ReasonId : uint8_t {
   kSparseMarkers,     ///< a load on this skin may hide between the markers that are in sight
   kUnsettled,         ///< where no camera sees the skin its shape did not settle
   kForceModel,        ///< the force model that was asked for does not hold here
-  kCamerasMoved,      ///< all markers together are off: taken out of the estimate, but calibrate
+  kCamerasMoved,      ///< what they make of markers is taken off, but calibrate
   kDrift,             ///< the baseline has drifted
+  kNoFrames,          ///< none come from the source, or from the log that is replayed
+  kWorker,            ///< what reads or computes the frames is late, has failed or is being started again
+  kForcedBaseline,    ///< beside another reason: a baseline that was taken by force may explain it
 };
-inline constexpr int kReasonCount = static_cast<int>(ReasonId::kDrift) + 1;
+inline constexpr int kReasonCount = static_cast<int>(ReasonId::kForcedBaseline) + 1;
 const char* Name(ReasonId id);
 /// None: another version's.
 std::optional<ReasonId> ReasonNamed(std::string_view name);
 
+/// What a reason's number is in.
+enum class ReasonUnit : uint8_t { kNone, kMillimeters, kMegapascals, kSeconds };
+/// kNone: a number of markers, or a ratio.
+ReasonUnit UnitOf(ReasonId id);
+
 struct Reason {
   ReasonId id = ReasonId::kFewMarkers;
   std::string text;  ///< for people, with what to do
+  /// What was found, and where it begins to be told. None: it is no matter of more or less.
+  std::optional<double> value = {}, limit = {};
 };
 
 /// A pressure that the estimate found.
@@ -95,6 +108,11 @@ struct LinkState {
   bool replayed = false;  ///< from a log: the UTC times are those of then
 
   bool measured() const { return !shape.positions_mm.empty(); }
+  /// False: nothing is measured, or what was found can't be trusted; then no contacts do not say that nothing
+  /// presses. Holds at every level of detail.
+  bool has_forces() const {
+    return (status == LinkStatus::kOk || status == LinkStatus::kDegraded) && forces.converged;
+  }
   /// Nothing is measured; most buffers stay.
   void ClearMeasurement() {
     shape.positions_mm.clear();
@@ -106,7 +124,9 @@ struct LinkState {
     forces.forces_n.clear();
     forces.sigmas_n.clear();
     forces.loaded.clear();
-    forces.residual = forces.region_residual = 0;
+    forces.limits_n.clear();
+    forces.limit_around_n = 0;
+    forces.residual = forces.region_residual = forces.camera_shift_mm = 0;
     pressure_estimate.reset();
     forces.converged = true;
     contacts.clear();

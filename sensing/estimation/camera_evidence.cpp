@@ -9,7 +9,7 @@ namespace taclink {
 namespace {
 
 constexpr double kSameOffsetMm = 0.01;
-constexpr double kSettledMm = 0.005, kLongestStepMm = 20;  // of a triangulation
+constexpr double kTriangulatedMm = 0.005, kLongestTriangulationMm = 20;  // of a triangulation
 
 bool IsUsable(const MarkerObservation& o) {
   return o.seen && o.center_px.allFinite() && o.covariance_px2.allFinite() &&
@@ -68,51 +68,99 @@ void CameraEvidence::SetBaseline(const LabelledMarkers& rest, const Eigen::Vecto
   for (size_t i = 0; i < observations_.size(); ++i) {
     Observation& o = observations_[i];
     const size_t camera = i % kCameraCount, marker = i / kCameraCount;
+    const bool had_baseline = keep_unseen && o.residual_of != ResidualOf::kRing;
+    const bool was_shown = keep_unseen && o.residual_of == ResidualOf::kMarker;
+    const Vec2 before_px = o.residual, rest_before_px = o.rest_px;
     o.dropped = false;
     Linearise(o, camera, static_cast<int>(marker), u.segment<3>(3 * static_cast<Eigen::Index>(marker)));
     o.rest_px = o.projected;
-    o.has_baseline = keep_unseen && o.has_baseline;
-    if (marker >= rest.cameras[camera].size() || !IsUsable(rest.cameras[camera][marker]) || !o.linear)
+    o.residual_of = had_baseline ? ResidualOf::kBaselineBefore : ResidualOf::kRing;
+    o.change.reset();
+    if (marker >= rest.cameras[camera].size() || !IsUsable(rest.cameras[camera][marker]) || !o.linear) {
+      o.residual_covariance += DriftOver(o.rest_px - rest_before_px);
       continue;
+    }
     const MarkerObservation& seen = rest.cameras[camera][marker];
     o.residual = seen.center_px - o.projected;
     o.residual_covariance =
         seen.covariance_px2 + options_.rest_sigma_px * options_.rest_sigma_px * Mat2::Identity();
-    o.has_baseline = keep_unseen || o.residual.norm() <= options_.max_residual_px;
+    if (was_shown) o.change = o.residual - before_px;
+    if (keep_unseen || o.residual.norm() <= options_.max_residual_px) o.residual_of = ResidualOf::kMarker;
   }
   FillUnknownResiduals();
 }
 
-// A marker that the rest pictures do not show gets the mean residual of its ring in that camera, turned to
-// its place: domes and lenses look alike all round.
+Mat2 CameraEvidence::DriftOver(const Vec2& moved_px) const {
+  return options_.residual_drift * options_.residual_drift * moved_px.squaredNorm() * Mat2::Identity();
+}
+
+// What the markers of one ring have in common in one camera: domes and lenses look alike all round, air and
+// creep move a ring alike.
+struct CameraEvidence::InRing {
+  double outward_px = 0, square_px2 = 0;  // means
+  int known = 0;
+
+  void Add(const Vec2& residual, const Vec2& outward) {
+    outward_px += residual.dot(outward);
+    square_px2 += residual.squaredNorm();
+    ++known;
+  }
+  void Finish() {
+    if (known == 0) return;
+    outward_px /= known;
+    square_px2 /= known;
+  }
+  bool tells() const { return known > 2; }
+  double scatter_px2() const { return std::max(0.0, square_px2 - outward_px * outward_px); }
+};
+
+// A marker that the rest pictures do not show has the residual of its ring, or the one that it had in the
+// baseline before, changed as its ring's has: else what moved the skin since would be in its every frame.
 void CameraEvidence::FillUnknownResiduals() {
-  const int paths = paths_;
+  double changes_px2 = 0;
+  int changes = 0;
+  for (const Observation& o : observations_) {
+    if (!o.change) continue;
+    changes_px2 += o.change->squaredNorm();
+    ++changes;
+  }
+  const double any_change_px2 = changes_px2 / std::max(1, changes);
   for (int ring = 0; ring < rings_; ++ring) {
-    for (size_t c = 0; c < kCameraCount; ++c) {
-      const Vec2 middle = projectors_[c].model().lens.principal_point_px;
-      const auto at = [&](int path) -> Observation& {
-        return observations_[static_cast<size_t>(ring * paths + path) * kCameraCount + c];
-      };
-      double mean = 0, square = 0;
-      int known = 0;
-      for (int path = 0; path < paths; ++path) {
-        const Observation& o = at(path);
-        if (!o.has_baseline) continue;
-        const double outward = o.residual.dot((o.rest_px - middle).normalized());
-        mean += outward;
-        square += o.residual.squaredNorm();
-        ++known;
-      }
-      if (known > 0) mean /= known;
-      const double unknown2 = options_.unknown_residual_px * options_.unknown_residual_px;
-      const double scatter2 = known > 2 ? std::max(square / known - mean * mean, 0.04 * unknown2) : unknown2;
-      for (int path = 0; path < paths; ++path) {
-        Observation& o = at(path);
-        if (o.has_baseline) continue;
-        o.residual = mean * (o.rest_px - middle).normalized();
-        o.residual_covariance = scatter2 * Mat2::Identity();
-      }
+    for (size_t c = 0; c < kCameraCount; ++c) FillRing(ring, c, any_change_px2);
+  }
+}
+
+void CameraEvidence::FillRing(int ring, size_t camera, double any_change_px2) {
+  const Vec2 middle = projectors_[camera].model().lens.principal_point_px;
+  const auto at = [&](int path) -> Observation& {
+    return observations_[static_cast<size_t>(ring * paths_ + path) * kCameraCount + camera];
+  };
+  const auto outward = [&](const Observation& o) -> Vec2 { return (o.rest_px - middle).normalized(); };
+  const double unknown_px2 = options_.unknown_residual_px * options_.unknown_residual_px;
+  InRing change;
+  for (int path = 0; path < paths_; ++path) {
+    if (const Observation& o = at(path); o.change) change.Add(*o.change, outward(o));
+  }
+  change.Finish();
+  InRing residual;
+  for (int path = 0; path < paths_; ++path) {
+    Observation& o = at(path);
+    if (o.residual_of == ResidualOf::kBaselineBefore) {
+      if (change.tells()) o.residual += change.outward_px * outward(o);
+      const double doubt_px2 = change.tells() ? change.scatter_px2() : any_change_px2;
+      if (o.residual_covariance.trace() < 2 * unknown_px2)
+        o.residual_covariance += doubt_px2 * Mat2::Identity();
     }
+    if (o.residual_of != ResidualOf::kRing) residual.Add(o.residual, outward(o));
+  }
+  residual.Finish();
+  const double scatter_px2 =
+      residual.tells() ? std::max(residual.scatter_px2(), 0.04 * unknown_px2) : unknown_px2;
+  for (int path = 0; path < paths_; ++path) {
+    Observation& o = at(path);
+    if (o.residual_of != ResidualOf::kRing) continue;
+    o.residual = residual.outward_px * outward(o);
+    o.residual_covariance = scatter_px2 * Mat2::Identity();
   }
 }
 
@@ -129,9 +177,7 @@ void CameraEvidence::Observe(const LabelledMarkers& markers) {
     o.dropped = false;
     if (!o.seen) continue;
     o.pixel = seen.center_px - o.residual;
-    const double drift2 =
-        options_.residual_drift * options_.residual_drift * (o.pixel - o.rest_px).squaredNorm();
-    o.covariance = seen.covariance_px2 + o.residual_covariance + camera + drift2 * Mat2::Identity();
+    o.covariance = seen.covariance_px2 + o.residual_covariance + camera + DriftOver(o.pixel - o.rest_px);
     o.weight = o.covariance.inverse();
   }
 }
@@ -155,8 +201,8 @@ double CameraEvidence::Triangulate(int marker, Vec3& place, Mat3& information) {
     }
     const Vec3 by = information.ldlt().solve(pull);
     if (!by.allFinite()) return -1;
-    if (by.norm() < kSettledMm) return chi2;
-    place += by * std::min(1.0, kLongestStepMm / by.norm());
+    if (by.norm() < kTriangulatedMm) return chi2;
+    place += by * std::min(1.0, kLongestTriangulationMm / by.norm());
   }
   return chi2;
 }
@@ -166,7 +212,7 @@ void CameraEvidence::Measure(const Eigen::VectorXd& u, MarkerObservations& obser
   observed.information.assign(rest_mm_.size(), Mat3::Zero());
   for (size_t m = 0; m < rest_mm_.size(); ++m) {
     const auto marker = static_cast<int>(m);
-    Vec3 place = u.segment<3>(3 * static_cast<Eigen::Index>(m));
+    const Vec3 place = u.segment<3>(3 * static_cast<Eigen::Index>(m));
     Observation* pair = &observations_[m * kCameraCount];
     if (pair[0].in_use() && pair[1].in_use()) {
       Vec3 met = place;
@@ -194,6 +240,16 @@ void CameraEvidence::Measure(const Eigen::VectorXd& u, MarkerObservations& obser
       observed.information[m] = information;
     }
   }
+}
+
+CameraAgreement CameraEvidence::Agreement() const {
+  CameraAgreement agreement;
+  for (size_t m = 0; m < is_suspect_.size(); ++m) {
+    const Observation* pair = &observations_[m * kCameraCount];
+    agreement.pairs += pair[0].seen && pair[1].seen ? 1 : 0;
+    agreement.apart += is_suspect_[m] != 0 ? 1 : 0;
+  }
+  return agreement;
 }
 
 double CameraEvidence::Misfit(size_t observation, const Vec3& u, const Mat3& covariance) {

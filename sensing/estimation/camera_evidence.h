@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -32,6 +33,12 @@ struct CameraEvidenceOptions {
   double outlier_sigmas = 6;
 };
 
+/// Whether the two pictures of a moment are of one skin.
+struct CameraAgreement {
+  int pairs = 0;  ///< markers that both cameras see
+  int apart = 0;  ///< of these, whose two lines of sight do not meet
+};
+
 /// Both cameras' labeled markers as displacements. Where both cameras see a marker its place follows from its
 /// two rays alone, whatever a model expects; where one does, along its ray it is where the estimate has it.
 /// One thread; no allocation after construction. Displacements: from the model's rest, stacked, link frame,
@@ -43,7 +50,8 @@ class CameraEvidence {
   /// Takes the markers at rest, where they are displaced by `u` from the model. What their pixels are off the
   /// model's projection is systematic (the lens, a marker's place in the mould), and is subtracted from later
   /// observations, whose variance its noise joins. `keep_unseen`: what `rest` does not show keeps its fixed
-  /// residual, and a large one is believed, as the labels are those of a skin that is followed.
+  /// residual, changed as those of its ring have, with the doubt of that; and a large one is believed, as the
+  /// labels are those of a skin that is followed.
   void SetBaseline(const LabelledMarkers& rest, const Eigen::VectorXd& u, bool keep_unseen = false);
 
   /// Takes the walls' tilts from displacements `u`: the last estimate. Returns the longest change of a seen
@@ -58,6 +66,9 @@ class CameraEvidence {
   /// with it. `covariances`: of the model's error, by marker. True: something changed; measure again.
   bool Reconsider(const Eigen::VectorXd& u, std::span<const Mat3> covariances);
 
+  /// Of the frame that was observed last, once it was measured.
+  CameraAgreement Agreement() const;
+
   bool Uses(int marker, CameraId id) const { return At(marker, id).in_use(); }
   bool IsDropped(int marker, CameraId id) const {
     const Observation& o = At(marker, id);
@@ -65,12 +76,15 @@ class CameraEvidence {
   }
 
  private:
+  enum class ResidualOf { kRing, kBaselineBefore, kMarker };
+  struct InRing;
   struct Observation {
     bool seen = false, dropped = false;
     Vec2 pixel = Vec2::Zero();  // fixed residual subtracted
     Mat2 covariance = Mat2::Zero(), weight = Mat2::Zero();
-    bool has_baseline = false;
+    ResidualOf residual_of = ResidualOf::kRing;
     Vec2 residual = Vec2::Zero();  // fixed one
+    std::optional<Vec2> change;  // of the residual from one baseline to the next, where both show the marker
     Mat2 residual_covariance = Mat2::Zero();
     Vec2 rest_px = Vec2::Zero();
     bool linear = false;  // the rest is of the linearization
@@ -86,7 +100,9 @@ class CameraEvidence {
     return observations_[static_cast<size_t>(marker) * kCameraCount + Index(id)];
   }
   void Linearise(Observation& o, size_t camera, int marker, const Vec3& u) const;
+  Mat2 DriftOver(const Vec2& moved_px) const;
   void FillUnknownResiduals();
+  void FillRing(int ring, size_t camera, double any_change_px2);
   double Triangulate(int marker, Vec3& place, Mat3& information);
   double Misfit(size_t observation, const Vec3& u, const Mat3& covariance);
 

@@ -14,19 +14,15 @@ namespace {
 
 // Found on three-dimensional solids (docs/calculix.md); forces and lengths in SkinMechanics' units.
 constexpr double kSparsity = 1.5;  // of a load's norm: a load explains so many standard deviations
-constexpr double kBandSparsity =
-    12;  // likewise of a band: rarer, and errors of the model look like a little of one
 constexpr int kReweightings = 2;
-constexpr double kHillN = 0.02;   // the sparsity halves where so much acts nearby
-constexpr double kEndNorm = 1.0;  // of the median: beyond the markers loads hardly show
-constexpr double kLeastHillN = 0.01;
+constexpr double kHillN = 0.02;    // the sparsity halves where so much acts nearby
+constexpr double kEndNorm = 1.0;   // of the median: beyond the markers loads hardly show
 constexpr size_t kMostHills = 24;  // no scene that was ever compared with the truth has a third of it
 constexpr double kLeastOfPeak = 0.03;
 constexpr double kRefitSparsity = 0.1, kRefitEndSparsity = 1.0;
-constexpr double kRidge = 1e-9;
-constexpr float kRounding = 1e-6F;  // of a Gram matrix in single precision
-constexpr double kUnseenMm = 30;    // standard deviation of a direction that is not seen, in units of length
-constexpr double kSameNoise = 2;    // ratio of standard deviations
+constexpr double kHessianRidge = 1e-9;
+constexpr double kUnseenMm = 30;  // standard deviation of a direction that is not seen, in units of length
+constexpr double kSameNoise = 2;  // ratio of standard deviations
 constexpr double kSameDirection = 0.9999;  // cosine
 
 // Lower half of c := c + a a^T, of few columns.
@@ -37,7 +33,11 @@ void AddOuter(const Eigen::MatrixXd& a, Eigen::MatrixXd& c) {
 }  // namespace
 
 LoadEstimator::LoadEstimator(const SkinMechanics& mechanics, const Neighborhoods& near)
-    : mechanics_(mechanics), near_(near), covariance_(mechanics, near), hills_(mechanics) {}
+    : mechanics_(mechanics),
+      near_(near),
+      covariance_(mechanics, near),
+      camera_modes_(mechanics.model()),
+      hills_(mechanics) {}
 
 bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& inflated,
                             const MarkerObservations& observed, const PressurePrior& prior,
@@ -51,7 +51,9 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   if (prior.baseline_mm_per_mpa.size() == by_pressure_.size())
     by_baseline_ = prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa;
   AddOuter(by_baseline_, covariance_mm2_);
-  AddOuter(covariance_.by_cameras_mm(), covariance_mm2_);
+  camera_modes_.Write(observed, camera_modes_mm_);
+  AddOuter(camera_modes_mm_, covariance_mm2_);
+  AddOuter(covariance_.bow_mm(), covariance_mm2_);
   direct_mm2_ = covariance_mm2_.cast<float>();
   direct_mm2_.triangularView<Eigen::StrictlyUpper>() = direct_mm2_.transpose();
   covariance_.AddStray(skin, local_n, covariance_mm2_);
@@ -62,9 +64,11 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
     const auto i = static_cast<size_t>(m);
     auto block = covariance_mm2_.block<3, 3>(3 * m, 3 * m);
     model_covariance_[i] = block.selfadjointView<Eigen::Lower>();
-    // All markers together tell the cameras' modes; one by one they would hide a wrong marker in them.
-    const auto by_cameras_mm = covariance_.by_cameras_mm().middleRows<3>(3 * m);
-    model_covariance_[i].noalias() -= by_cameras_mm * by_cameras_mm.transpose();
+    // All markers together tell what is alike in all; one by one they would hide a wrong marker in it.
+    const auto modes_mm = camera_modes_mm_.middleRows<3>(3 * m);
+    model_covariance_[i].noalias() -= modes_mm * modes_mm.transpose();
+    const auto bow_mm = covariance_.bow_mm().segment<3>(3 * m);
+    model_covariance_[i].noalias() -= bow_mm * bow_mm.transpose();
     noise_mm2_[i] = NoiseOf(observed.information[i], kUnseenMm * mechanics_.length_unit());
     block += noise_mm2_[i];
   }
@@ -72,14 +76,30 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   Eigen::MatrixXd factor = covariance_mm2_;
   if (!dense::Cholesky(factor)) return false;
   factor_ = factor.cast<float>();
+  WriteCameraCovariances();
   whitened_pressure_ = factor.triangularView<Eigen::Lower>().solve(by_pressure_);
   SpreadColumns(skin.columns()[0]);
   hidden_.resize(0, 0);
+  limits_.by_site_n.resize(0);
   dense::SolveLower(factor_, columns_);
   dense::Gram(columns_, gram_);
   gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
   regions_.clear();
   return columns_.allFinite();
+}
+
+// Of M m with independent m ~ N(0, 1): what all markers leave of it, M (I - M' covariance^-1 M) M'.
+void LoadEstimator::WriteCameraCovariances() {
+  Eigen::MatrixXf whitened = camera_modes_mm_.cast<float>();
+  dense::SolveLower(factor_, whitened);
+  const Eigen::Index modes = camera_modes_mm_.cols();
+  const Eigen::MatrixXd left =
+      Eigen::MatrixXd::Identity(modes, modes) - (whitened.transpose() * whitened).cast<double>();
+  camera_covariance_.resize(noise_mm2_.size());
+  for (size_t m = 0; m < camera_covariance_.size(); ++m) {
+    const auto modes_mm = camera_modes_mm_.middleRows<3>(3 * static_cast<Eigen::Index>(m));
+    camera_covariance_[m] = modes_mm * left * modes_mm.transpose();
+  }
 }
 
 // Behind the sites' columns, those of bands: of 1 N that a row of sites shares.
@@ -128,7 +148,8 @@ Eigen::MatrixXd LoadEstimator::Whitened(const Eigen::MatrixXd& columns) const {
 // projected out of data and columns, which is the same as leaving these rows out.
 void LoadEstimator::Hide(const MarkerObservations& observed) {
   const double unseen = kUnseenMm * mechanics_.length_unit(), unseen2 = unseen * unseen;
-  std::vector<Direction> missing;
+  std::vector<Direction>& missing = missing_now_;
+  missing.clear();
   is_shown_.assign(static_cast<size_t>(3 * mechanics_.marker_count()), 1);
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const auto i = static_cast<size_t>(m);
@@ -156,6 +177,7 @@ void LoadEstimator::Hide(const MarkerObservations& observed) {
       std::equal(missing.begin(), missing.end(), missing_.begin(), missing_.end(), is_same))
     return;
   missing_ = missing;
+  limits_.by_site_n.resize(0);
   is_hidden_projected_ = false;
   hidden_.setZero(factor_.rows(), static_cast<Eigen::Index>(missing.size()));
   for (size_t k = 0; k < missing.size(); ++k)
@@ -332,7 +354,7 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& chosen,
     if (!IsBand(column) && mechanics_.IsBeyondMarkers(column))
       b[i] -= kRefitEndSparsity * std::max(kEndNorm * usual_norm_ - norm, 0.0);
   }
-  h.diagonal().array() += kRidge * h.trace() / static_cast<double>(n);
+  h.diagonal().array() += kHessianRidge * h.trace() / static_cast<double>(n);
   Solution solution;
   std::vector<int> support;
   solution.loads = solver_.Solve(h, b, support);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sensing/estimation/assimilation.h"
+#include "sensing/estimation/camera_modes.h"
 #include "sensing/estimation/hills.h"
 #include "sensing/estimation/linearization.h"
 #include "sensing/estimation/marker_covariance.h"
@@ -33,15 +34,23 @@ struct EstimatedLoad {
   Mat2 center_covariance = Mat2::Zero();  ///< of `center`
 };
 
+/// The weakest inward loads that would be told 95 times in 100 (limits of detection), N.
+struct DetectionLimits {
+  Eigen::VectorXd by_site_n;  ///< where nothing else presses nearby
+  double around_n = 0;        ///< of what presses alike all around, the sum; at the worst row of sites
+};
+
 struct LoadEstimate {
   std::vector<EstimatedLoad> loads;
   Linearization::SiteLoads at_sites;  ///< all of them and the stray forces
   Eigen::VectorXd contact_sizes_n;    ///< by site, of the contacts alone
-  /// Where the markers are beside the equilibrium, by what they say and by how wrong the model may be; mm,
+  /// Where the markers are beside the equilibrium, by what they say and by how wrong the model may be; and
+  /// how far beside that they seem to be by cameras that have moved or changed since the baseline. mm,
   /// stacked. Empty: nothing was fitted.
-  Eigen::VectorXd beside_mm;
-  /// How far cameras that have moved or changed since the baseline put a marker off, the most of all.
-  double camera_shift_mm = 0;
+  Eigen::VectorXd beside_mm, by_cameras_mm;
+  double camera_shift_mm = 0;  ///< the latter's longest, of a marker
+  /// Likewise, as each camera by itself sees them, across its lines of sight. Empty: nothing was fitted.
+  std::array<Eigen::VectorXd, kCameraCount> by_camera_mm;
   double pressure_error_mpa = 0;  ///< true less told
   double baseline_error_mpa = 0;  ///< likewise, of the pressure under which the baseline was taken
   double pressure_sigma_mpa = 0;  ///< of the corrected pressure
@@ -81,12 +90,19 @@ class LoadEstimator {
   /// Writes these for what was fitted last.
   void Conclude(const Linearization& skin, LoadEstimate& estimate);
 
+  /// After Prepare, instead of Fit where there is nothing to fit: which markers are not in sight now.
+  void Hide(const MarkerObservations& observed);
+  /// Of what the last Fit or Hide was shown; nothing is allocated as long as that stays.
+  const DetectionLimits& Limits();
+
   /// The frames before.
   void Forget() { chosen_.clear(); }
 
   const MarkerCovariance& covariance() const { return covariance_; }
   /// Covariance of the model's error at a marker, after Prepare.
   Mat3 ModelCovariance(int marker) const { return model_covariance_[static_cast<size_t>(marker)]; }
+  /// Likewise, of what is not known of the cameras' motion once all markers were seen.
+  Mat3 CameraCovariance(int marker) const { return camera_covariance_[static_cast<size_t>(marker)]; }
 
  private:
   /// Standard deviation of a tangential force that was let in, N in SkinMechanics' units.
@@ -95,12 +111,19 @@ class LoadEstimator {
   static constexpr double kCoupleNmm = 10;
   /// What a contact has to explain, of chi^2.
   static constexpr double kHillGain = 20;
+  /// Of a band's norm: it has to explain so many standard deviations. It is rarer than other loads, and
+  /// errors of the model look like a little of one.
+  static constexpr double kBandSparsity = 12;
+  /// N in SkinMechanics' units.
+  static constexpr double kLeastHillN = 0.01;
+  /// Of a Gram matrix in single precision.
+  static constexpr float kRounding = 1e-6F;
   /// Columns of the problem that are one contact: sites or, of a hug, bands.
   using Hill = HillFinder::Hill;
 
+  void WriteCameraCovariances();
   void SpreadColumns(const Eigen::MatrixXf& at_nodes);
   Eigen::MatrixXd Whitened(const Eigen::MatrixXd& columns) const;
-  void Hide(const MarkerObservations& observed);
   /// The sites that a column of the problem loads, and the share of each: one site, or a band's.
   template <typename Visit>
   void ForSites(int column, Visit visit) const {
@@ -156,17 +179,19 @@ class LoadEstimator {
   void WriteLoad(const Linearization& skin, EstimatedLoad& load) const;
   void WriteCovariances(const Linearization& skin, LoadEstimate& estimate);
   void WriteStray(Linearization& skin, LoadEstimate& estimate);
-  double WorstRegion(const Eigen::VectorXd& residual);
+  double WorstRegion(const Eigen::VectorXd& by_cameras_mm);
 
   const SkinMechanics& mechanics_;
   const Neighborhoods& near_;
   MarkerCovariance covariance_;
+  const CameraModes camera_modes_;
   HillFinder hills_;
   NonNegativeSolver solver_;
 
   // Since Prepare. Whitened: in units of independent standard deviations.
-  std::vector<Mat3> noise_mm2_, model_covariance_;
+  std::vector<Mat3> noise_mm2_, model_covariance_, camera_covariance_;
   Eigen::MatrixXd covariance_mm2_;
+  Eigen::MatrixXd camera_modes_mm_;
   Eigen::MatrixXf factor_;
   Eigen::MatrixXf direct_mm2_;  // of it, what no force and no pressure of the estimate explains
   Eigen::VectorXd by_pressure_, by_baseline_;  // stacked, of one standard deviation
@@ -182,8 +207,8 @@ class LoadEstimator {
 
   // Of the frame. Hidden: an orthonormal basis of what the frame does not show, whitened, and of the
   // tangential forces that were let in; data and Gram matrix without it.
-  using Direction = std::pair<int, Vec3>;  // first row of the marker, unit vector
-  std::vector<Direction> missing_;         // what hidden_ is of
+  using Direction = std::pair<int, Vec3>;         // first row of the marker, unit vector
+  std::vector<Direction> missing_, missing_now_;  // what hidden_ is of, and what this frame misses
   Eigen::MatrixXd hidden_;
   Eigen::MatrixXf hidden_columns_, free_gram_;
   bool is_hidden_projected_ = false;             // free_gram_ is without hidden_ alone
@@ -191,6 +216,7 @@ class LoadEstimator {
   Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
   bool is_selected_ = false;    // by a solver that came to its end
   std::vector<char> is_shown_;  // by row
+  DetectionLimits limits_;      // none by site: not known since Prepare, or since other markers are hidden
   std::vector<int> chosen_;     // loads above zero of the last selection
   Solution solution_;
   Eigen::VectorXd pulls_per_mm_;          // of the residual, on each marker: covariance^-1 times it

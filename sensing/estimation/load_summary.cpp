@@ -13,8 +13,15 @@ namespace {
 constexpr double kStillTangential =
     0.15;  // of a normal force: what a contact without a tangential one may have
 constexpr double kHardlyN = 1e-6;
-constexpr double kForceShare = 0.04;   // of a force: what the model gets wrong of it
-constexpr double kCenterShare = 0.25;  // of a site's spacing: what the grid of loads makes of a center
+constexpr double kForceShare = 0.04;        // of a force: what the model gets wrong of it
+constexpr double kCenterShare = 0.25;       // of a site's spacing: what the grid of loads makes of a center
+constexpr double kUnmeasuredModulus = 0.1;  // castings of one silicone differ by as much
+
+// Standard deviation of Young's modulus by itself.
+double ModulusShare(const LinkModel& model) {
+  if (!model.material_evidence) return kUnmeasuredModulus;
+  return model.material_evidence->sigma_mpa / model.material.youngs_modulus_mpa;
+}
 
 }  // namespace
 
@@ -62,14 +69,16 @@ void LoadEstimator::Conclude(const Linearization& skin, LoadEstimate& estimate) 
   MoveCenters(skin, estimate);
   Eigen::VectorXf beside(pulls_per_mm_.size());
   dense::Product(direct_mm2_, pulls_per_mm_.cast<float>(), beside);
-  estimate.beside_mm = beside.cast<double>();
-  const Eigen::MatrixXd& by_cameras_mm = covariance_.by_cameras_mm();
-  const Eigen::VectorXd shift_mm = by_cameras_mm * (by_cameras_mm.transpose() * pulls_per_mm_);
-  estimate.camera_shift_mm = shift_mm.reshaped(3, shift_mm.size() / 3).colwise().norm().maxCoeff();
+  Eigen::VectorXd& by_cameras_mm = estimate.by_cameras_mm;
+  const Eigen::VectorXd modes = camera_modes_mm_.transpose() * pulls_per_mm_;
+  by_cameras_mm = camera_modes_mm_ * modes;
+  for (const CameraId id : kBothCameras) estimate.by_camera_mm[Index(id)] = camera_modes_.SeenBy(id) * modes;
+  estimate.camera_shift_mm = by_cameras_mm.reshaped(3, by_cameras_mm.size() / 3).colwise().norm().maxCoeff();
+  estimate.beside_mm = beside.cast<double>() - by_cameras_mm;
   estimate.chi2_per_dof =
       solution_.residual.squaredNorm() /
       std::max<double>(1, static_cast<double>(std::count(is_shown_.begin(), is_shown_.end(), 1)));
-  estimate.region_chi2_per_dof = WorstRegion(solution_.residual);
+  estimate.region_chi2_per_dof = WorstRegion(by_cameras_mm);
 }
 
 void LoadEstimator::WriteLoad(const Linearization& skin, EstimatedLoad& load) const {
@@ -187,6 +196,12 @@ void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& es
     }
     const double size_n = std::max(load.force_n.norm(), load.normal_force_n);
     load.force_covariance_n2 += kForceShare * kForceShare / 3 * size_n * size_n * Mat3::Identity();
+    // A force is as wrong as Young's modulus, less what pressure makes stiff.
+    const double modulus_share = ModulusShare(mechanics_.model());
+    if (load.is_hug)
+      load.force_covariance_n2 += std::pow(modulus_share * size_n, 2) / 2 * Vec3(1, 1, 0).asDiagonal();
+    else
+      load.force_covariance_n2 += std::pow(modulus_share, 2) * load.force_n * load.force_n.transpose();
     load.center_covariance = covariance.block<2, 2>(5 * i + 3, 5 * i + 3);
     load.center_covariance.diagonal().array() += kCenterShare * kCenterShare;
   }
@@ -194,7 +209,8 @@ void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& es
 
 // Mahalanobis' distance of the residual over 3 x 3 markers, per number, the largest; of regions that are
 // mostly seen.
-double LoadEstimator::WorstRegion(const Eigen::VectorXd& residual) {
+// The cameras' motion is all markers' together: a region must not have one of its own.
+double LoadEstimator::WorstRegion(const Eigen::VectorXd& by_cameras_mm) {
   const LinkModel& model = mechanics_.model();
   const int paths = model.markers.paths, rings = model.markers.rings();
   if (regions_.empty()) {
@@ -209,11 +225,15 @@ double LoadEstimator::WorstRegion(const Eigen::VectorXd& residual) {
           for (int c = 0; c < 3; ++c) region.rows.push_back(3 * neighbor + c);
         }
       }
-      region.factor.compute(covariance_mm2_(region.rows, region.rows).cast<float>());
+      const Eigen::MatrixXd modes_mm = camera_modes_mm_(region.rows, Eigen::all);
+      const Eigen::MatrixXd own_mm2 =
+          covariance_mm2_(region.rows, region.rows) - modes_mm * modes_mm.transpose();
+      region.factor.compute(own_mm2.cast<float>());
       regions_.push_back(std::move(region));
     }
   }
-  const Eigen::VectorXf left_mm = factor_.triangularView<Eigen::Lower>() * residual.cast<float>();
+  Eigen::VectorXf left_mm = factor_.triangularView<Eigen::Lower>() * solution_.residual.cast<float>();
+  left_mm -= by_cameras_mm.cast<float>();
   double worst = 0;
   for (const Region& region : regions_) {
     int shown = 0;

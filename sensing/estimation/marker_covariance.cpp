@@ -1,6 +1,5 @@
 #include "sensing/estimation/marker_covariance.h"
 
-#include <Eigen/Geometry>
 #include <cmath>
 
 #include "sensing/mechanics/dense.h"
@@ -13,37 +12,18 @@ constexpr double kFloorMm = 0.02;
 constexpr double kByMotion = 0.01;
 constexpr double kSpreadShare = 0.5;  // of the error near a large motion
 constexpr double kByInflation = 0.015, kLeastInflation = 0.3, kAxialShare = 0.5;
+// At mid-length; without it drags of glued bodies were off, and wrong markers left phantoms.
+constexpr double kBowMm = 0.2;
 constexpr double kStrayN = 1e-3, kNormalShare = 0.01, kTangentialShare = 0.003;
-// Of each of the cameras' modes, where it moves markers most: phantoms of a newton came of 0.3 mm that no
-// mode took up, and between 0.05 and 0.35 the solids' forces do not depend on it.
-constexpr double kCameraMm = 0.2;
-constexpr int kCameraModes = 9;
-
-// Of a marker: shifts of all, turns about the middle of the link, a stretch along the axis, a bow of z, which
-// two cameras at the ends know worst in the middle, and a twist, of cameras that are rolled against each
-// other. Not a growth of the radius: that is the pressure's.
-Eigen::Matrix<double, 3, kCameraModes> CameraModes(const Vec3& at_mm, double length_mm) {
-  const double half_mm = length_mm / 2;
-  const Vec3 from_middle = (at_mm - Vec3(0, 0, half_mm)) / half_mm;
-  Eigen::Matrix<double, 3, kCameraModes> modes;
-  modes.leftCols<3>().setIdentity();
-  const Vec3 around = Vec3(-at_mm.y(), at_mm.x(), 0).normalized();
-  for (int axis = 0; axis < 2; ++axis) modes.col(3 + axis) = Vec3::Unit(axis).cross(from_middle);
-  modes.col(5) = around;
-  modes.col(6) = Vec3(0, 0, from_middle.z());
-  modes.col(7) = Vec3(0, 0, std::sin(kPi * at_mm.z() / length_mm));
-  modes.col(8) = from_middle.z() * around;
-  return modes;
-}
 
 }  // namespace
 
 MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics, const Neighborhoods& near)
-    : mechanics_(mechanics), near_(near), by_cameras_mm_(3 * mechanics.marker_count(), kCameraModes) {
-  const double sigma_mm = kCameraMm * mechanics.length_unit();
+    : mechanics_(mechanics), near_(near), bow_mm_(Eigen::VectorXd::Zero(3 * mechanics.marker_count())) {
+  const double length_mm = mechanics.model().length_mm;
   for (int m = 0; m < mechanics.marker_count(); ++m)
-    by_cameras_mm_.middleRows<3>(3 * m) =
-        sigma_mm * CameraModes(mechanics.RestMarker(m), mechanics.model().length_mm);
+    bow_mm_[3 * m + 2] =
+        kBowMm * mechanics.length_unit() * std::sin(kPi * mechanics.RestMarker(m).z() / length_mm);
 }
 
 void MarkerCovariance::WriteDirect(const Linearization& skin, const InflatedSkin& inflated,

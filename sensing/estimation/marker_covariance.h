@@ -28,9 +28,9 @@ class MarkerCovariance {
   /// for four. `local_n`: force in the neighborhood of each site. Sets the stray forces' standard deviations
   /// by direction and site, 0 where there is none.
   void AddStray(const Linearization& skin, const Eigen::VectorXd& local_n, Eigen::MatrixXd& covariance_mm2);
-  /// By column, of one standard deviation: what cameras that have moved or changed a little since the
-  /// baseline make of all markers together.
-  const Eigen::MatrixXd& by_cameras_mm() const { return by_cameras_mm_; }
+  /// Stacked markers, of one standard deviation: a bow of z along the link, of lenses and of a shell that is
+  /// no solid, which cameras at both ends know worst in the middle.
+  const Eigen::VectorXd& bow_mm() const { return bow_mm_; }
   const std::array<Eigen::VectorXd, 3>& stray_sigmas_n() const { return stray_n_; }
 
   /// Forces on sites, or on markers, smoothed over the neighborhood in which they count as local.
@@ -42,7 +42,7 @@ class MarkerCovariance {
  private:
   const SkinMechanics& mechanics_;
   const Neighborhoods& near_;
-  Eigen::MatrixXd by_cameras_mm_;
+  Eigen::VectorXd bow_mm_;
   std::array<Eigen::VectorXd, 3> stray_n_;
 };
 

@@ -8,7 +8,7 @@ namespace taclink {
 namespace {
 
 // In units of length (SkinMechanics) where mm.
-constexpr double kSettledMm = 0.02;  // of the next step
+constexpr double kNextStepMm = 0.02;  // of the next step
 constexpr double kTangentErrorPerMm =
     0.2;                                  // share of a step that a tangent gets wrong, by how far it is from
 constexpr double kNearlySettledMm = 0.3;  // of the last step, when they run out
@@ -176,7 +176,7 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const SkinProblem& problem, Ski
   if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
   estimate.model = linear ? ForceModel::kLinear : ForceModel::kPressurised;
   if (IsFirstOrder()) {
-    estimate.first_order_mm = LongestOff(problem.inflated.state.mids_mm, about.mids_mm);
+    estimate.first_order_mm = LongestOff(estimate.state.mids_mm, about.mids_mm);
     return true;
   }
   if (estimate.loads.loads.empty()) {
@@ -215,7 +215,7 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
     const bool is_off = distance_mm > touched_->reach_mm || !touched_->HasLocal(local_n);
     const bool is_slow = step > 0 && step_mm > kShrinks * before_mm;
     const bool is_settled =
-        step_mm * std::min(1.0, kTangentErrorPerMm * distance_mm / unit) < kSettledMm * unit;
+        step_mm * std::min(1.0, kTangentErrorPerMm * distance_mm / unit) < kNextStepMm * unit;
     if (is_settled && !is_off) return true;
     before_mm = step_mm;
     if (step + kStepsOfTangent < kMostSteps && (is_off || is_slow) && estimate.tangents < kMostTangents) {

@@ -40,14 +40,15 @@ struct SkinEstimate {
   ForceModel model = ForceModel::kNonlinear;  ///< the approximation that was good enough
   ShellState state;
   /// Of the markers from the slack skin, stacked: where `state` has them and, where they disagree by more
-  /// than noise, between that and what is seen (posterior of the model's error).
+  /// than noise, between that and what is seen (posterior of the model's error). What cameras that have moved
+  /// make of them (loads.by_cameras_mm) is taken off.
   Eigen::VectorXd displacements_mm;
   Eigen::VectorXd baseline_mm;  ///< of the model's markers in the baseline, likewise
   Eigen::VectorXd inflated_mm;  ///< of the model's markers under this pressure without loads
   LoadEstimate loads;
   double pressure_mpa = 0;  ///< with the estimated error taken off
-  /// The longest way of a point of the skin under this pressure, without loads, from where a first-order
-  /// model that was asked for begins; else 0.
+  /// The longest way of a point of the skin from where the tangent of a first-order model that was asked for
+  /// is made; else 0.
   double first_order_mm = 0;
   /// How far the last step still moved the skin somewhere that no camera sees, where loads and seen markers
   /// had settled; else 0.
@@ -74,7 +75,9 @@ class SkinEstimator {
   ~SkinEstimator();
 
   void Estimate(const SkinObservation& observation, SkinEstimate& estimate);
-  /// Forgets the frames before.
+  /// Forgets the frames before: where the next one begins.
+  void Forget();
+  /// And the tangents that were made in them.
   void Restart();
   /// The next call is of the same frame, looked at more closely: it begins from the last call's answer.
   void Continue() { is_same_frame_ = true; }
@@ -86,12 +89,13 @@ class SkinEstimator {
   /// What the last estimate was made with.
   const Linearization& linearization() const;
   const LoadEstimator& loads() const;
+  /// See LoadEstimator::Limits; after an estimate that is an answer.
+  const DetectionLimits& Limits() { return used_->loads.Limits(); }
 
  private:
   /// In length units: from the inflated skin, whose tangent is good enough there; and of a step.
   static constexpr double kStillReachMm = 0.4, kLongestStepMm = 5;
 
-  void Forget();
   bool IsStill(const SkinObservation& observation, const InflatedSkin& inflated, const PressurePrior& prior,
                SkinEstimate& estimate);
   bool AreNeighborsStill() const;

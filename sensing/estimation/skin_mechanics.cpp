@@ -16,7 +16,7 @@ constexpr double kLongestElement = 0.8, kWidestElementDeg = 15;
 constexpr double kSpreadMm = 3.2;         // standard deviation of a load's spread
 constexpr double kLeastShare = 0.02;      // of the largest; less is left out of a spread
 constexpr double kInflationStep = 0.011;  // of PressureScale
-constexpr int kMostSteps = 400;
+constexpr int kMostInflationSteps = 400;
 constexpr int kParts = 8;          // of a step, where the skin does not stand at its far end
 constexpr int kForgivenSteps = 2;  // that a pressure may be beyond what the skin stands
 
@@ -122,7 +122,7 @@ bool SkinMechanics::Solve(InflatedSkin& skin) {
 
 // Whole steps are solved from the step before, parts of a step from its near end.
 const InflatedSkin* SkinMechanics::Solved(int part) {
-  if (std::abs(part) > kMostSteps * kParts) return nullptr;
+  if (std::abs(part) > kMostInflationSteps * kParts) return nullptr;
   if (const auto found = solved_.find(part); found != solved_.end()) return found->second.get();
   auto skin = std::make_unique<InflatedSkin>();
   skin->pressure_mpa = part * (pressure_step_mpa_ / kParts);
@@ -140,7 +140,7 @@ const InflatedSkin* SkinMechanics::Solved(int part) {
 
 const InflatedSkin* SkinMechanics::Inflated(double pressure_mpa) {
   const double part_mpa = pressure_step_mpa_ / kParts;
-  if (!(std::abs(pressure_mpa) < (kMostSteps - 1) * pressure_step_mpa_)) return nullptr;
+  if (!(std::abs(pressure_mpa) < (kMostInflationSteps - 1) * pressure_step_mpa_)) return nullptr;
   if (const InflatedSkin* skin = Between(pressure_mpa, kParts)) return skin;
   if (const InflatedSkin* skin = Between(pressure_mpa, 1)) return skin;
   const int toward = pressure_mpa > 0 ? -1 : 1;

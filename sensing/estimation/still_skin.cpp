@@ -48,10 +48,13 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSk
     if (!Remake(tangent, problem, inflated.state, none, estimate)) return false;
   }
   used_ = &tangent;
+  tangent.loads.Hide(observation.markers);
   Forget();
   estimate.loads.loads.clear();
   estimate.loads.chi2_per_dof = chi2_per_dof;
   estimate.loads.region_chi2_per_dof = estimate.loads.camera_shift_mm = 0;
+  estimate.loads.by_cameras_mm.setZero(inflated.markers_mm.size());
+  for (Eigen::VectorXd& by_camera_mm : estimate.loads.by_camera_mm) by_camera_mm.resize(0);
   estimate.loads.converged = true;
   estimate.loads.pressure_error_mpa = off / told;
   estimate.loads.baseline_error_mpa = 0;

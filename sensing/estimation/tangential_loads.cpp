@@ -10,7 +10,7 @@ namespace taclink {
 namespace {
 
 constexpr double kTangentialGain = 60;  // of chi^2
-constexpr double kRidge = 1e-9;
+constexpr double kInformationRidge = 1e-9;
 constexpr double kShiftSites = 2;  // standard deviation of where a tangential force acts about its hill
 
 }  // namespace
@@ -57,7 +57,8 @@ LoadEstimator::FitColumns LoadEstimator::ColumnsOf(const std::vector<int>& actin
   Eigen::MatrixXd information;
   dense::TransposedProduct(fit.columns, fit.columns, information);
   if (loads > 0)
-    information.diagonal().head(loads).array() += kRidge * information.diagonal().head(loads).mean();
+    information.diagonal().head(loads).array() +=
+        kInformationRidge * information.diagonal().head(loads).mean();
   information.diagonal().tail(tangential.cols()) += TangentialPrior(tangential.cols());
   fit.factor.compute(information);
   return fit;

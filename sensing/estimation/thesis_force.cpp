@@ -58,7 +58,9 @@ void ThesisForce::Estimate(const Eigen::VectorXd& displacements_mm, double press
   forces.forces_n.assign(markers, Vec3::Zero());
   forces.sigmas_n.assign(markers, 0);
   forces.loaded.clear();
-  forces.residual = forces.region_residual = 0;
+  forces.residual = forces.region_residual = forces.camera_shift_mm = 0;
+  forces.limits_n.clear();
+  forces.limit_around_n = 0;
   s.displacement.setZero(s.shell.dof_count());
   for (int node = 0; node < s.mesh.node_count(); ++node) {
     if (s.mesh.IsClamped(node)) continue;

@@ -23,7 +23,7 @@ constexpr int kExactFrames = 2;
 constexpr double kFrameMm =
     1;  // that bodies move from frame to frame, at most: 30 mm/s at 30 frames a second
 
-std::unique_ptr<StateEstimator> Make(const LinkModel& model, const AccuracyMethod& method) {
+std::unique_ptr<StateEstimator> Make(const LinkModel& model, const ForceMethod& method) {
   ForceOptions options;
   options.model = method.model;
   options.refinement = method.refinement;
@@ -119,7 +119,7 @@ class Player {
 };
 
 // In a process of its own, with a few frames so that scratch memory counts.
-double MemoryOf(const LinkModel& model, const AccuracyMethod& method, const std::vector<PathTruth>& truths) {
+double MemoryOf(const LinkModel& model, const ForceMethod& method, const std::vector<PathTruth>& truths) {
   return ResidentGrowthMb([&] {
     auto estimator = Make(model, method);
     ContactFinder finder(model);
@@ -185,7 +185,7 @@ void MakeShape(const LinkModel& model, const TrueStage& truth, double noise_mm, 
 std::vector<AccuracyOutcome> RunAccuracyBench(const LinkModel& model, const std::vector<PathTruth>& truths,
                                               const AccuracyOptions& options) {
   std::vector<AccuracyOutcome> outcomes;
-  for (const AccuracyMethod& method : options.methods) {
+  for (const ForceMethod& method : options.methods) {
     const double memory = MemoryOf(model, method, truths);
     for (const double noise : options.noises_mm) {
       AccuracyOutcome& outcome = outcomes.emplace_back();

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,20 +11,12 @@
 #include "sensing/core/skin_shape.h"
 #include "sensing/evaluation/accuracy_score.h"
 #include "sensing/evaluation/accuracy_truth.h"
+#include "sensing/evaluation/force_method.h"
 
 namespace taclink {
 
-/// A force model on a mesh. No model: the estimator chooses, frame by frame.
-struct AccuracyMethod {
-  std::optional<ForceModel> model;
-  int refinement = 0;  ///< 0: the mesh that links have
-
-  std::string mesh() const { return refinement == 0 ? "default" : std::to_string(refinement); }
-  std::string name() const { return model ? Name(*model) : "auto"; }
-};
-
 struct AccuracyOptions {
-  std::vector<AccuracyMethod> methods;
+  std::vector<ForceMethod> methods;
   /// Standard deviations of the markers across the axis, mm; three times as much along it. 0: exact markers.
   std::vector<double> noises_mm = {0, 0.05, 0.1};
   int frames = 4;  ///< of each scene, each with noise of its own; two of exact markers
@@ -44,7 +35,7 @@ struct SceneScores {
 
 /// What one method made of one model's scenes with one noise.
 struct AccuracyOutcome {
-  AccuracyMethod method;
+  ForceMethod method;
   std::string model;  ///< of the link
   double noise_mm = 0;
   std::vector<SceneScores> scenes;

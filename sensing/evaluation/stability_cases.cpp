@@ -165,6 +165,13 @@ std::vector<SkinCase> LiveCases(const LinkModel& base) {
   return cases;
 }
 
+std::string ReasonsOf(const LinkState& state) {
+  std::string reasons;
+  for (const Reason& reason : state.reasons)
+    reasons += std::string(reasons.empty() ? "" : ", ") + Name(reason.id);
+  return reasons;
+}
+
 std::vector<SkinCase> PictureCases(const LinkModel& base) {
   std::vector<SkinCase> cases;
   AddShipped(base, cases);

@@ -1,12 +1,17 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "sensing/core/link_model.h"
+#include "sensing/core/link_state.h"
 
 namespace taclink {
+
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double kNoiseMm = 0.05;  ///< of a marker, across the axis
 
 /// How a case ended.
 enum class Ending {
@@ -35,6 +40,9 @@ struct SkinCase {
   /// The same skin of another stiffness under loads scaled alike: must move alike.
   double reference_modulus_mpa = 0;  ///< 0: none
 };
+
+/// Names of a state's reasons, separated by commas.
+std::string ReasonsOf(const LinkState& state);
 
 /// The shipped geometry with another modulus, thickness (same mid-surface), Poisson's ratio or law. A
 /// neo-Hookean skin has Poisson's ratio 0.5.

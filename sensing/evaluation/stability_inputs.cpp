@@ -14,9 +14,8 @@
 namespace taclink {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr double kPressureMpa = 1e-3, kNoiseMm = 0.05;
+constexpr double kPressureMpa = 1e-3;
 constexpr int kTruthRefinement = 2;
 
 StabilityRow Row(const std::string& name, Ending ending, const std::string& reason) {
@@ -115,13 +114,6 @@ Vec3 Total(const NodalForces& forces) {
   return sum;
 }
 
-std::string ReasonsOf(const LinkState& state) {
-  std::string reasons;
-  for (const Reason& reason : state.reasons)
-    reasons += std::string(reasons.empty() ? "" : ", ") + Name(reason.id);
-  return reasons;
-}
-
 StabilityRow Verdict(const std::string& name, Expected expected, const LinkState& state,
                      const Vec3& clean_n) {
   const NodalForces& forces = state.forces;
@@ -147,8 +139,8 @@ StabilityRow Verdict(const std::string& name, Expected expected, const LinkState
 }
 
 // All defects, one by one, each to an estimator that knows nothing of what was before.
-void RunEstimator(const LinkModel& model, const AccuracyMethod& method, const TrueStage& truth,
-                  size_t pressed, const std::function<void(const StabilityRow&)>& add) {
+void RunEstimator(const LinkModel& model, const ForceMethod& method, const TrueStage& truth, size_t pressed,
+                  const std::function<void(const StabilityRow&)>& add) {
   ForceOptions options;
   options.model = method.model;
   options.refinement = method.refinement;

@@ -11,8 +11,6 @@
 namespace taclink {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kNoiseMm = 0.05;  // of a marker, across the axis
 constexpr double kForceShare = 0.1, kForceN = 0.03, kCenterMm = 4, kPhantomMm = 8, kMarkerRmsMm = 0.3,
                  kDeviations = 3;
 constexpr PressKind kKinds[] = {PressKind::kRest, PressKind::kSphereMarker, PressKind::kTwo,
@@ -112,14 +110,7 @@ class Faults {
   std::string text_;
 };
 
-std::string ReasonsOf(const LinkState& state) {
-  std::string reasons;
-  for (const Reason& reason : state.reasons)
-    reasons += std::string(reasons.empty() ? "" : ", ") + Name(reason.id);
-  return reasons;
-}
-
-StabilityRow Verdict(const std::string& name, const std::string& faults, const LinkState& state) {
+StabilityRow LiveVerdict(const std::string& name, const std::string& faults, const LinkState& state) {
   StabilityRow row{name, Ending::kRight, faults, kNan, kNan, kNan, kNan, kNan};
   const std::string reasons = ReasonsOf(state);
   if (faults.empty())
@@ -150,7 +141,7 @@ std::vector<StabilityRow> RunPath(const SkinCase& skin, PressKind kind) {
     const LinkState state = SolveMarkers(
         skin.model, *estimator, {.now = {skin.pressure_mpa, sigma}, .baseline = {}}, std::move(shape));
     const bool answers = state.forces.converged && !state.shape.positions_mm.empty();
-    rows.push_back(Verdict(name, answers ? Faults(skin, path, stage, state).text() : "no answer", state));
+    rows.push_back(LiveVerdict(name, answers ? Faults(skin, path, stage, state).text() : "no answer", state));
   }
   return rows;
 }

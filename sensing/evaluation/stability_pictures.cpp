@@ -13,7 +13,6 @@
 namespace taclink {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kForceShare = 0.1, kForceN = 0.03, kDeviations = 3, kCenterMm = 4, kMarkerRmsMm = 0.3;
 constexpr double kInflateS = 0.5, kInflatedS = 1.3, kPressS = 1.5, kRampS = 0.4, kEndS = 2.4;
 constexpr double kDepthMm = 4, kPatchMm = 11, kRateHz = 30;
@@ -65,9 +64,7 @@ class PictureRun {
     auto simulated = SimulatedSkin::Make(skin_.model, scene_);
     if (!simulated) return Row(Ending::kRefused, "the skin itself: " + simulated.error().message);
     Play(**simulated);
-    std::string reasons;
-    for (const Reason& reason : state_.reasons)
-      reasons += std::string(reasons.empty() ? "" : ", ") + Name(reason.id);
+    const std::string reasons = ReasonsOf(state_);
     if (state_.status == LinkStatus::kCalibrating)
       return Row(Ending::kRefused, "the rest pictures: " + state_.status_reason);
     CheckLabels();

@@ -12,7 +12,6 @@
 namespace taclink {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSphereMm = 10, kClearMm = 0.1;
 constexpr int kInflations = 32, kPresses = 8;  // steps of each path, for the work
 constexpr double kMostResidual = 2e-7, kMostEnergyError = 0.01, kMostReciprocity = 1e-4,

@@ -18,6 +18,11 @@ bool WithinAngle(const Vec2& a, const Vec2& b, double least) {
   return a.dot(b) >= least * std::sqrt(a.squaredNorm() * b.squaredNorm());
 }
 
+// What both displacements have in common.
+double Least(double a, double b) {
+  return a * b > 0 ? std::copysign(std::min(std::abs(a), std::abs(b)), a) : 0;
+}
+
 // Azimuth, link frame, at which a ray passes the cylinder of that radius about the link's axis.
 std::optional<double> AzimuthAtRadius(const SightRay& ray, double radius_mm) {
   const Vec2 o = ray.origin.head<2>(), d = ray.direction.head<2>();
@@ -43,6 +48,12 @@ PathTracker::PathTracker(const SimilarSkin& skin, PathTrackerOptions options)
   }
   by_path_.resize(paths);
   displacements_mm_.resize(static_cast<size_t>(model_.markers.count()));
+  for (auto& places : places_) places.resize(displacements_mm_.size());
+  numbered_.resize(paths);
+  complete_.resize(paths);
+  whole_ring_mm_.resize(static_cast<size_t>(model_.markers.rings()));
+  around_mm_.resize(static_cast<size_t>(model_.markers.rings()));
+  ring_mm_.reserve(paths);
   dropped_.reserve(displacements_mm_.size());
   tracings_.resize(paths);
   for (int j = 0; j < model_.markers.rings(); ++j) {
@@ -106,32 +117,118 @@ void PathTracker::Label(const std::array<Detections, kCameraCount>& detections, 
     Trace(id);
     out.cameras[Index(id)].assign(static_cast<size_t>(model_.markers.count()), MarkerObservation{});
   }
-  for (int l = 0; l < model_.markers.paths; ++l) {
-    for (const CameraId id : kBothCameras) {
-      auto& chain = chains_[Index(id)][static_cast<size_t>(l)];
-      if (id == CameraId::kBottom) std::reverse(chain.begin(), chain.end());  // rising z
-      auto& rays = path_rays_[Index(id)];
-      rays.clear();
-      for (const int detection : chain) rays.push_back(rays_[Index(id)][static_cast<size_t>(detection)]);
-    }
-    numbering_.Number(path_rays_[0], path_rays_[1]);
-    for (int j = 0; j < model_.markers.rings(); ++j) {
-      displacements_mm_[static_cast<size_t>(model_.MarkerIndex(l, j))] =
-          numbering_.DisplacementOf(j).value_or(std::numeric_limits<double>::quiet_NaN());
-    }
-    for (const CameraId id : kBothCameras) {
-      for (int j = 0; j < model_.markers.rings(); ++j) {
-        const int place = numbering_.LabelOf(id, j);
-        if (place < 0) continue;
-        const auto detection =
-            static_cast<size_t>(chains_[Index(id)][static_cast<size_t>(l)][static_cast<size_t>(place)]);
-        const Detection& d = detections[Index(id)][detection];
-        out.cameras[Index(id)][static_cast<size_t>(model_.MarkerIndex(l, j))] = {true, d.center_px,
-                                                                                 d.covariance_px2};
-      }
+  const int paths = model_.markers.paths;
+  for (int l = 0; l < paths; ++l) {
+    auto& from_bottom = chains_[Index(CameraId::kBottom)][static_cast<size_t>(l)];
+    std::reverse(from_bottom.begin(), from_bottom.end());  // rising z
+    Number(l, {});
+  }
+  FindReferences();
+  for (int l = 0; l < paths; ++l) {
+    if (complete_[static_cast<size_t>(l)] == 0 && FindAround(l)) Number(l, around_mm_);
+  }
+  for (const CameraId id : kBothCameras) {
+    for (int m = 0; m < model_.markers.count(); ++m) {
+      const int place = places_[Index(id)][static_cast<size_t>(m)];
+      if (place < 0) continue;
+      const auto& chain = chains_[Index(id)][static_cast<size_t>(m % paths)];
+      const Detection& d = detections[Index(id)][static_cast<size_t>(chain[static_cast<size_t>(place)])];
+      out.cameras[Index(id)][static_cast<size_t>(m)] = {true, d.center_px, d.covariance_px2};
     }
   }
   DropImplausible(out);
+}
+
+std::span<const SightRay> PathTracker::RaysOf(CameraId id, int path) {
+  auto& rays = path_rays_[Index(id)];
+  rays.clear();
+  for (const int detection : chains_[Index(id)][static_cast<size_t>(path)])
+    rays.push_back(rays_[Index(id)][static_cast<size_t>(detection)]);
+  return rays;
+}
+
+// What was numbered before stands if this numbers no more.
+void PathTracker::Number(int path, std::span<const double> around_mm) {
+  numbering_.Number(RaysOf(CameraId::kTop, path), RaysOf(CameraId::kBottom, path), around_mm);
+  const auto l = static_cast<size_t>(path);
+  int numbered = 0;
+  for (const CameraId id : kBothCameras) {
+    for (int j = 0; j < model_.markers.rings(); ++j) numbered += numbering_.LabelOf(id, j) >= 0 ? 1 : 0;
+  }
+  if (!around_mm.empty() && numbered <= numbered_[l]) return;
+  numbered_[l] = numbered;
+  for (int j = 0; j < model_.markers.rings(); ++j) {
+    const auto marker = static_cast<size_t>(model_.MarkerIndex(path, j));
+    displacements_mm_[marker] =
+        numbering_.DisplacementOf(j).value_or(std::numeric_limits<double>::quiet_NaN());
+    for (const CameraId id : kBothCameras) places_[Index(id)][marker] = numbering_.LabelOf(id, j);
+  }
+}
+
+// What paths are numbered beside in the second pass, so that none depends on another's second answer: those
+// of which all detections have a label, half of the rings in both cameras at least, and what rings do as a
+// whole.
+void PathTracker::FindReferences() {
+  const int rings = model_.markers.rings();
+  for (size_t l = 0; l < numbered_.size(); ++l) {
+    const bool all = static_cast<size_t>(numbered_[l]) == chains_[0][l].size() + chains_[1][l].size();
+    complete_[l] = all && numbered_[l] >= rings ? 1 : 0;
+  }
+  FindRings();
+}
+
+// Of each ring, the displacement (outwards) that three in four of its markers have at least.
+void PathTracker::FindRings() {
+  for (int j = 0; j < model_.markers.rings(); ++j) {
+    ring_mm_.clear();
+    for (int l = 0; l < model_.markers.paths; ++l) {
+      const double mm = displacements_mm_[static_cast<size_t>(model_.MarkerIndex(l, j))];
+      if (!std::isnan(mm)) ring_mm_.push_back(mm);
+    }
+    double& whole_mm = whole_ring_mm_[static_cast<size_t>(j)];
+    whole_mm = 0;
+    if (ring_mm_.empty()) continue;
+    std::sort(ring_mm_.begin(), ring_mm_.end());
+    const size_t quarter = ring_mm_.size() / 4;
+    whole_mm = Least(ring_mm_[quarter], ring_mm_[ring_mm_.size() - 1 - quarter]);
+  }
+}
+
+// On the line between the nearest complete paths on both sides, and along the skin between the rings that
+// both show and its clamped ends. What is inwards counts as far as the whole ring is, for dents around tell
+// nothing of this path; what is outwards is air's, which all feel. False: nothing complete is near, or it
+// shows nothing.
+bool PathTracker::FindAround(int path) {
+  const int paths = model_.markers.paths, rings = model_.markers.rings();
+  const auto nearest = [&](int step) {
+    int away = 1;
+    while (away < paths && complete_[static_cast<size_t>((path + step * away + paths) % paths)] == 0) ++away;
+    return away;
+  };
+  const int before = nearest(-1), after = nearest(1);
+  if (before + after > paths / 2) return false;
+  const double share = static_cast<double>(before) / (before + after);
+  const std::vector<double>& z_mm = model_.markers.rings_z_mm;
+  size_t next = 0;
+  double from_z_mm = 0, from_mm = 0, furthest_mm = 0;
+  const auto fill = [&](size_t end, double to_z_mm, double to_mm) {
+    for (; next < end; ++next)
+      around_mm_[next] = from_mm + (to_mm - from_mm) * (z_mm[next] - from_z_mm) / (to_z_mm - from_z_mm);
+    from_z_mm = to_z_mm;
+    from_mm = to_mm;
+    furthest_mm = std::max(furthest_mm, std::abs(to_mm));
+  };
+  for (int j = 0; j < rings; ++j) {
+    const auto at = [&](int l) {
+      return displacements_mm_[static_cast<size_t>(model_.MarkerIndex((l + paths) % paths, j))];
+    };
+    const double beside_mm = (1 - share) * at(path - before) + share * at(path + after);
+    const auto k = static_cast<size_t>(j);
+    if (!std::isnan(beside_mm))
+      fill(k + 1, z_mm[k], beside_mm > 0 ? beside_mm : Least(beside_mm, whole_ring_mm_[k]));
+  }
+  fill(static_cast<size_t>(rings), model_.length_mm, 0);
+  return furthest_mm > options_.least_around_mm;
 }
 
 void PathTracker::DropImplausible(LabelledMarkers& out) {
@@ -140,13 +237,19 @@ void PathTracker::DropImplausible(LabelledMarkers& out) {
     return -displacements_mm_[static_cast<size_t>(model_.MarkerIndex((path + paths) % paths, ring))];
   };
   dropped_.clear();
+  FindRings();
   for (int j = 0; j < model_.markers.rings(); ++j) {
+    // Dents are counted from rest also where a whole ring is pressed.
+    const double ring = -std::max(0.0, whole_ring_mm_[static_cast<size_t>(j)]);
     for (int l = 0; l < paths; ++l) {
       const double u = inward(l, j), a = inward(l - 1, j), b = inward(l + 1, j);
       if (std::isnan(u) || std::isnan(a) || std::isnan(b)) continue;
-      const bool in = u > options_.max_beyond_mm + options_.max_beyond_times * std::max({a, b, 0.0});
+      const auto is_in = [&](double from) {
+        const double around = std::max({a - from, b - from, 0.0});
+        return u - from > options_.max_beyond_mm + options_.max_beyond_times * around;
+      };
       const bool beyond = u < std::min(a, b) - options_.max_beyond_mm;
-      if (in || beyond) dropped_.push_back(model_.MarkerIndex(l, j));
+      if (is_in(0) || is_in(ring) || beyond) dropped_.push_back(model_.MarkerIndex(l, j));
     }
   }
   for (const int marker : dropped_) {

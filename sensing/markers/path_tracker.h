@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "sensing/camera/projection.h"
@@ -20,8 +22,12 @@ struct PathTrackerOptions {
   /// A detection whose area is off the expected one by more than this factor is dust or a reflection.
   double max_area_ratio = 6;
   /// Skin is continuous: a marker's displacement beyond what both neighbouring paths show at its ring,
-  /// inwards by more than this and times theirs, or outwards by more than this, is a wrong label's.
+  /// inwards by more than this and times theirs, or outwards by more than this, is a wrong label's. Inwards
+  /// is counted from rest and from what a ring that is inflated does as a whole.
   double max_beyond_mm = 2.5, max_beyond_times = 2;
+  /// Paths around that are displaced by less tell nothing: at a third of what a label that is a ring off is
+  /// displaced by on the shipped skins.
+  double least_around_mm = 2;
   RingNumberingOptions numbering;
 };
 
@@ -31,8 +37,9 @@ struct PathTrackerOptions {
 ///    a node at a time by (4.27); a detection that two paths want goes to the cheaper one. This gives each
 ///    path's detections in their order, which is also the order of the rings: a camera on the axis sees no
 ///    two points of a path in reverse order.
-/// 2. Number. Which ring each of them is takes both pictures, see RingNumbering.
-///
+/// 2. Number. Which ring each of them is takes both pictures, see RingNumbering. Paths of which some
+///    detections could not be numbered, as those that leave the pictures at an inflated skin's ends, are
+///    numbered once more beside those around them of which all were, if that numbers more.
 /// 3. Check. A label whose displacement does not suit those of the neighbouring paths is dropped.
 ///
 /// Lengths in the options and inside are those of the SimilarSkin. Constant after construction but for
@@ -74,6 +81,11 @@ class PathTracker {
   void FindAreas(View& view) const;
   bool AreaFits(const View& view, const Detection& d) const;
   void SortIntoPaths(CameraId id, const Detections& detections);
+  std::span<const SightRay> RaysOf(CameraId id, int path);
+  void Number(int path, std::span<const double> around_mm);
+  void FindReferences();
+  void FindRings();
+  bool FindAround(int path);
   void DropImplausible(LabelledMarkers& out);
   void Trace(CameraId id);
   void FindBest(int path, Tracing& tracing) const;
@@ -88,7 +100,13 @@ class PathTracker {
   std::array<std::vector<SightRay>, kCameraCount> rays_;            // by detection
   std::array<std::vector<SightRay>, kCameraCount> path_rays_;       // of one path's chains
   std::vector<int> owners_;                                         // path, by candidate
-  std::vector<double> displacements_mm_;                            // radial, by marker; NaN: not labelled
+  std::array<std::vector<int>, kCameraCount> places_;  // in its path's chain, by marker; -1: none
+  std::vector<int> numbered_;                          // by path: detections with a label
+  std::vector<double> displacements_mm_;               // radial, by marker; NaN: not labelled
+  std::vector<double> around_mm_;                      // the same of the paths around one, by ring
+  std::vector<uint8_t> complete_;                      // by path: others are numbered beside it
+  std::vector<double> whole_ring_mm_;                  // what all of a ring have in common, by ring
+  std::vector<double> ring_mm_;                        // of one ring
   std::vector<int> dropped_;
   double mean_radius_mm_ = 0;
   RingNumbering numbering_;

@@ -13,9 +13,9 @@ namespace taclink {
 namespace {
 
 constexpr int kMaxRounds = 12;
-constexpr double kMaxAreaRatio = 2.2;  // of a marker against others of its ring
-constexpr double kMinOfRing = 0.15;    // part of a ring's or a path's markers without which it is none
-constexpr double kMinSeen = 0.5;       // of all markers
+constexpr double kMaxAreaRatio = 2.2;   // of a marker against others of its ring
+constexpr double kMinOfRing = 0.15;     // part of a ring's or a path's markers without which it is none
+constexpr double kLeastLabelled = 0.5;  // of all markers
 // Between rings, beside a spot's own width; closer, their spots run into one another.
 constexpr double kResolvedPx = 2;
 
@@ -121,7 +121,7 @@ Result<void> PictureLabeller::CheckComplete() {
       return Refusal("of ring " + std::to_string(model_.RingOf(MarkerAt(0, j)) + 1) +
                      " hardly a marker is seen, the link may have fewer rings than the model");
   }
-  if (all < kMinSeen * paths_ * rings_)
+  if (all < kLeastLabelled * paths_ * rings_)
     return Refusal("only " + std::to_string(all) + " of " + std::to_string(paths_ * rings_) +
                    " markers found");
   return {};

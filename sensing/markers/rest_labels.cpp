@@ -5,18 +5,19 @@
 namespace taclink {
 
 Result<std::vector<MarkerObservation>> LabelRestPicture(const LinkModel& model, CameraId id,
-                                                        const Detections& detections) {
-  const auto labels = LabelPicture(model, id, detections);
+                                                        Detections& detections, const cv::Mat& gray) {
+  const auto labels = LabelPicture(model, id, detections, gray);
   if (!labels) return labels.error();
   std::vector<MarkerObservation> seen(static_cast<size_t>(model.markers.count()));
   for (const PictureMarker& m : labels->markers) {
     seen[static_cast<size_t>(m.marker)] = {true, m.detection.center_px, m.detection.covariance_px2};
+    if (m.looked_again) detections.push_back(m.detection);
   }
   return seen;
 }
 
 Result<LabelledMarkers> LabelRestPair(const LinkModel& model,
-                                      const std::array<Detections, kCameraCount>& detections) {
+                                      std::array<Detections, kCameraCount> detections) {
   LabelledMarkers labelled;
   for (const CameraId id : kBothCameras) {
     auto seen = LabelRestPicture(model, id, detections[Index(id)]);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <opencv2/core/mat.hpp>
 #include <vector>
 
 #include "sensing/core/link_model.h"
@@ -9,14 +10,15 @@
 
 namespace taclink {
 
-/// Labels a rest picture before the cameras are calibrated: LabelPicture without looking again. Of the
-/// model's nominal rig only the orientation is believed, the roll to half a path pitch, see PictureGrid.
-/// Errors: kInvalidArgument, with what does not fit. For calibration, not for every frame: it allocates.
+/// Labels a rest picture before the cameras are calibrated. Of the model's nominal rig only the orientation
+/// is believed, the roll to half a path pitch, see PictureGrid. With `gray` LabelPicture looks again, and
+/// what it finds is added to `detections`: blur merges spots of the far rings that are markers each. Errors:
+/// kInvalidArgument, with what does not fit. For calibration, not for every frame: it allocates.
 Result<std::vector<MarkerObservation>> LabelRestPicture(const LinkModel& model, CameraId id,
-                                                        const Detections& detections);
+                                                        Detections& detections, const cv::Mat& gray = {});
 
 /// The same for both pictures; fails if either does, and names the camera.
 Result<LabelledMarkers> LabelRestPair(const LinkModel& model,
-                                      const std::array<Detections, kCameraCount>& detections);
+                                      std::array<Detections, kCameraCount> detections);
 
 }  // namespace taclink

@@ -35,6 +35,7 @@ RingNumbering::RingNumbering(const LinkModel& model, RingNumberingOptions option
     const double after = j + 1 < rings_ ? ring_z_mm_[k + 1] - ring_z_mm_[k] : kInfinite;
     ring_pitch_mm_.push_back(std::min(before, after));
   }
+  usual_radius_mm_.resize(ring_radius_mm_.size());
   pairs_.resize(static_cast<size_t>(max_chain_ * max_chain_));
   states_.resize(static_cast<size_t>((rings_ + 1) * (max_chain_ + 1) * (max_chain_ + 1)));
   for (auto& labels : labels_) labels.assign(static_cast<size_t>(rings_), -1);
@@ -48,7 +49,10 @@ RingNumbering::State& RingNumbering::At(int ring, int top, int bottom) {
   return states_[static_cast<size_t>((ring * (max_chain_ + 1) + top) * (max_chain_ + 1) + bottom)];
 }
 
-void RingNumbering::Number(std::span<const SightRay> top, std::span<const SightRay> bottom) {
+void RingNumbering::Number(std::span<const SightRay> top, std::span<const SightRay> bottom,
+                           std::span<const double> around_mm) {
+  usual_radius_mm_ = ring_radius_mm_;
+  for (size_t k = 0; k < around_mm.size(); ++k) usual_radius_mm_[k] += around_mm[k];
   // Too many: the far ones are the doubtful ones, they are last in the top chain and first in the bottom one.
   const auto most = static_cast<size_t>(max_chain_);
   const size_t skipped = bottom.size() > most ? bottom.size() - most : 0;
@@ -76,7 +80,7 @@ void RingNumbering::FindBends() {
   for (int j = 0; j < rings_; ++j) {
     const auto k = static_cast<size_t>(j);
     known_[k] = labels_[0][k] >= 0 && labels_[1][k] >= 0;
-    if (known_[k]) bends_mm_[k] = PairOf(labels_[0][k], labels_[1][k]).radius_mm - ring_radius_mm_[k];
+    if (known_[k]) bends_mm_[k] = PairOf(labels_[0][k], labels_[1][k]).radius_mm - usual_radius_mm_[k];
   }
 }
 
@@ -114,17 +118,17 @@ double RingNumbering::PairCost(const Pair& pair, int ring) const {
 
 // Capped in the displacement: a dent may be as deep as it likes.
 double RingNumbering::RivalCost(const Pair& pair, int ring) const {
-  const double bend = pair.radius_mm - ring_radius_mm_[static_cast<size_t>(ring)];
+  const double bend = pair.radius_mm - usual_radius_mm_[static_cast<size_t>(ring)];
   return PairCost(pair, ring) +
          std::min(Square((bend - ExpectedBend(ring)) / options_.sigma_rival_mm), options_.max_rival_cost);
 }
 
 // Both cameras' labels slipped by one, in opposite ways, meet at the right z: a dent or a bulge that is none.
-// Where neither's are counted from its end without a gap, the undeformed skin is a rival.
+// Where neither's are counted from its end without a gap, the usual radius is a rival.
 double RingNumbering::RivalCost(const Pair& pair, int ring, bool counted) const {
   const double cost = RivalCost(pair, ring);
   if (counted) return cost;
-  const double bend = pair.radius_mm - ring_radius_mm_[static_cast<size_t>(ring)];
+  const double bend = pair.radius_mm - usual_radius_mm_[static_cast<size_t>(ring)];
   return std::min(cost, PairCost(pair, ring) + Square(bend / options_.sigma_rest_mm));
 }
 
@@ -236,7 +240,7 @@ std::optional<double> RingNumbering::Bend(CameraId id, int place, int ring) cons
   const double radius = point->head<2>().norm();
   if (radius < tube_radius_mm_ - 1 || radius > ring_radius_mm_[k] + options_.max_outward_mm)
     return std::nullopt;
-  return radius - ring_radius_mm_[k];
+  return radius - usual_radius_mm_[k];
 }
 
 // As the thesis numbers, by counting; believed if nothing is missing and every ring agrees.
@@ -296,7 +300,7 @@ void RingNumbering::Relax(int ring, int top, int bottom) {
   if (has_top && has_bottom) {
     const Pair& pair = PairOf(top, bottom);
     if (pair.ring != ring) return;
-    const double bend = pair.radius_mm - ring_radius_mm_[k];
+    const double bend = pair.radius_mm - usual_radius_mm_[k];
     Offer(ring + 1, top + 1, bottom + 1, from.cost + PairCost(pair, ring) + bending(bend), bend, kPair);
   }
 }

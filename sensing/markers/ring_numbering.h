@@ -39,15 +39,18 @@ struct RingNumberingOptions {
 /// rings, some rings missing, some detections false. The cheapest alignment of both chains with the rings is
 /// found by dynamic programming over (ring, used of top, used of bottom). Evidence: where two rays meet, z
 /// must be that of the ring (the skin hardly moves along its axis), and the radial displacement runs smoothly
-/// from one clamped end to the other. Every label of the result is then checked by itself and dropped where
-/// another ring would do as well; undeformed skin does where a gap in both chains leaves the count open.
+/// from one clamped end to the other, beside what the paths around show. Every label of the result is then
+/// checked by itself and dropped where another ring would do as well; the usual radius does where a gap in
+/// both chains leaves the count open.
 class RingNumbering {
  public:
   RingNumbering(const LinkModel& model, RingNumberingOptions options);
 
-  /// `top`, `bottom`: rays of a path's detections, rising z. Afterwards LabelOf says which place in the chain
-  /// each ring has.
-  void Number(std::span<const SightRay> top, std::span<const SightRay> bottom);
+  /// `top`, `bottom`: rays of a path's detections, rising z. `around_mm`: radial displacements (outwards) by
+  /// ring that the paths around have; empty: not known, as at rest. Afterwards LabelOf says which place in
+  /// the chain each ring has.
+  void Number(std::span<const SightRay> top, std::span<const SightRay> bottom,
+              std::span<const double> around_mm = {});
   /// Place in that camera's chain of the ring (from 0); -1: not seen, or dropped.
   int LabelOf(CameraId id, int ring) const { return labels_[Index(id)][static_cast<size_t>(ring)]; }
 
@@ -55,7 +58,7 @@ class RingNumbering {
   std::optional<double> DisplacementOf(int ring) const {
     const auto k = static_cast<size_t>(ring);
     if (!known_[k] || (labels_[0][k] < 0 && labels_[1][k] < 0)) return std::nullopt;
-    return bends_mm_[k];
+    return bends_mm_[k] + usual_radius_mm_[k] - ring_radius_mm_[k];
   }
 
   /// Longest chain that is used.
@@ -65,7 +68,7 @@ class RingNumbering {
   enum Move : uint8_t { kStart, kFalseTop, kFalseBottom, kNone, kTopOnly, kBottomOnly, kPair };
   struct State {
     double cost = 0;
-    double bend_mm = 0;  // radial displacement of the last ring that was seen
+    double bend_mm = 0;  // of the last ring that was seen
     Move move = kStart;
   };
   struct Pair {
@@ -95,7 +98,7 @@ class RingNumbering {
   bool HasNeighbour(CameraId id, int ring) const;
   void CheckSingles();
   bool SingleHolds(CameraId id, int ring, double expected_mm) const;
-  /// Radial displacement of a chain's detection if it is on that ring; None: not possible there.
+  /// Of a chain's detection if it is on that ring; None: not possible there.
   std::optional<double> Bend(CameraId id, int place, int ring) const;
   double ExpectedBend(int ring) const;
 
@@ -104,12 +107,13 @@ class RingNumbering {
   double tube_radius_mm_;
   std::vector<double> ring_z_mm_, ring_radius_mm_, ring_pitch_mm_;  // of the markers at rest
   double length_mm_;
+  std::vector<double> usual_radius_mm_;  // of the rings at rest, or of the paths around
 
   std::array<std::span<const SightRay>, kCameraCount> chains_;
   std::vector<Pair> pairs_;
   std::vector<State> states_;
   std::array<std::vector<int>, kCameraCount> labels_;
-  std::vector<double> bends_mm_;  // by ring, where known_
+  std::vector<double> bends_mm_;  // outwards, off the usual radius; by ring, where known_
   std::vector<bool> known_;
   std::vector<uint8_t> counted_;   // by ring: in one camera's chain there is no gap before it
   std::vector<uint8_t> doubtful_;  // by ring; 1: the top label, 2: the bottom one

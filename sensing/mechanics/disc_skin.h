@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -24,6 +25,9 @@ struct SkinLoad {
   double pressure_mpa = 0;
   std::vector<SkinDisc> discs;
 };
+
+/// Depth of a disc that is not there.
+inline constexpr double kOffMm = std::numeric_limits<double>::quiet_NaN();
 
 /// A skin in equilibrium with a SkinLoad, or a guess at it.
 struct SkinBalance {

@@ -8,7 +8,7 @@ namespace taclink {
 namespace {
 
 using Shape = Eigen::Vector4d;
-using Corners = Eigen::Matrix<double, 3, 4>;
+using CornerVectors = Eigen::Matrix<double, 3, 4>;
 // Products here are lazyProduct: Eigen would pack matrices of this size as if they were large.
 
 // Slopes of the corners' shape functions at the Gauss points, and their products.
@@ -46,19 +46,20 @@ struct Edge {
 };
 constexpr std::array<Edge, 4> kEdges = {{{0, 1}, {3, 2}, {0, 3}, {1, 2}}};
 
-Corners Mids(const ElementState& q) {
-  Corners c;
+CornerVectors Mids(const ElementState& q) {
+  CornerVectors c;
   for (Eigen::Index i = 0; i < 4; ++i) c.col(i) = q.segment<3>(6 * i);
   return c;
 }
-Corners Directors(const ElementState& q) {
-  Corners c;
+CornerVectors Directors(const ElementState& q) {
+  CornerVectors c;
   for (Eigen::Index i = 0; i < 4; ++i) c.col(i) = q.segment<3>(6 * i + 3);
   return c;
 }
 
 // Covariant shear g_a . g_3 (g_3 by the unit normalised coordinate zeta) at the tying points.
-Eigen::Vector4d TyingShears(const Corners& mids, const Corners& directors, double half_thickness) {
+Eigen::Vector4d ShearsAtTyingPoints(const CornerVectors& mids, const CornerVectors& directors,
+                                    double half_thickness) {
   Eigen::Vector4d shears;
   for (size_t t = 0; t < 4; ++t) {
     const auto [from, to] = kEdges[t];
@@ -69,9 +70,13 @@ Eigen::Vector4d TyingShears(const Corners& mids, const Corners& directors, doubl
 }
 
 // Along xi and eta, through the middle.
-std::array<ElementSpan, 2> Spans(const Corners& mids, const Corners& directors) {
-  const auto by_xi = [](const Corners& c) { return (c.col(1) + c.col(2) - c.col(0) - c.col(3)).norm() / 2; };
-  const auto by_eta = [](const Corners& c) { return (c.col(2) + c.col(3) - c.col(0) - c.col(1)).norm() / 2; };
+std::array<ElementSpan, 2> Spans(const CornerVectors& mids, const CornerVectors& directors) {
+  const auto by_xi = [](const CornerVectors& c) {
+    return (c.col(1) + c.col(2) - c.col(0) - c.col(3)).norm() / 2;
+  };
+  const auto by_eta = [](const CornerVectors& c) {
+    return (c.col(2) + c.col(3) - c.col(0) - c.col(1)).norm() / 2;
+  };
   const double xi_mm = by_xi(mids), eta_mm = by_eta(mids);
   return {ElementSpan{xi_mm, by_eta(directors) / eta_mm}, ElementSpan{eta_mm, by_xi(directors) / xi_mm}};
 }
@@ -80,21 +85,22 @@ std::array<ElementSpan, 2> Spans(const Corners& mids, const Corners& directors) 
 
 NonlinearElement::NonlinearElement(const ElementState& rest, double thickness_mm, const Material& material)
     : thickness_mm_(thickness_mm), material_(material) {
-  const Corners mids = Mids(rest), directors = Directors(rest);
+  const CornerVectors mids = Mids(rest), directors = Directors(rest);
   const auto [along, across] = Spans(mids, directors);
   shear_moduli_mpa_ = {TransverseShearModulus(material, thickness_mm, along),
                        TransverseShearModulus(material, thickness_mm, across)};
-  rest_tying_ = TyingShears(mids, directors, thickness_mm / 2);
+  rest_tying_ = ShearsAtTyingPoints(mids, directors, thickness_mm / 2);
   for (size_t side = 0; side < 2; ++side) {
     layers_[side].height_mm = (side == 0 ? -kGauss : kGauss) * thickness_mm / 2;
     for (size_t p = 0; p < 4; ++p) SetPoint(mids, directors, p, layers_[side]);
   }
 }
 
-void NonlinearElement::SetPoint(const Corners& mids, const Corners& directors, size_t p, Layer& layer) {
+void NonlinearElement::SetPoint(const CornerVectors& mids, const CornerVectors& directors, size_t p,
+                                Layer& layer) {
   const auto [xi, eta] = kGaussPoints[p];
   const ShapeFunctions n = ShapeFunctionsAt(xi, eta);
-  const Corners at_height = mids + layer.height_mm * directors;
+  const CornerVectors at_height = mids + layer.height_mm * directors;
   Mat3 base;
   base << at_height * n.by_xi, at_height * n.by_eta, thickness_mm_ / 2 * (directors * n.value);
   const Vec3 g1 = base.col(0), g2 = base.col(1);
@@ -140,8 +146,8 @@ struct NonlinearElement::Strained {
   Lanes3 force;                             // by the covariant strains e11, e22, 2 e12
 };
 
-void NonlinearElement::Strain(const Layer& layer, const Corners& at_height, const Eigen::Vector4d& tying,
-                              Strained& strained) const {
+void NonlinearElement::Strain(const Layer& layer, const CornerVectors& at_height,
+                              const Eigen::Vector4d& tying, Strained& strained) const {
   auto& [g1, g2, sheet, shear, shear_force, force] = strained;
   g1 = Interpolate(at_height, ShapesAtGaussPoints().by_xi);
   g2 = Interpolate(at_height, ShapesAtGaussPoints().by_eta);
@@ -179,8 +185,8 @@ struct NonlinearElement::Sums {
 
 template <DerivativeOrder kOrder>
 void NonlinearElement::AddUpTo(const ElementState& state, ElementResponse& response) const {
-  const Corners mids = Mids(state), directors = Directors(state);
-  const Eigen::Vector4d tying = TyingShears(mids, directors, thickness_mm_ / 2) - rest_tying_;
+  const CornerVectors mids = Mids(state), directors = Directors(state);
+  const Eigen::Vector4d tying = ShearsAtTyingPoints(mids, directors, thickness_mm_ / 2) - rest_tying_;
   Sums sums;
   if constexpr (kOrder == DerivativeOrder::kHessian) {
     for (auto& stiffness : sums.stiffness) stiffness.setZero();
@@ -280,7 +286,8 @@ void NonlinearElement::AddStiffness(const Layer& layer, const Strained& strained
 }
 
 // The tying shears are bilinear in points and directors.
-NonlinearElement::Tied NonlinearElement::TyingByState(const Corners& mids, const Corners& directors) const {
+NonlinearElement::Tied NonlinearElement::TyingByState(const CornerVectors& mids,
+                                                      const CornerVectors& directors) const {
   Tied by_state = Tied::Zero();
   for (size_t t = 0; t < 4; ++t) {
     const auto [from, to] = kEdges[t];

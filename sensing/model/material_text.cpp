@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
-#include <sstream>
 
+#include "sensing/core/read_file.h"
 #include "sensing/model/model_file.h"
 
 namespace taclink {
@@ -76,11 +75,7 @@ size_t EndOfBlock(const std::string& text, size_t at, size_t column) {
 
 Result<std::string> LinkModelText(const std::string& name_or_path) {
   if (const auto text = ShippedModelText(name_or_path); !text.empty()) return std::string(text);
-  const std::ifstream file(name_or_path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file) return Error{ErrorCode::kNotFound, name_or_path + ": cannot be read; check the path"};
-  return text.str();
+  return ReadFile(name_or_path);
 }
 
 Result<std::string> WithMaterial(const std::string& name, const std::string& content,

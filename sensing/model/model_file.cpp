@@ -217,13 +217,13 @@ Result<LinkModel> ParseLinkModel(const std::string& name, std::string_view conte
 Result<LinkModel> LoadLinkModel(const std::string& name_or_path) {
   if (const auto text = ShippedModelText(name_or_path); !text.empty())
     return ParseLinkModel(name_or_path, text);
-  if (!std::ifstream(name_or_path)) {
+  auto file = YamlFile::Load(name_or_path);
+  if (!file && file.error().code == ErrorCode::kNotFound) {
     std::string names;
     for (const auto& name : ShippedModelNames()) names += (names.empty() ? "" : ", ") + name;
     return Error{ErrorCode::kNotFound,
                  "link model '" + name_or_path + "' is neither a file nor a shipped model (" + names + ")"};
   }
-  auto file = YamlFile::Load(name_or_path);
   if (!file) return file.error();
   return ReadLinkModel(std::move(*file));
 }

@@ -10,6 +10,8 @@ namespace {
 
 // Further from the baseline's own pressure, the error of what pressure does would be taken for drift.
 constexpr double kSamePressureMpa = 1e-4;
+// So long a tare waits where no loads explain the markers: by time, for such frames may take a second each.
+constexpr int64_t kMostWaitedNs = 3'000'000'000;
 
 double StrongestLoad(const LinkState& state) {
   double strongest = 0;
@@ -41,6 +43,7 @@ void BaselineKeeper::Take(BaselineOrigin origin, double pressure_mpa, const Fram
 Result<void> BaselineKeeper::BeginTare(const TareOptions& options) {
   if (tare_) return Error{ErrorCode::kFailedPrecondition, "a tare is under way; wait for its end"};
   tare_.emplace(model_, options);
+  waits_since_ns_.reset();
   tare_end_.reset();
   return {};
 }
@@ -66,24 +69,41 @@ void BaselineKeeper::Apply(const PressureReading& pressure, const SkinEstimate& 
   for (size_t m = 0; m < off_mm_.size(); ++m) {
     const auto at = 3 * static_cast<Eigen::Index>(m);
     off_mm_[m] -= estimate.inflated_mm.segment<3>(at) - estimate.baseline_mm.segment<3>(at);
+    // A baseline that is taken or follows takes up what the cameras did, too.
+    if (estimate.loads.by_cameras_mm.size() > 0) off_mm_[m] += estimate.loads.by_cameras_mm.segment<3>(at);
     if (drift_) off_mm_[m] += follower_.drift_mm()[m];
   }
 }
 
 void BaselineKeeper::Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels,
                            SkinStage& skin, StateEstimator& estimator, const Clock& clock) {
+  waits_since_ns_.reset();
   if (drift_) FollowDrift(times, state, clock);
+  Tell(times, state, clock);
+  if (tare_) TakeTareFrame(times, state, labels, skin, estimator, clock);
+}
+
+void BaselineKeeper::Wait(const FrameTimes& times, LinkState& state, const Clock& clock) {
+  Tell(times, state, clock);
+  if (!tare_) return;
+  const int64_t now_ns = MonotonicNs(times, clock);
+  if (!waits_since_ns_) waits_since_ns_ = now_ns;
+  if (now_ns - *waits_since_ns_ > kMostWaitedNs)
+    AbortTare("for 3 s there was no answer to tare by: " + state.status_reason +
+              "; or take the rest shape anew with nothing at the skin (calibrate)");
+}
+
+void BaselineKeeper::Tell(const FrameTimes& times, LinkState& state, const Clock& clock) const {
   state.baseline = baseline_;
   state.baseline.drift_mm = follower_.largest_mm();
   if (drift_) state.baseline.drift_state = follower_.following() ? DriftState::kFollowing : DriftState::kHeld;
   state.baseline_age_s = AgeS(times, clock);
-  if (tare_) TakeTareFrame(times, state, labels, skin, estimator, clock);
 }
 
 void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock) {
   // Degraded by nothing but the drift itself.
-  const bool good = state.status == LinkStatus::kOk ||
-                    (state.measured() && HasDriftedFar() && state.status_reason == DriftAdvice());
+  const bool good = state.status == LinkStatus::kOk || (state.measured() && state.reasons.size() == 1 &&
+                                                        state.reasons[0].id == ReasonId::kDrift);
   const bool sure = good && std::abs(PressureChange(frame_pressure_.mpa)) <= kSamePressureMpa;
   follower_.Update(MonotonicNs(times, clock), sure ? std::optional(StrongestLoad(state)) : std::nullopt,
                    off_mm_);
@@ -105,7 +125,8 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
     const PressureReading pressure = tare_->pressure();
     const auto inflation = estimator.InflationAt(pressure.mpa);
     skin.Tare(tare_->markers(), pressure, inflation.value_or(estimator.estimate().baseline_mm));
-    Take(tare_->forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, pressure.mpa, times, clock);
+    Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, pressure.mpa,
+         times, clock);
   }
   tare_.reset();
 }
@@ -114,13 +135,15 @@ double BaselineKeeper::AgeS(const FrameTimes& times, const Clock& clock) const {
   return static_cast<double>(MonotonicNs(times, clock) - taken_ns_) * 1e-9;
 }
 
-std::string BaselineKeeper::DriftAdvice() const {
+std::optional<Reason> BaselineKeeper::DriftReason() const {
+  const double drifted_mm = follower_.largest_mm();
+  if (!drift_ || drifted_mm <= drift_->limit_mm) return {};
   char text[160];
   std::snprintf(
       text, sizeof text,
       "the baseline has drifted by %.2f mm since it was taken; tare the link while nothing touches it",
-      follower_.largest_mm());
-  return text;
+      drifted_mm);
+  return Reason{ReasonId::kDrift, text, drifted_mm, drift_->limit_mm};
 }
 
 }  // namespace taclink

@@ -41,13 +41,20 @@ class BaselineKeeper {
 
   /// A frame's shape, of which what the pressure alone has changed since the baseline is left out.
   void Apply(const PressureReading& pressure, const SkinEstimate& estimate, const SkinShape& shape);
-  /// Follows drift and takes a tare's frame, which may be its last; fills what the state says of the
-  /// baseline.
+  /// Instead of Apply and Learn: there is a shape, but no answer to what moved it. Tells; a tare waits for an
+  /// answer, and ends without one after a while.
+  void Wait(const FrameTimes& times, LinkState& state, const Clock& clock);
+  /// Fills what the state says of the baseline.
+  void Tell(const FrameTimes& times, LinkState& state, const Clock& clock) const;
+  /// Follows drift and takes a tare's frame, which may be its last; then tells.
   void Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels, SkinStage& skin,
              StateEstimator& estimator, const Clock& clock);
 
-  bool HasDriftedFar() const { return drift_ && follower_.largest_mm() > drift_->limit_mm; }
-  std::string DriftAdvice() const;
+  /// None: it has not drifted far.
+  std::optional<Reason> DriftReason() const;
+  /// What touched when a tare was forced is part of the baseline until rest is taken anew: a tare that is not
+  /// forced cannot see whether it has gone.
+  bool is_forced() const { return baseline_.origin == BaselineOrigin::kForcedTare; }
 
  private:
   void FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock);
@@ -66,6 +73,7 @@ class BaselineKeeper {
   std::vector<Vec3> off_mm_;        // likewise: against the baseline as it was taken, without pressure's part
 
   std::optional<TareCollector> tare_;
+  std::optional<int64_t> waits_since_ns_;  // for an answer; monotonic
   std::optional<Result<TareSummary>> tare_end_;
 };
 

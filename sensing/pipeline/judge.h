@@ -1,20 +1,42 @@
 #pragma once
 
-#include <string>
+#include <algorithm>
+#include <optional>
 
 #include "sensing/core/link_model.h"
 #include "sensing/core/link_state.h"
+#include "sensing/estimation/camera_evidence.h"
+#include "sensing/pipeline/camera_motion.h"
 #include "sensing/pipeline/state_estimator.h"
 
 namespace taclink {
 
+/// Below this share of the markers in sight a link is lost: nothing is measured.
+inline constexpr double kLostShare = 0.4;
+
+/// Of so many markers two pictures of one skin may disagree, few of which are wrong labels.
+inline double MostApart(const CameraAgreement& agreement) {
+  return std::max(7.0, 0.1 * agreement.pairs);
+}
+
+/// False: the two pictures are not of one skin. So many lines of sight miss each other that nothing is
+/// measured.
+inline bool AreOfOneSkin(const CameraAgreement& agreement) {
+  return agreement.apart <= MostApart(agreement);
+}
+
 /// All that is known of how good a frame's answer is.
 struct Evidence {
   const LinkModel& model;
-  const std::string& camera_trouble;  ///< empty: none
-  const std::string drift_advice;     ///< empty: the baseline has not drifted far
-  PressureReading told;               ///< the pressure that was taken as told
-  PressureReading baseline;           ///< and that of the baseline
+  std::optional<Reason> camera_trouble;  ///< none: both cameras' pictures are there
+  CameraAgreement agreement;
+  std::optional<MotionDisagreement> motion;  ///< see CameraMotion
+  std::optional<CameraId> sees_alone;        ///< see RestComparison
+  std::optional<Reason> drift;               ///< none: the baseline has not drifted far
+  bool is_baseline_forced = false;           ///< taken although something touched or moved
+  PressureReading told;                      ///< the pressure that was taken as told
+  bool is_told = true;                       ///< false: by nobody, or by a sensor that fell silent
+  PressureReading baseline;                  ///< and that of the baseline
   const SkinEstimate& estimate;
 };
 

@@ -7,13 +7,14 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "sensing/capture/decode.h"
 #include "sensing/markers/detector.h"
 #include "sensing/markers/marker_tracker.h"
 #include "sensing/markers/path_tracker.h"
 #include "sensing/pipeline/baseline_keeper.h"
+#include "sensing/pipeline/camera_motion.h"
 #include "sensing/pipeline/judge.h"
 #include "sensing/pipeline/mean_pressure.h"
+#include "sensing/pipeline/picture_stage.h"
 #include "sensing/pipeline/rest_pose.h"
 #include "sensing/pipeline/skin_stage.h"
 
@@ -33,6 +34,17 @@ void SetStatus(LinkState& state, LinkStatus status, std::string reason) {
   state.reasons.clear();
 }
 
+// Cameras are told from a skin whose shape is known.
+std::string CalibrationAdvice(const PressureReading& pressure) {
+  if (std::abs(pressure.mpa) <= 3 * pressure.sigma_mpa) return {};
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "; the skin is under %.3f kPa: cameras are calibrated without pressure, or have a saved calibration",
+      1e3 * pressure.mpa);
+  return text;
+}
+
 }  // namespace
 
 struct LinkPipeline::Stages {
@@ -50,14 +62,14 @@ struct LinkPipeline::Stages {
   const PipelineOptions options;
   Clock& clock;
 
-  std::array<GrayDecoder, kCameraCount> decoders;
-  std::array<cv::Mat, kCameraCount> gray;
-  std::array<bool, kCameraCount> has_picture{};
+  PictureStage camera_pictures;
   MarkerDetector detector;
   std::array<Detections, kCameraCount> detections;
   std::optional<RestPose> rest;  // while rest pairs are taken
   MeanPressure rest_pressure;    // of these
   RestProgress rest_progress;
+  std::string last_refusal;                            // of these pairs, while more are taken
+  bool calibrates = false;                             // the cameras are told from them
   BaselineOrigin rest_origin = BaselineOrigin::kNone;  // of what is being taken
   int64_t refused_ns = 0, wait_ns = 0;  // exposure of the pair last refused; until the next is tried
   // Made when the rest pose is known.
@@ -65,6 +77,7 @@ struct LinkPipeline::Stages {
   std::optional<PathTracker> acquirer;
   std::optional<MarkerTracker> tracker;
   std::optional<SkinStage> skin;
+  std::optional<CameraMotion> motion;
 
   MarkerTracker::Pictures pictures;              // of the frame in work; empty where there is none
   AcquireReason reason = AcquireReason::kFirst;  // of the frame in work
@@ -75,8 +88,6 @@ struct LinkPipeline::Stages {
   ContactFinder finder;
   BaselineKeeper keeper;
 
-  std::string camera_trouble;  // of the frame in work
-
   double MsSince(int64_t start_ns) const {
     return static_cast<double>(clock.MonotonicNs() - start_ns) * 1e-6;
   }
@@ -86,38 +97,12 @@ struct LinkPipeline::Stages {
     return options.rig ? *options.rig : model.nominal_rig;
   }
 
-  void Decode(const StereoFrame& frame, LinkState& state) {
-    camera_trouble.clear();
-    for (const CameraId id : kBothCameras) {
-      const auto i = Index(id);
-      has_picture[i] = false;
-      state.cameras[i].bad_picture = frame.images[i].valid;  // until it is found to be good
-      if (!frame.images[i].valid) {
-        camera_trouble = std::string("no picture from the ") + Name(id) + " camera";
-        if (!frame.images[i].why_missing.empty()) camera_trouble += ": " + frame.images[i].why_missing;
-        continue;
-      }
-      if (auto decoded = decoders[i].Decode(frame.images[i], gray[i]); !decoded) {
-        camera_trouble = std::string(Name(id)) + " camera: " + decoded.error().message;
-        continue;
-      }
-      const CameraModel& expected = CurrentRig()[id];
-      has_picture[i] = gray[i].cols == expected.width_px && gray[i].rows == expected.height_px;
-      state.cameras[i].bad_picture = !has_picture[i];
-      if (!has_picture[i]) {
-        camera_trouble = std::string(Name(id)) + " camera: the picture is " + std::to_string(gray[i].cols) +
-                         "x" + std::to_string(gray[i].rows) + ", the camera's model is for " +
-                         std::to_string(expected.width_px) + "x" + std::to_string(expected.height_px);
-      }
-    }
-  }
-
   void Detect(LinkState& state) {
     for (size_t i = 0; i < kCameraCount; ++i) {
       detections[i].clear();
-      if (has_picture[i]) detector.Detect(gray[i], detections[i]);
+      if (camera_pictures.has(i)) detector.Detect(camera_pictures.gray(i), detections[i]);
       state.cameras[i].detections = static_cast<int>(detections[i].size());
-      state.tracking.cameras[i].share_read = has_picture[i] ? 1 : 0;
+      state.tracking.cameras[i].share_read = camera_pictures.has(i) ? 1 : 0;
     }
   }
 
@@ -134,7 +119,8 @@ struct LinkPipeline::Stages {
     state.tracking = {};
     reason = ReasonToAcquire(next);
     sequence = next;
-    for (size_t i = 0; i < kCameraCount; ++i) pictures[i] = has_picture[i] ? gray[i] : cv::Mat();
+    for (size_t i = 0; i < kCameraCount; ++i)
+      pictures[i] = camera_pictures.has(i) ? camera_pictures.gray(i) : cv::Mat();
     if (reason == AcquireReason::kNone) return tracker->Follow(pictures, predicted_mm, state.tracking);
     if (tracker) tracker->Forget();
     Detect(state);
@@ -146,6 +132,8 @@ struct LinkPipeline::Stages {
     rest.emplace(model, rig, pairs);
     rest_pressure.Clear();
     rest_progress = {.taken = 0, .wanted = pairs, .refusal = {}};
+    last_refusal.clear();
+    calibrates = !rig;
     wait_ns = 0;
   }
 
@@ -170,7 +158,7 @@ struct LinkPipeline::Stages {
     for (size_t i = 0; i < kCameraCount; ++i)
       state.cameras[i].detections = static_cast<int>(detections[i].size());
     SetStatus(state, LinkStatus::kCalibrating,
-              camera_trouble.empty() ? rest_progress.refusal->message : camera_trouble);
+              camera_pictures.trouble() ? camera_pictures.trouble()->text : last_refusal);
   }
 
   // A baseline under a pressure that is not known would be wrong for good.
@@ -189,7 +177,8 @@ struct LinkPipeline::Stages {
           state, LinkStatus::kCalibrating,
           "no skin of this model is stable under the pressure that is told; check the pressure and "
           "the model's material");
-    if (!camera_trouble.empty()) return SetStatus(state, LinkStatus::kCalibrating, camera_trouble);
+    if (const auto& trouble = camera_pictures.trouble())
+      return SetStatus(state, LinkStatus::kCalibrating, trouble->text);
     rest_pressure.Add(pressure);
     if (const std::string trouble = rest_pressure.Trouble(); !trouble.empty()) {
       rest->StartAgain();
@@ -197,24 +186,31 @@ struct LinkPipeline::Stages {
       rest_progress.taken = 0;
       return SetStatus(state, LinkStatus::kCalibrating, trouble);
     }
-    const auto complete = rest->Add(detections, *inflation);
+    const auto complete = rest->Add(detections, pictures, *inflation);
     rest_progress.taken = rest->taken();
     rest_progress.refusal = complete ? std::nullopt : std::optional(complete.error());
     if (!complete) {
+      if (calibrates) rest_progress.refusal->message += CalibrationAdvice(pressure);
+      last_refusal = rest_progress.refusal->message;
       rest_pressure.Clear();
+      const bool begins_again = rest->taken() > 0;
+      if (begins_again) rest_pressure.Add(pressure);
       refused_ns = times.exposure_monotonic_ns;
-      wait_ns = std::clamp(2 * wait_ns, kFirstWaitNs, kLongestWaitNs);
-      return SetStatus(state, LinkStatus::kCalibrating, complete.error().message);
+      wait_ns = begins_again ? 0 : std::clamp(2 * wait_ns, kFirstWaitNs, kLongestWaitNs);
+      return SetStatus(state, LinkStatus::kCalibrating, last_refusal);
     }
-    SetStatus(state, LinkStatus::kCalibrating, "taking the rest shape; do not touch the skin");
+    std::string taking = "taking the rest shape; do not touch the skin";
+    if (!last_refusal.empty()) taking = "taking the rest shape again. Before: " + last_refusal;
+    SetStatus(state, LinkStatus::kCalibrating, std::move(taking));
     if (!*complete) return;
     calibration = rest->calibration();
     acquirer.emplace(model, calibration->rig);
     tracker.emplace(model, calibration->rig, options.tracking);
+    motion.emplace(model, calibration->rig, rest->noise_px());
     CameraEvidenceOptions cameras;
     cameras.camera_sigma_px = std::max(cameras.camera_sigma_px, rest->noise_px());
     cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
-    skin.emplace(model, *calibration, cameras);
+    skin.emplace(model, *calibration, cameras, rest->noise_px());
     const PressureReading mean = rest_pressure.mean();
     skin->SetBaseline(rest->markers(), mean, estimator->InflationAt(mean.mpa).value_or(*inflation));
     keeper.Take(rest_origin, mean.mpa, times, clock);
@@ -281,6 +277,7 @@ void LinkPipeline::Restart() {
   stages_->calibration.reset();
   stages_->acquirer.reset();
   stages_->tracker.reset();
+  stages_->motion.reset();
   stages_->predicted_mm.clear();
   stages_->skin.reset();
   stages_->estimator->Restart();
@@ -333,17 +330,21 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.stage_ms = {};
   const bool stale = frame.pressure.stale;
   PressureReading told{
-      .mpa = stale ? frame.pressure.mpa : frame.pressure_mpa.value_or(s.options.pressure_mpa),
+      .mpa = stale ? frame.pressure.mpa : frame.pressure_mpa.value_or(s.options.pressure_mpa.value_or(0)),
       .sigma_mpa = s.options.pressure_sigma_mpa.value_or(PressureSigma(frame.pressure.origin))};
-  // A sensor that fell silent: the shape tells the pressure.
-  const std::optional<PressureReading> known = stale ? std::nullopt : std::optional(told);
+  // A sensor that fell silent, or none at all: the shape tells the pressure.
+  const bool is_told = !stale && (frame.pressure_mpa || s.options.pressure_mpa ||
+                                  frame.pressure.origin != PressureOrigin::kNone);
+  const std::optional<PressureReading> known = is_told ? std::optional(told) : std::nullopt;
 
   const auto timed = [&s](double& stage_ms, auto&& stage) {
     const int64_t start = s.clock.MonotonicNs();
     stage();
     stage_ms = s.MsSince(start);
   };
-  timed(state.stage_ms.decode, [&] { s.Decode(frame, state); });
+  timed(state.stage_ms.decode, [&] {
+    s.camera_pictures.Take(frame, s.CurrentRig(), s.rest || s.options.pictures_may_repeat, state);
+  });
   if (s.WaitsForRest(frame.times)) return s.SkipRest(state);
   timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });
   if (s.rest) {
@@ -352,6 +353,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
     return;
   }
   timed(state.stage_ms.register_, [&] { s.Label(state); });
+  s.motion->Observe(frame.times, s.labels);
   state.times.tracked_ns = s.clock.MonotonicNs();
   timed(state.stage_ms.force,
         [&] { s.skin->Run(s.labels, known, s.keeper.DriftMm(), *s.estimator, s.finder, state, told); });
@@ -367,14 +369,22 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.total_force_n.setZero();
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   Judge({.model = s.model,
-         .camera_trouble = s.camera_trouble,
-         .drift_advice = s.keeper.HasDriftedFar() ? s.keeper.DriftAdvice() : "",
+         .camera_trouble = s.camera_pictures.trouble(),
+         .agreement = s.skin->agreement(),
+         .motion = s.motion->disagreement(),
+         .sees_alone = s.skin->sees_alone(),
+         .drift = s.keeper.DriftReason(),
+         .is_baseline_forced = s.keeper.is_forced(),
          .told = told,
+         .is_told = is_told,
          .baseline = s.skin->baseline_pressure(),
          .estimate = estimate},
         state);
-  if (estimate.failure == EstimateFailure::kNone)
+  // A tare ends where nothing is measured; where there is a shape without forces it waits for a while.
+  if (estimate.failure == EstimateFailure::kNone || !state.measured())
     s.keeper.Learn(frame.times, state, s.labels, *s.skin, *s.estimator, s.clock);
+  else
+    s.keeper.Wait(frame.times, state, s.clock);
   state.times.solved_ns = s.clock.MonotonicNs();
 }
 

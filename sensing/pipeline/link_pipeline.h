@@ -21,12 +21,14 @@ namespace taclink {
 struct PipelineOptions {
   /// Camera parameters of this very link; none: found from the rest pictures.
   std::optional<StereoRig> rig;
-  /// Gauge pressure where the source does not measure it.
-  double pressure_mpa = 0;
+  /// Gauge pressure where the source does not measure it. None: nobody tells it, and forces are degraded.
+  std::optional<double> pressure_mpa;
   /// Standard deviation of the pressure, whoever tells it; none: as is usual for its source (PressureSigma).
   std::optional<double> pressure_sigma_mpa;
   /// The baseline is the mean of so many rest pairs. They must be untouched.
   int rest_frames = 8;
+  /// Files and simulations may show the same picture twice; of a camera it means that it hangs.
+  bool pictures_may_repeat = false;
   /// Search the full pictures in every frame instead of following the markers.
   bool always_acquire = false;
   MarkerTrackerOptions tracking;

@@ -11,7 +11,7 @@ constexpr int kMostPasses = 4;
 constexpr double kOutlierSigmas = 6;  // as CameraEvidenceOptions has it
 
 // Markers that contradict the estimate. True: there was one more.
-bool LeaveOutliersOut(SkinShape& shape) {
+bool LeaveOutliersOut(const Eigen::VectorXd& by_cameras_mm, SkinShape& shape) {
   bool changed = false;
   for (size_t m = 0; m < shape.measured.size(); ++m) {
     MeasuredDisplacement& measured = shape.measured[m];
@@ -19,7 +19,9 @@ bool LeaveOutliersOut(SkinShape& shape) {
     if (!(information.trace() > 0)) continue;
     // From the posterior, which has moved towards what neighbors agree on, by noise alone: no more than chi^2
     // of the error from what the others say.
-    const Vec3 error = measured.displacement_mm - shape.displacements_mm[m];
+    const Vec3 seen_mm =
+        shape.displacements_mm[m] + by_cameras_mm.segment<3>(3 * static_cast<Eigen::Index>(m));
+    const Vec3 error = measured.displacement_mm - seen_mm;
     if (error.dot(information * error) < kOutlierSigmas * kOutlierSigmas) continue;
     for (const CameraId id : kBothCameras) {
       const bool is_other =
@@ -35,17 +37,27 @@ bool LeaveOutliersOut(SkinShape& shape) {
 
 }  // namespace
 
-LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, const PressurePair& pressure,
-                       SkinShape shape) {
+LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, PressurePair pressure,
+                       SkinShape shape, bool is_told) {
   LinkState state;
   state.shape = std::move(shape);
   ContactFinder finder(model);
   const SkinEstimate& estimate = estimator.estimate();
+  if (!is_told) {
+    MarkerObservations seen;
+    for (const MeasuredDisplacement& measured : state.shape.measured) {
+      seen.displacement_mm.push_back(measured.displacement_mm);
+      seen.information.push_back(measured.information_per_mm2);
+    }
+    pressure.now = estimator.PressureFromShape(seen, pressure);
+  }
   for (int pass = 0; pass < kMostPasses; ++pass) {
     estimator.Estimate(pressure, state.shape, state.forces);
     // Of the last pass nothing is left out, for it is in the answer.
     const bool is_last = pass + 1 == kMostPasses;
-    if (estimate.failure != EstimateFailure::kNone || is_last || !LeaveOutliersOut(state.shape)) break;
+    if (estimate.failure != EstimateFailure::kNone || is_last ||
+        !LeaveOutliersOut(estimate.loads.by_cameras_mm, state.shape))
+      break;
     estimator.skin().BeginAgain();
   }
   estimator.FindContacts(finder, state.shape, state.forces, state.contacts);
@@ -53,9 +65,13 @@ LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, const 
   if (state.forces.converged)
     state.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
   Judge({.model = model,
-         .camera_trouble = "",
-         .drift_advice = "",
+         .camera_trouble = {},
+         .agreement = {},
+         .motion = {},
+         .sees_alone = {},
+         .drift = {},
          .told = pressure.now,
+         .is_told = is_told,
          .baseline = pressure.baseline,
          .estimate = estimate},
         state);

@@ -17,6 +17,7 @@ constexpr double kLargest = std::numeric_limits<double>::max();
 
 constexpr const char* kForceModel = "force.model";
 constexpr const char* kForceRefinement = "force.refinement";
+constexpr const char* kMayRepeat = "pictures_may_repeat";  // not there: false
 constexpr const char* kPressure = "pressure_mpa";
 constexpr const char* kPressureSigma = "pressure_sigma_mpa";  // not there: as is usual for the source
 constexpr const char* kDriftFollow = "drift.follow";
@@ -114,8 +115,9 @@ Result<std::optional<ForceModel>> ParseForceModel(const std::string& text) {
 TextMap OptionsText(const PipelineOptions& options) {
   TextMap text = {{kForceModel, ForceModelText(options.force.model)},
                   {kForceRefinement, std::to_string(options.force.refinement)},
-                  {kPressure, NumberText(options.pressure_mpa)},
                   {kDriftFollow, options.drift ? "true" : "false"}};
+  if (options.pictures_may_repeat) text[kMayRepeat] = "true";
+  if (options.pressure_mpa) text[kPressure] = NumberText(*options.pressure_mpa);
   if (options.pressure_sigma_mpa) text[kPressureSigma] = NumberText(*options.pressure_sigma_mpa);
   if (!options.drift) return text;
   for (const DriftNumber& number : kDriftNumbers)
@@ -136,7 +138,12 @@ Result<PipelineOptions> ParseOptionsText(const TextMap& text) {
   options.force.refinement = static_cast<int>(refinement);
   if (options.force.refinement != refinement)
     reader.Fail(std::string("'") + kForceRefinement + "' is not a whole number");
-  options.pressure_mpa = reader.Number(kPressure, -1, 1);
+  if (text.contains(kMayRepeat)) options.pictures_may_repeat = reader.Bool(kMayRepeat);
+  // 0 tells nothing here, as in logs that always have it: frames say who tells their pressure.
+  if (text.contains(kPressure)) {
+    const double mpa = reader.Number(kPressure, -1, 1);
+    if (mpa != 0) options.pressure_mpa = mpa;
+  }
   if (text.contains(kPressureSigma)) options.pressure_sigma_mpa = reader.Number(kPressureSigma, 1e-9, 1);
   if (reader.Bool(kDriftFollow)) options.drift = ReadDrift(reader);
   if (const std::string trouble = reader.Finish(); !trouble.empty()) return Bad(trouble);

@@ -14,7 +14,8 @@ namespace {
 
 using PairDetections = std::array<Detections, kCameraCount>;
 
-constexpr double kMovedPx = 1, kMovedFraction = 0.03;  // more markers that scatter more: the skin moved
+constexpr double kScatteredPx = 1,
+                 kScatteredFraction = 0.03;  // more markers that scatter more: the skin moved
 // Swapped pictures that fit are refused if they put the cameras nearer to the nominal ones by this much
 // (difference of half the squared distance in tolerances).
 constexpr double kSwapMargin = 6;
@@ -34,9 +35,9 @@ Result<void> CheckSize(const LinkModel& model, CameraId id, const cv::Mat& pictu
                  "; take the pictures as the camera sends them, or correct the model's image_size_px");
 }
 
-Result<SettledCamera> Settle(const LinkModel& model, CameraId id, const Detections& detections,
-                             const CalibrationOptions& options) {
-  const auto labels = LabelRestPicture(model, id, detections);
+Result<SettledCamera> Settle(const LinkModel& model, CameraId id, Detections detections,
+                             const cv::Mat& picture, const CalibrationOptions& options) {
+  const auto labels = LabelRestPicture(model, id, detections, picture);
   if (!labels) return Refusal(labels.error().message);
   auto settled = SettleCamera(model, id, *labels, detections, options.domes);
   if (!settled) {
@@ -83,10 +84,12 @@ class RestMean {
         if (sum.count < 2) continue;
         const double n = sum.count;
         ++repeated;
-        moved += (sum.squares - sum.center.squaredNorm() / n) / (2 * (n - 1)) > kMovedPx * kMovedPx ? 1 : 0;
+        moved += (sum.squares - sum.center.squaredNorm() / n) / (2 * (n - 1)) > kScatteredPx * kScatteredPx
+                     ? 1
+                     : 0;
       }
     }
-    return moved > kMovedFraction * repeated;
+    return moved > kScatteredFraction * repeated;
   }
 
  private:
@@ -100,11 +103,11 @@ class RestMean {
 };
 
 Result<CalibrationSummary> Calibrate(const LinkModel& model, const std::vector<PairDetections>& pairs,
-                                     const CalibrationOptions& options) {
+                                     const RestPictures& first_pair, const CalibrationOptions& options) {
   std::array<RestMatch, kCameraCount> first;
   RestMean mean(model);
   for (const CameraId id : kBothCameras) {
-    auto settled = Settle(model, id, pairs.front()[Index(id)], options);
+    auto settled = Settle(model, id, pairs.front()[Index(id)], first_pair[Index(id)], options);
     if (!settled) return settled.error();
     mean.Add(id, settled->match.markers);
     for (size_t i = 1; i < pairs.size(); ++i)
@@ -120,11 +123,12 @@ Result<CalibrationSummary> Calibrate(const LinkModel& model, const std::vector<P
 }
 
 // True if the pictures explain the model better the other way round.
-bool LookSwapped(const LinkModel& model, std::vector<PairDetections> pairs,
+bool LookSwapped(const LinkModel& model, std::vector<PairDetections> pairs, RestPictures first_pair,
                  const Result<CalibrationSummary>& as_given, CalibrationOptions options) {
   for (auto& pair : pairs) std::swap(pair[0], pair[1]);
+  std::swap(first_pair[0], first_pair[1]);
   options.progress = nullptr;
-  const auto swapped = Calibrate(model, pairs, options);
+  const auto swapped = Calibrate(model, pairs, first_pair, options);
   if (!swapped) return false;
   return swapped->departure_cost + kSwapMargin < (as_given ? as_given->departure_cost : kSwapDoubt);
 }
@@ -154,9 +158,9 @@ Result<CalibrationSummary> CalibrateFromPictures(const LinkModel& model, std::sp
       options.progress({0.3 + 0.6 * one.done, one.step});
     };
   }
-  auto result = Calibrate(model, detections, rest_of_way);
+  auto result = Calibrate(model, detections, pairs.front(), rest_of_way);
   if (options.progress) options.progress({0.9, "try the pictures the other way round"});
-  if (LookSwapped(model, detections, result, options)) {
+  if (LookSwapped(model, detections, pairs.front(), result, options)) {
     return Refusal(
         "the pictures look swapped: they fit the model with top as bottom and bottom as top; give them the "
         "other "
@@ -172,7 +176,7 @@ Result<CameraCalibration> CalibrateFromPicture(const LinkModel& model, CameraId 
   MarkerDetector detector;
   Detections detections;
   detector.Detect(picture, detections);
-  const auto settled = Settle(model, id, detections, options);
+  const auto settled = Settle(model, id, detections, picture, options);
   if (!settled) return settled.error();
   return CalibrateCamera(model, id, settled->match.markers, options);
 }

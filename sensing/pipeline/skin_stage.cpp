@@ -1,6 +1,9 @@
 #include "sensing/pipeline/skin_stage.h"
 
+#include <algorithm>
+
 #include "sensing/core/similar_skin.h"
+#include "sensing/pipeline/judge.h"
 
 namespace taclink {
 namespace {
@@ -9,8 +12,6 @@ constexpr int kMostPasses = 4;
 // In LengthUnit: of the points that cameras see of the markers; of a marker that one camera sees, from where
 // its ray was linearized.
 constexpr double kSameLookMm = 0.1, kSamePlaceMm = 0.25;
-// Of a pressure that the shape tells: what the model's inflation is wrong by, and the rest.
-constexpr double kFromShapeShare = 0.05, kFromShapeMpa = 1e-4;
 
 MarkerSource SourceOf(bool top, bool bottom) {
   if (top) return bottom ? MarkerSource::kBoth : MarkerSource::kTop;
@@ -20,10 +21,11 @@ MarkerSource SourceOf(bool top, bool bottom) {
 }  // namespace
 
 SkinStage::SkinStage(const LinkModel& model, const CalibrationSummary& calibration,
-                     const CameraEvidenceOptions& options)
+                     const CameraEvidenceOptions& options, double noise_px)
     : model_(model),
       length_unit_(LengthUnit(model)),
       evidence_(model, calibration.rig, options),
+      rest_(model, calibration.rig, noise_px),
       doubt_(model, calibration.rig, calibration.covariance),
       baseline_mm_(Eigen::VectorXd::Zero(3 * model.markers.count())),
       about_mm_(baseline_mm_) {}
@@ -33,6 +35,7 @@ void SkinStage::SetBaseline(const LabelledMarkers& rest, const PressureReading& 
   baseline_pressure_ = pressure;
   baseline_mm_ = about_mm_ = inflation_mm;
   evidence_.SetBaseline(rest, inflation_mm);
+  rest_.SetBaseline(rest);
 }
 
 void SkinStage::Tare(const LabelledMarkers& now, const PressureReading& pressure,
@@ -40,6 +43,7 @@ void SkinStage::Tare(const LabelledMarkers& now, const PressureReading& pressure
   baseline_pressure_ = pressure;
   baseline_mm_ = about_mm_ = inflation_mm;
   evidence_.SetBaseline(now, inflation_mm, true);
+  rest_.SetBaseline(now);
 }
 
 void SkinStage::Measure(const Eigen::VectorXd& about_mm, std::span<const Vec3> drift_mm, SkinShape& shape) {
@@ -58,6 +62,27 @@ void SkinStage::Measure(const Eigen::VectorXd& about_mm, std::span<const Vec3> d
   }
 }
 
+void SkinStage::CompareWithRest(const LabelledMarkers& markers, std::span<const Vec3> drift_mm,
+                                const SkinEstimate& estimate) {
+  sees_alone_.reset();
+  const auto size = 3 * static_cast<Eigen::Index>(model_.markers.count());
+  if (estimate.failure != EstimateFailure::kNone || estimate.inflated_mm.size() != size ||
+      estimate.baseline_mm.size() != size)
+    return;
+  for (const CameraId id : kBothCameras) {
+    const Eigen::VectorXd& by_camera_mm = estimate.loads.by_camera_mm[Index(id)];
+    std::vector<Vec3>& expected_mm = expected_mm_[Index(id)];
+    expected_mm.resize(static_cast<size_t>(model_.markers.count()));
+    for (size_t m = 0; m < expected_mm.size(); ++m) {
+      const auto at = 3 * static_cast<Eigen::Index>(m);
+      expected_mm[m] = estimate.inflated_mm.segment<3>(at) - estimate.baseline_mm.segment<3>(at);
+      if (by_camera_mm.size() == size) expected_mm[m] += by_camera_mm.segment<3>(at);
+      if (!drift_mm.empty()) expected_mm[m] += drift_mm[m];
+    }
+  }
+  sees_alone_ = rest_.SeesAlone(markers, expected_mm_);
+}
+
 void SkinStage::Run(const LabelledMarkers& markers, const std::optional<PressureReading>& pressure,
                     std::span<const Vec3> drift_mm, StateEstimator& estimator, ContactFinder& finder,
                     LinkState& state, PressureReading& told) {
@@ -66,12 +91,16 @@ void SkinStage::Run(const LabelledMarkers& markers, const std::optional<Pressure
   const auto count = static_cast<size_t>(model_.markers.count());
   for (int pass = 0; pass < kMostPasses; ++pass) {
     Measure(about_mm_, drift_mm, shape);
+    // Nothing would be shown of what took long to find.
+    if (pass == 0 && (shape.seen() < kLostShare * model_.markers.count() || !AreOfOneSkin(agreement()))) {
+      estimator.GiveUp({told, baseline_pressure_}, shape, state.forces);
+      about_mm_ = baseline_mm_;
+      break;
+    }
     if (pressure) {
       told = *pressure;
     } else if (pass == 0) {
-      told = baseline_pressure_;
-      told.mpa = estimator.PressureFromShape(observed_, {told, baseline_pressure_});
-      told.sigma_mpa = kFromShapeMpa + kFromShapeShare * std::abs(told.mpa);
+      told = estimator.PressureFromShape(observed_, {baseline_pressure_, baseline_pressure_});
     }
     estimator.Estimate({told, baseline_pressure_}, shape, state.forces);
     const SkinEstimate& estimate = estimator.estimate();
@@ -80,7 +109,7 @@ void SkinStage::Run(const LabelledMarkers& markers, const std::optional<Pressure
       break;
     }
     Eigen::VectorXd& now = now_mm_;
-    now = estimate.displacements_mm;
+    now = estimate.displacements_mm + estimate.loads.by_cameras_mm;  // as they are seen
     for (size_t m = 0; m < drift_mm.size(); ++m)
       now.segment<3>(3 * static_cast<Eigen::Index>(m)) += drift_mm[m];
     model_covariances_.resize(count);
@@ -101,6 +130,7 @@ void SkinStage::Run(const LabelledMarkers& markers, const std::optional<Pressure
     else
       estimator.skin().Continue();
   }
+  CompareWithRest(markers, drift_mm, estimator.estimate());
   estimator.FindContacts(finder, shape, state.forces, state.contacts);
   shape.rejected.clear();
   for (size_t m = 0; m < count; ++m) {

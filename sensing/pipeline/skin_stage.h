@@ -7,6 +7,7 @@
 #include "sensing/core/markers.h"
 #include "sensing/estimation/calibration_doubt.h"
 #include "sensing/estimation/camera_evidence.h"
+#include "sensing/pipeline/rest_comparison.h"
 #include "sensing/pipeline/state_estimator.h"
 
 namespace taclink {
@@ -16,8 +17,9 @@ namespace taclink {
 /// when the cameras are known. One thread.
 class SkinStage {
  public:
+  /// `noise_px`: of markers in rest pictures, each axis; 0: as detections tell.
   SkinStage(const LinkModel& model, const CalibrationSummary& calibration,
-            const CameraEvidenceOptions& options);
+            const CameraEvidenceOptions& options, double noise_px = 0);
 
   /// Takes the markers of the untouched skin (means over frames, with the means' covariances), under a gauge
   /// pressure; `inflation_mm`: what that pressure does, stacked.
@@ -25,6 +27,11 @@ class SkinStage {
                    const Eigen::VectorXd& inflation_mm);
   /// Takes what is seen now as the untouched skin; markers that `now` does not show keep their baseline.
   void Tare(const LabelledMarkers& now, const PressureReading& pressure, const Eigen::VectorXd& inflation_mm);
+  /// In the frame that was run last.
+  CameraAgreement agreement() const { return evidence_.Agreement(); }
+  /// Likewise, where there was an answer: the camera that alone shows the skin elsewhere than pressure moves
+  /// it.
+  const std::optional<CameraId>& sees_alone() const { return sees_alone_; }
   const PressureReading& baseline_pressure() const { return baseline_pressure_; }
 
   /// `drift_mm`: how far the untouched skin has gone since the baseline, by marker; empty: not. `pressure`:
@@ -35,11 +42,16 @@ class SkinStage {
            PressureReading& told);
 
  private:
+  void CompareWithRest(const LabelledMarkers& markers, std::span<const Vec3> drift_mm,
+                       const SkinEstimate& estimate);
   void Measure(const Eigen::VectorXd& about_mm, std::span<const Vec3> drift_mm, SkinShape& shape);
 
   const LinkModel model_;
   const double length_unit_;
   CameraEvidence evidence_;
+  RestComparison rest_;
+  std::optional<CameraId> sees_alone_;
+  RestComparison::Expected expected_mm_;
   const CalibrationDoubt doubt_;
   PressureReading baseline_pressure_;
   Eigen::VectorXd baseline_mm_, about_mm_, now_mm_;

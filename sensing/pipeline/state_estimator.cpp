@@ -13,6 +13,12 @@ namespace {
 // What nothing is known of is uncertain by that, in SkinMechanics' units.
 constexpr double kUnknownMm = 5, kSpringsMm = 1;  // ... and where springs pull the skin to what is seen
 constexpr double kWeakInformation = 1e-9;
+// Of a pressure that the shape tells: what the model's inflation is wrong by, and the rest.
+constexpr double kFromShapeShare = 0.05, kFromShapeMpa = 1e-4;
+
+PressureReading FromShape(double mpa) {
+  return {.mpa = mpa, .sigma_mpa = kFromShapeMpa + kFromShapeShare * std::abs(mpa)};
+}
 
 SkinEstimatorOptions SkinOptions(const ForceOptions& options) {
   // The thesis' forces need the displacements of all markers, too.
@@ -29,6 +35,16 @@ StateEstimator::StateEstimator(const LinkModel& model, const ForceOptions& optio
     : model_(model), rest_mm_(model.RestMarkers()), options_(options), skin_(model, SkinOptions(options)) {
   if (options.model == ForceModel::kLiteral)
     thesis_ = std::make_unique<ThesisForce>(model, std::max(1, options.refinement));
+  const SkinMechanics& mechanics = skin_.mechanics();
+  for (int site = 0; site < mechanics.site_count(); ++site) {
+    const auto distance2 = [&](const Vec3& marker) {
+      return (marker - mechanics.RestSite(site)).squaredNorm();
+    };
+    const auto nearest =
+        std::min_element(rest_mm_.begin(), rest_mm_.end(),
+                         [&](const Vec3& a, const Vec3& b) { return distance2(a) < distance2(b); });
+    marker_of_site_.push_back(static_cast<size_t>(nearest - rest_mm_.begin()));
+  }
 }
 
 std::optional<Eigen::VectorXd> StateEstimator::InflationAt(double pressure_mpa) {
@@ -37,15 +53,16 @@ std::optional<Eigen::VectorXd> StateEstimator::InflationAt(double pressure_mpa) 
   return skin->markers_mm;
 }
 
-double StateEstimator::PressureFromShape(const MarkerObservations& observed, const PressurePair& pressure) {
+PressureReading StateEstimator::PressureFromShape(const MarkerObservations& observed,
+                                                  const PressurePair& pressure) {
   constexpr int kSteps = 6;
   const auto baseline = InflationAt(pressure.baseline.mpa);
   double mpa = pressure.now.mpa;
-  if (!baseline) return mpa;
+  if (!baseline) return FromShape(mpa);
   std::vector<double> asked;
   for (int step = 0; step < kSteps; ++step) {
     const InflatedSkin* skin = skin_.mechanics().Inflated(mpa);
-    if (skin == nullptr) return pressure.now.mpa;
+    if (skin == nullptr) return FromShape(pressure.now.mpa);
     asked.clear();
     for (size_t m = 0; m < observed.information.size(); ++m) {
       const auto at = 3 * static_cast<Eigen::Index>(m);
@@ -56,15 +73,18 @@ double StateEstimator::PressureFromShape(const MarkerObservations& observed, con
           observed.displacement_mm[m] + baseline->segment<3>(at) - skin->markers_mm.segment<3>(at);
       asked.push_back(by.dot(observed.information[m] * off) / information);
     }
-    if (asked.empty()) return pressure.now.mpa;
+    if (asked.empty()) return FromShape(pressure.now.mpa);
     const double by = Median(asked);
     mpa = skin->pressure_mpa + by;
     if (std::abs(by) < 1e-6) break;
   }
-  return mpa;
+  return FromShape(mpa);
 }
 
 void StateEstimator::WriteShape(SkinShape& shape) const {
+  shape.positions_mm.resize(rest_mm_.size());
+  shape.displacements_mm.resize(rest_mm_.size());
+  shape.covariances_mm2.resize(rest_mm_.size());
   const bool is_answer = estimate_.failure == EstimateFailure::kNone;
   const bool has_baseline = estimate_.baseline_mm.size() > 0;
   for (size_t m = 0; m < rest_mm_.size(); ++m) {
@@ -75,7 +95,8 @@ void StateEstimator::WriteShape(SkinShape& shape) const {
       const Mat3 model = skin_.loads().ModelCovariance(static_cast<int>(m));
       shape.displacements_mm[m] = estimate_.displacements_mm.segment<3>(at) - baseline;
       // Of the model's error and the marker's own observation; both are of the same marker.
-      shape.covariances_mm2[m] = (model.inverse() + measured.information_per_mm2).inverse();
+      shape.covariances_mm2[m] = (model.inverse() + measured.information_per_mm2).inverse() +
+                                 skin_.loads().CameraCovariance(static_cast<int>(m));
       if (measured.information_per_mm2.isZero())
         shape.covariances_mm2[m].diagonal().array() += estimate_.unsettled_mm * estimate_.unsettled_mm;
     } else {
@@ -96,17 +117,36 @@ void StateEstimator::WriteShape(SkinShape& shape) const {
 void StateEstimator::WriteForces(NodalForces& forces) {
   forces.model = estimate_.model;
   forces.converged = estimate_.failure == EstimateFailure::kNone;
-  forces.residual = forces.region_residual = 0;
+  forces.residual = forces.region_residual = forces.camera_shift_mm = 0;
   forces.forces_n.assign(rest_mm_.size(), Vec3::Zero());
   forces.sigmas_n.assign(rest_mm_.size(), 0);
   forces.loaded.clear();
+  forces.limits_n.clear();
+  forces.limit_around_n = 0;
   if (!forces.converged) return;
   forces.residual = std::sqrt(estimate_.loads.chi2_per_dof);
   forces.region_residual = estimate_.loads.region_chi2_per_dof;
+  forces.camera_shift_mm = estimate_.loads.camera_shift_mm;
   ContactWriter writer(skin_, estimate_);
   for (const EstimatedLoad& load : estimate_.loads.loads) writer.Lump(load, forces);
   for (size_t m = 0; m < rest_mm_.size(); ++m) {
     if (!forces.forces_n[m].isZero()) forces.loaded.push_back(static_cast<int>(m));
+  }
+  WriteLimits(forces);
+}
+
+// Of a marker, the worst of its site and those about it, up to the outer rings: what presses beyond is
+// another matter (ReasonId::kBeyondMarkers).
+void StateEstimator::WriteLimits(NodalForces& forces) {
+  const SkinMechanics& mechanics = skin_.mechanics();
+  const Eigen::VectorXd& limits_n = skin_.Limits().by_site_n;
+  forces.limit_around_n = skin_.Limits().around_n;
+  for (int marker = 0; marker < mechanics.marker_count(); ++marker)
+    forces.limits_n.push_back(limits_n[mechanics.markers().node(marker) - mechanics.columns()]);
+  for (size_t site = 0; site < marker_of_site_.size(); ++site) {
+    if (mechanics.IsBeyondMarkers(static_cast<int>(site))) continue;
+    double& limit_n = forces.limits_n[marker_of_site_[site]];
+    limit_n = std::max(limit_n, limits_n[static_cast<Eigen::Index>(site)]);
   }
 }
 
@@ -123,16 +163,25 @@ void StateEstimator::Estimate(const PressurePair& pressure, SkinShape& shape, No
   observation_.pressure = pressure.now;
   observation_.baseline_pressure = pressure.baseline;
   skin_.Estimate(observation_, estimate_);
-  shape.positions_mm.resize(markers);
-  shape.displacements_mm.resize(markers);
-  shape.covariances_mm2.resize(markers);
   WriteShape(shape);
   if (!thesis_) return WriteForces(forces);
   Eigen::VectorXd moved(3 * static_cast<Eigen::Index>(markers));
   for (size_t m = 0; m < markers; ++m)
     moved.segment<3>(3 * static_cast<Eigen::Index>(m)) = shape.displacements_mm[m];
   thesis_->Estimate(moved, pressure.now.mpa - pressure.baseline.mpa, forces);
+  forces.camera_shift_mm = estimate_.loads.camera_shift_mm;
   forces.converged = estimate_.failure == EstimateFailure::kNone;  // or the shape is none
+}
+
+void StateEstimator::GiveUp(const PressurePair& pressure, SkinShape& shape, NodalForces& forces) {
+  const ForceModel model = forces.model;
+  skin_.Forget();
+  estimate_.failure = EstimateFailure::kNotConverged;
+  estimate_.has_shape = false;
+  if (const auto baseline = InflationAt(pressure.baseline.mpa)) estimate_.baseline_mm = *baseline;
+  WriteShape(shape);
+  WriteForces(forces);
+  forces.model = model;
 }
 
 void StateEstimator::FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,

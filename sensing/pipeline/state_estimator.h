@@ -38,6 +38,8 @@ class StateEstimator {
   /// at the inflated skin's, with a covariance that says so. A frame may be looked at several times
   /// (SkinEstimator::Continue, BeginAgain).
   void Estimate(const PressurePair& pressure, SkinShape& shape, NodalForces& forces);
+  /// Instead of Estimate, where too little is seen: as where none can be made. Forgets the frames before.
+  void GiveUp(const PressurePair& pressure, SkinShape& shape, NodalForces& forces);
   /// The contacts of what was estimated last, none where there is no answer. Once a frame, for `finder` gives
   /// them the ids of those of the call before.
   void FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,
@@ -52,16 +54,18 @@ class StateEstimator {
   std::optional<Eigen::VectorXd> InflationAt(double pressure_mpa);
   /// The pressure that explains most markers, where nobody tells it: of each marker the one that its
   /// displacement along the inflation asks for, the median of them. Displacements from the baseline.
-  double PressureFromShape(const MarkerObservations& observed, const PressurePair& pressure);
+  PressureReading PressureFromShape(const MarkerObservations& observed, const PressurePair& pressure);
 
  private:
   void WriteShape(SkinShape& shape) const;
   void WriteForces(NodalForces& forces);
+  void WriteLimits(NodalForces& forces);
 
   const LinkModel model_;
   const std::vector<Vec3> rest_mm_;
   const ForceOptions options_;
   SkinEstimator skin_;
+  std::vector<size_t> marker_of_site_;  // the nearest
   std::unique_ptr<ThesisForce> thesis_;
   SkinObservation observation_;
   SkinEstimate estimate_;

@@ -1,7 +1,6 @@
 #include "sensing/simulation/scene.h"
 
 #include <algorithm>
-#include <fstream>
 #include <span>
 #include <utility>
 
@@ -158,13 +157,13 @@ Result<Scene> ParseScene(const std::string& name, std::string_view text) {
 
 Result<Scene> LoadScene(const std::string& name_or_path) {
   if (const auto text = ShippedSceneText(name_or_path); !text.empty()) return ParseScene(name_or_path, text);
-  if (!std::ifstream(name_or_path)) {
+  auto file = YamlFile::Load(name_or_path);
+  if (!file && file.error().code == ErrorCode::kNotFound) {
     std::string names;
     for (const auto& name : ShippedSceneNames()) names += (names.empty() ? "" : ", ") + name;
     return Error{ErrorCode::kNotFound,
                  "scene '" + name_or_path + "' is neither a file nor a shipped scene (" + names + ")"};
   }
-  auto file = YamlFile::Load(name_or_path);
   if (!file) return file.error();
   return ReadScene(std::move(*file));
 }

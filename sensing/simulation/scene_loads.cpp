@@ -4,10 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include "sensing/core/units.h"
+
 namespace taclink {
 namespace {
 
-constexpr double kMpaPerKpa = 1e-3;
 constexpr double kSameS = 1e-6;  // times that are the same
 constexpr int kFreeSkins = 5;
 

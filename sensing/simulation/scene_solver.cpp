@@ -9,10 +9,9 @@
 namespace taclink {
 namespace {
 
-constexpr double kOffMm = std::numeric_limits<double>::quiet_NaN();  // depth of a disc that is not there
-constexpr double kTouchMm = 0.02;                                    // of a disc that begins to press
-constexpr double kAwayMm = 15;                                       // outside, of a disc that jumps away
-constexpr double kLeastSpanS = 4e-3;                                 // between keys
+constexpr double kTouchMm = 0.02;      // of a disc that begins to press
+constexpr double kAwayMm = 15;         // outside, of a disc that jumps away
+constexpr double kLeastSpanS = 4e-3;   // between keys
 constexpr double kMostRoughness = 10;  // of what is left at that span, by the tolerance
 constexpr double kRateShare = 1e-4;    // of a part, to either side, for rates
 constexpr double kRecallMm = 3;        // from where a state is guessed

@@ -6,12 +6,6 @@
 #include "sensing/simulation/scene_solver.h"
 
 namespace taclink {
-namespace {
-
-constexpr double kOffMm = std::numeric_limits<double>::quiet_NaN();  // depth of a disc that is not there
-
-}  // namespace
-
 Eigen::VectorXf SceneSolver::PlaceOf(const SkinBalance& balance) const {
   Eigen::VectorXf place(6 * static_cast<Eigen::Index>(rest_.mids_mm.size()));
   for (size_t i = 0; i < rest_.mids_mm.size(); ++i) {

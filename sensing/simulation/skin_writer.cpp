@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sensing/core/units.h"
+
 namespace taclink {
 
 double StartTruth(const Scene& scene, double time_s, SkinTruth& truth) {
-  constexpr double kMpaPerKpa = 1e-3;
   const double t = scene.loop ? std::fmod(time_s, scene.duration_s) : std::min(time_s, scene.duration_s);
   truth.time_s = time_s;
   truth.frame = static_cast<uint64_t>(std::max(0.0, std::round(time_s * scene.frame_rate_hz)));

@@ -1,10 +1,14 @@
 #include "sensing/yaml/yaml_reader.h"
 
+#include <yaml-cpp/eventhandler.h>
+
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
 #include <type_traits>
+
+#include "sensing/core/read_file.h"
 
 namespace taclink {
 namespace {
@@ -46,10 +50,47 @@ double Within(Range range, double value) {
   return std::isfinite(value) ? std::clamp(value, range.min, range.max) : 0;
 }
 
+// Of a stream, without making nodes of them.
+class DocumentCounter final : public YAML::EventHandler {
+ public:
+  int count() const { return count_; }
+
+ private:
+  void OnDocumentStart(const YAML::Mark&) override { ++count_; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+  }
+  void OnMapEnd() override {}
+
+  int count_ = 0;
+};
+
+int CountDocuments(std::string_view content) {
+  std::istringstream in{std::string(content)};
+  YAML::Parser parser(in);
+  DocumentCounter counter;
+  while (counter.count() < 2 && parser.HandleNextDocument(counter)) {
+  }
+  return counter.count();
+}
+
 }  // namespace
 
 YamlMap::YamlMap(std::shared_ptr<Context> context, const YAML::Node& node, std::string path, int line)
-    : context_(std::move(context)), node_(node), path_(std::move(path)), line_(LineOf(node_, line)) {}
+    : context_(std::move(context)), node_(node), path_(std::move(path)), line_(LineOf(node_, line)) {
+  if (!node_.IsMap()) return;
+  std::set<std::string> keys;  // the parser would take one of two and say nothing
+  for (const auto& entry : node_) {
+    if (entry.first.IsScalar() && !keys.insert(entry.first.Scalar()).second)
+      FailAt(entry.first, entry.first.Scalar(), "stands here a second time");
+  }
+}
 
 bool YamlMap::Has(const std::string& key) const {
   return node_.IsMap() && node_[key].IsDefined();
@@ -264,15 +305,15 @@ void YamlMap::Done() {
 }
 
 Result<YamlFile> YamlFile::Load(const std::string& path) {
-  const std::ifstream in(path);
-  if (!in) return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path"};
-  std::ostringstream content;
-  content << in.rdbuf();
-  return Parse(path, content.str());
+  const auto content = ReadFile(path);
+  if (!content) return content.error();
+  return Parse(path, *content);
 }
 
 Result<YamlFile> YamlFile::Parse(const std::string& name, std::string_view content) {
   try {
+    if (CountDocuments(content) > 1)
+      return Error{ErrorCode::kInvalidArgument, name + ": holds more than one document, separated by '---'"};
     const YAML::Node node = YAML::Load(std::string(content));
     if (!node.IsMap()) {
       return Error{ErrorCode::kInvalidArgument, name + ":1: must be a mapping (key: value) at the top"};

@@ -25,8 +25,8 @@ inline constexpr Range kNotNegative{.min = 0};
 
 /// Reads one mapping of a YAML file strictly. A getter that fails records the error (the first one of the
 /// file is kept, with file, line and what was expected) and returns a default, so that a reader is a plain
-/// list of fields; `Done` then reports keys that nobody asked for. YamlFile::Finish says whether all went
-/// well.
+/// list of fields; `Done` then reports keys that nobody asked for. A key that stands twice is an error, too.
+/// YamlFile::Finish says whether all went well.
 class YamlMap {
  public:
   bool Has(const std::string& key) const;

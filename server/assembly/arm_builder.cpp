@@ -1,5 +1,6 @@
 #include "server/assembly/arm_builder.h"
 
+#include <algorithm>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -9,6 +10,7 @@
 
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/state_estimator.h"
+#include "sensing/simulation/scene.h"
 #include "server/assembly/encoder.h"
 #include "server/assembly/pressure_factory.h"
 #include "server/assembly/processor_factory.h"
@@ -38,23 +40,37 @@ class ChosenForceModel {
   std::optional<ForceModel> model_;  // guarded by mutex_; none: by tolerance, frame by frame
 };
 
+Result<bool> IsInflatedByScene(const LinkConfig& link) {
+  const auto* simulated = std::get_if<SimulatedSourceConfig>(&link.source);
+  if (simulated == nullptr) return false;
+  const auto scene = LoadScene(simulated->scene);
+  if (!scene) return scene.error();
+  return std::ranges::any_of(scene->pressure, [](const PressureKey& key) { return key.kpa != 0; });
+}
+
 Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock, const BackgroundRunner& background) {
   auto model = LoadLinkModel(link.model);
   if (!model) return model.error();
   if (const auto good = CheckRules(link.rules, model->markers); !good) return good.error();
+  const auto inflated = IsInflatedByScene(link);
+  if (!inflated) return inflated.error();
+  if (const auto good = CheckForceModel(link, *inflated); !good)
+    return Error{good.error().code, "force_model " + good.error().message};
   const auto chosen = std::make_shared<ChosenForceModel>(link.force_model);
   const LinkFactories factories = {
       .source = [link, model = *model, &clock] { return MakeSource(link, model, clock); },
       .processor = [link, model = *model, chosen,
                     background] { return MakeProcessor(chosen->In(link), model, background); },
-      .estimator =
-          [link, model = *model, background](std::optional<ForceModel> force_model) {
-            LinkConfig changed = link;
-            changed.force_model = force_model;
-            ForceOptions options = ToPipelineOptions(changed).force;
-            options.background = background;
-            return MakeStateEstimator(model, options);
-          },
+      .estimator = [link, model = *model, background, is_inflated = *inflated](
+                       std::optional<ForceModel> force_model) -> Result<std::shared_ptr<StateEstimator>> {
+        LinkConfig changed = link;
+        changed.force_model = force_model;
+        if (auto good = CheckForceModel(changed, is_inflated); !good)
+          return Error{good.error().code, "the force model " + good.error().message};
+        ForceOptions options = ToPipelineOptions(changed).force;
+        options.background = background;
+        return std::shared_ptr<StateEstimator>(MakeStateEstimator(model, options));
+      },
       .choose = [chosen](std::optional<ForceModel> force_model) { chosen->Set(force_model); }};
   auto source = factories.source();
   if (!source) return source.error();
@@ -73,15 +89,14 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock, const Backgrou
                    .realtime = link.realtime};
 }
 
-// Null without a URDF: then the links' own poses are relative to the base.
+}  // namespace
+
 Result<std::unique_ptr<ArmPoses>> BuildPoses(const Config& config) {
   if (!config.kinematics.urdf) return std::unique_ptr<ArmPoses>();
   auto kinematics = ArmKinematics::Load(*config.kinematics.urdf, config.kinematics.base);
   if (!kinematics) return kinematics.error();
   return MakePoses(config, std::move(*kinematics));
 }
-
-}  // namespace
 
 Result<std::unique_ptr<ArmPoses>> MakePoses(const Config& config,
                                             std::shared_ptr<const ArmKinematics> kinematics) {

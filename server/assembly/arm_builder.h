@@ -16,6 +16,10 @@ std::vector<Result<LinkParts>> BuildLinks(const Config& config, Clock& clock);
 Result<std::unique_ptr<ArmPoses>> MakePoses(const Config& config,
                                             std::shared_ptr<const ArmKinematics> kinematics);
 
+/// Null without a URDF: then the links' own poses are relative to the base. Errors: as ArmKinematics::Load
+/// and MakePoses.
+Result<std::unique_ptr<ArmPoses>> BuildPoses(const Config& config);
+
 /// Builds the configured arm, not started. Errors name the link.
 Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock);
 

@@ -13,8 +13,8 @@ struct ConfigFindings {
 };
 
 /// Makes all that the configuration names (models, scenes, calibrations, picture folders; certificate and
-/// tokens) without starting anything, and looks at the cameras' names and at what is open to other machines,
-/// which `insecure_open` allows.
+/// tokens) without starting anything, and looks at the cameras' names, at the addresses to listen on, at
+/// where it would write, and at what is open to other machines, which `insecure_open` allows.
 ConfigFindings CheckConfig(const Config& config, bool insecure_open);
 
 }  // namespace taclink::server

@@ -4,9 +4,8 @@
 #include <unistd.h>
 
 #include <array>
-#include <fstream>
-#include <sstream>
 
+#include "sensing/core/read_file.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/options_text.h"
 #include "server/assembly/processor_factory.h"
@@ -23,13 +22,11 @@ std::string HostName() {
 }
 
 void AddFile(const std::string& name, const char* media_type, const std::string& path, LogPreamble& out) {
-  const std::ifstream in(path);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (in) {
-    out.files.push_back({name, media_type, text.str()});
+  auto text = ReadFile(path);
+  if (text) {
+    out.files.push_back({name, media_type, *std::move(text)});
   } else {
-    spdlog::warn("recording: {} cannot be read, so logs will not hold it", path);
+    SPDLOG_WARN("recording: {}; logs will not hold it", text.error().message);
   }
 }
 

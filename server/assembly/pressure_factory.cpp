@@ -3,13 +3,12 @@
 #include <cmath>
 #include <utility>
 
+#include "sensing/core/units.h"
 #include "server/pressure/pressure_readers.h"
 #include "server/pressure/pressure_sensor.h"
 
 namespace taclink::server {
 namespace {
-
-constexpr double kMpaPerKpa = 1e-3;
 
 struct PressureMaker {
   const std::string& link;

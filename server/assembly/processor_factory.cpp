@@ -6,11 +6,12 @@
 #include <utility>
 
 #include "sensing/camera/calibration.h"
+#include "sensing/core/units.h"
 
 namespace taclink::server {
 namespace {
 
-constexpr double kMpaPerKpa = 1e-3, kMpaPerPa = 1e-6;
+constexpr double kMpaPerPa = 1e-6;
 
 bool IsMissing(const std::string& path) {
   std::error_code ignored;
@@ -25,6 +26,8 @@ class PipelineProcessor final : public LinkProcessor {
 
   void Process(const StereoFrame& frame, LinkState& state) override {
     pipeline_.Process(frame, state);
+    // Where no forces are known the rest pictures themselves must show that nothing touches: a calibration is
+    // what mends that.
     touched_ = !state.contacts.empty();
   }
 
@@ -95,6 +98,7 @@ PipelineOptions ToPipelineOptions(const LinkConfig& link) {
   options.force.model = link.force_model;
   options.force.refinement = link.force_refinement;
   options.drift = link.drift;
+  options.pictures_may_repeat = !std::holds_alternative<V4l2SourceConfig>(link.source);
   if (link.pressure) {
     if (const auto* constant = std::get_if<ConstantPressureConfig>(&link.pressure->source))
       options.pressure_mpa = constant->kpa * kMpaPerKpa;
@@ -108,7 +112,7 @@ Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, con
   PipelineOptions options = ToPipelineOptions(link);
   options.force.background = background;
   if (link.calibration && IsMissing(*link.calibration)) {
-    spdlog::warn(
+    SPDLOG_WARN(
         "link {}: {} does not exist yet; the first pictures calibrate the cameras instead. "
         "'taclink calibrate --link {} --save' writes it",
         link.name, *link.calibration, link.name);

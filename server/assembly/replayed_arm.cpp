@@ -57,8 +57,8 @@ Result<std::unique_ptr<ArmPoses>> BuildPoses(const ReplayedLog& log, const Confi
   if (!config.kinematics.urdf) return std::unique_ptr<ArmPoses>();
   const auto xml = AttachmentOf(log, wire::log::kUrdfAttachment);
   if (!xml) {
-    spdlog::warn("{}; links are shown where their poses say, as if all frames were the base",
-                 xml.error().message);
+    SPDLOG_WARN("{}; links are shown where their poses say, as if all frames were the base",
+                xml.error().message);
     return std::unique_ptr<ArmPoses>();
   }
   auto kinematics =

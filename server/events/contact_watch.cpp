@@ -85,7 +85,9 @@ void ContactWatch::Take(const LinkState& state, std::vector<Told>& told) {
                              [&](const Contact& contact) { return contact.id == track.current; });
   }
   for (const Contact& contact : state.contacts) Follow(contact, now_ns, told);
-  const char* const reason = !state.measured() ? "not measured" : new_baseline_ ? "new baseline" : "released";
+  const char* const reason = !state.measured() || !state.has_forces() ? "not measured"
+                             : new_baseline_                          ? "new baseline"
+                                                                      : "released";
   for (Track& track : tracks_) {
     if (!track.begun || now_ns - track.strong_ns < Ns(options_.release_s)) continue;
     Tell(EventKind::kContactEnd, track, now_ns, told);

@@ -10,6 +10,7 @@
 #include <random>
 #include <utility>
 
+#include "sensing/core/printable.h"
 #include "server/thread_setup.h"
 
 namespace taclink::server {
@@ -18,6 +19,7 @@ namespace {
 constexpr size_t kQueue = 256;  // frames
 constexpr size_t kMostPosts = 1024;
 constexpr size_t kLongestText = 256;  // of what clients may have sent: the history must not grow by it
+constexpr size_t kLongestAudit = 4096;
 constexpr int64_t kBeatNs = 1'000'000'000;
 constexpr std::chrono::milliseconds kPoll{100};  // how soon a beat that is due is noticed
 
@@ -105,7 +107,7 @@ void EventEngine::Drain() {
     TakeFrames();
     TellLostFrames();
   } catch (const std::exception& e) {
-    spdlog::error("events: {}", e.what());
+    SPDLOG_ERROR("events: {}", e.what());
   }
   if (clock_.MonotonicNs() - beat_ns_ < kBeatNs) return;
   beat_ns_ = clock_.MonotonicNs();
@@ -119,8 +121,12 @@ void EventEngine::TakePosts() {
     std::swap(posts, posts_);
   }
   for (Posted& post : posts) {
+    if (!post.kind) {
+      audit_.Write(post.what, post.operation, clock_.UtcNs());
+      continue;
+    }
     Event event;
-    event.kind = post.kind;
+    event.kind = *post.kind;
     event.link = post.link;
     event.detail = std::move(post.operation);
     Raise(std::move(event));
@@ -161,15 +167,24 @@ void EventEngine::Raise(Event event) {
 }
 
 void EventEngine::Post(EventKind kind, std::optional<size_t> link, Operation operation) {
-  operation.who.resize(std::min(operation.who.size(), kLongestText));
-  operation.outcome.resize(std::min(operation.outcome.size(), kLongestText));
+  operation.who.resize(Cut(operation.who, kLongestText).kept.size());
+  operation.outcome.resize(Cut(operation.outcome, kLongestText).kept.size());
+  Take({kind, Name(kind), link, std::move(operation)});
+}
+
+void EventEngine::Audit(const std::string& what, Operation operation) {
+  operation.outcome.resize(Cut(operation.outcome, kLongestAudit).kept.size());
+  Take({std::nullopt, what, std::nullopt, std::move(operation)});
+}
+
+void EventEngine::Take(Posted posted) {
   {
     const std::lock_guard lock(mutex_);
     if (posts_.size() >= kMostPosts) {
-      spdlog::error("events: too many at once; one of kind {} is lost", Name(kind));
+      SPDLOG_ERROR("events: too many at once; one of kind {} is lost", posted.what);
       return;
     }
-    posts_.push_back({kind, link, std::move(operation)});
+    posts_.push_back(std::move(posted));
   }
   signal_->Set();
 }

@@ -50,6 +50,8 @@ class EventEngine {
   /// Something was asked of a link (none: of the whole arm). Any thread, at once: it is told and audited by
   /// the engine's thread. Of more than 1024 that wait, the newest are left out, which the log says.
   void Post(EventKind kind, std::optional<size_t> link, Operation operation);
+  /// Something that is no event of the arm, but for the audit: `what` it is about. Otherwise likewise.
+  void Audit(const std::string& what, Operation operation);
 
   /// In force from the next frame on; told and audited. Errors: kInvalidArgument, kNotFound (no such region).
   Result<void> SetThresholds(size_t link, const std::string& region, const Thresholds& thresholds,
@@ -61,11 +63,13 @@ class EventEngine {
  private:
   struct Signal;
   struct Posted {
-    EventKind kind;
+    std::optional<EventKind> kind;  // none: for the audit only
+    std::string what;               // the kind's name, or what the audit is about
     std::optional<size_t> link;
     Operation operation;
   };
 
+  void Take(Posted posted);
   void Run(const std::stop_token& stop);
   void Drain();
   void TakePosts();

@@ -29,7 +29,8 @@ ForceLevel ForceWatch::LevelAt(double force_n) const {
 }
 
 void ForceWatch::Take(const LinkState& state, std::vector<ForceLevelDetail>& told) {
-  if (!state.measured()) return;
+  // A level stays: nobody has seen that the force is gone.
+  if (!state.measured() || !state.has_forces()) return;
   const Contact* strongest = nullptr;
   force_n_ = 0;
   for (const Contact& contact : state.contacts) {

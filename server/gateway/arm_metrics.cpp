@@ -1,6 +1,7 @@
 #include "server/gateway/arm_metrics.h"
 
 #include <array>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -94,14 +95,19 @@ void AddArmMetrics(const Arm& arm, MetricsText& metrics) {
           [&](size_t link) { return statistics[link].rate_hz; });
   AddEach(arm, metrics.Counter("taclink_link_source_restarts_total", "Starts of the source after the first"),
           [&](size_t link) { return sources[link].restarts; });
-  AddEach(arm, metrics.Gauge("taclink_link_contacts", "Contacts in the newest frame"), [&](size_t link) {
-    const auto latest = arm.hub().Latest(link);
-    return latest ? latest->state().contacts.size() : 0;
-  });
+  AddEach(arm, metrics.Gauge("taclink_link_contacts", "Contacts in the newest frame; NaN: not known"),
+          [&](size_t link) {
+            const auto latest = arm.hub().Latest(link);
+            return latest && latest->state().has_forces()
+                       ? static_cast<double>(latest->state().contacts.size())
+                       : std::nan("");
+          });
   AddEach(arm, metrics.Gauge("taclink_link_total_force_newtons", "Size of the sum of all contact forces"),
           [&](size_t link) {
             const auto latest = arm.hub().Latest(link);
-            return latest ? latest->state().total_force_n.norm() : 0.0;
+            if (!latest) return std::nan("");
+            const LinkState& state = latest->state();
+            return state.has_forces() ? state.total_force_n.norm() : std::nan("");
           });
   AddStatus(arm, metrics);
   AddSupervision(arm, metrics);

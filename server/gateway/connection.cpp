@@ -16,19 +16,19 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 
-constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
+constexpr auto kAwaitTransfer = asio::as_tuple(asio::use_awaitable);
 
 template <typename Stream>
 asio::awaitable<size_t> ReadSome(Stream& stream, std::span<char> place) {
   const auto [error, size] =
-      co_await stream.async_read_some(asio::buffer(place.data(), place.size()), kAwait);
+      co_await stream.async_read_some(asio::buffer(place.data(), place.size()), kAwaitTransfer);
   co_return error ? 0 : size;
 }
 
 template <typename Stream>
 asio::awaitable<bool> WriteAll(Stream& stream, std::string_view bytes) {
   const auto [error, size] =
-      co_await asio::async_write(stream, asio::buffer(bytes.data(), bytes.size()), kAwait);
+      co_await asio::async_write(stream, asio::buffer(bytes.data(), bytes.size()), kAwaitTransfer);
   co_return !error && size == bytes.size();
 }
 
@@ -72,7 +72,7 @@ class TlsConnection final : public Connection {
   TlsConnection(tcp::socket socket, std::shared_ptr<asio::ssl::context> tls)
       : tls_(std::move(tls)), stream_(std::move(socket), *tls_) {}
   asio::awaitable<bool> Handshake() override {
-    const auto [error] = co_await stream_.async_handshake(asio::ssl::stream_base::server, kAwait);
+    const auto [error] = co_await stream_.async_handshake(asio::ssl::stream_base::server, kAwaitTransfer);
     co_return !error;
   }
   std::string ClientName() override { return CommonNameOfPeer(stream_.native_handle()); }

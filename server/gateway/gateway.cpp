@@ -1,5 +1,6 @@
 #include "server/gateway/gateway.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -10,13 +11,17 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <functional>
+#include <map>
 #include <optional>
-#include <set>
+#include <string>
 #include <thread>
 #include <utility>
 
 #include "server/config.h"
 #include "server/gateway/session.h"
+#include "server/party.h"
+#include "server/shares.h"
 #include "server/thread_setup.h"
 
 namespace taclink::server {
@@ -63,7 +68,7 @@ std::shared_ptr<asio::ssl::context> MakeTls(const TlsMaterial& material) {
     if (good()) tls->set_verify_mode(asio::ssl::verify_peer | asio::ssl::verify_fail_if_no_peer_cert, error);
   }
   if (good()) return tls;
-  spdlog::error("http: the certificate cannot be used: {}", error.message());
+  SPDLOG_ERROR("http: the certificate cannot be used: {}", error.message());
   return nullptr;
 }
 
@@ -85,7 +90,8 @@ struct Gateway::Running {
   asio::awaitable<void> Accept();
   asio::awaitable<void> Sweep();
   asio::awaitable<void> Serve(std::shared_ptr<Session> session);
-  bool MakeRoom();
+  Result<void> MakeRoom(const Place& from);
+  bool EndLongestWaiting(const std::function<bool(const Place&)>& among);
   std::shared_ptr<asio::ssl::context> CurrentTls();
   void StopListening();
   void Stop();
@@ -97,7 +103,7 @@ struct Gateway::Running {
   tcp::acceptor acceptor;
   asio::steady_timer sweep_timer;
   bool stopping = false;
-  std::set<std::shared_ptr<Session>> sessions;
+  std::map<std::shared_ptr<Session>, Place> sessions;
   std::shared_ptr<const TlsMaterial> tls_material;
   std::shared_ptr<asio::ssl::context> tls;
 
@@ -139,20 +145,46 @@ std::shared_ptr<asio::ssl::context> Gateway::Running::CurrentTls() {
   return tls;
 }
 
-// Ends the connection that has waited longest for a request, if all places are taken: those who open
-// connections and say nothing keep nobody out.
-bool Gateway::Running::MakeRoom() {
-  if (sessions.size() < shared->options.max_connections) return true;
+// False: none of them waits for a request.
+bool Gateway::Running::EndLongestWaiting(const std::function<bool(const Place&)>& among) {
   std::shared_ptr<Session> oldest;
-  for (const auto& session : sessions) {
+  for (const auto& [session, place] : sessions) {
     const auto since = session->waiting_since();
-    if (since && (!oldest || *since < *oldest->waiting_since())) oldest = session;
+    if (since && among(place) && (!oldest || *since < *oldest->waiting_since())) oldest = session;
   }
-  ++shared->services.counts->refused;
   if (!oldest) return false;
   oldest->Close();
   sessions.erase(oldest);
   return true;
+}
+
+// Where all places that the new connection may take are taken, the one among them that has waited longest for
+// a request ends: those who open connections and say nothing keep nobody out. Errors: kResourceExhausted.
+Result<void> Gateway::Running::MakeRoom(const Place& from) {
+  const size_t most = shared->options.max_connections,
+               most_per_peer = shared->options.max_connections_per_peer;
+  const auto of_peer = [&](const Place& place) { return place.address == from.address; };
+  const auto remote = [](const Place& place) { return !place.local; };
+  const auto count = [this](const auto& which) {
+    return static_cast<size_t>(std::count_if(sessions.begin(), sessions.end(),
+                                             [&](const auto& each) { return which(each.second); }));
+  };
+  bool made = true;
+  std::string taken, setting = "http.max_connections";
+  if (count(of_peer) >= most_per_peer) {
+    taken = fmt::format("all {} connections of {}", most_per_peer, from.address);
+    setting = "http.max_connections_per_peer";
+    made = EndLongestWaiting(of_peer);
+  } else if (!from.local && count(remote) >= most - Kept(most)) {
+    taken = fmt::format("all {} connections but those kept for this machine", most - Kept(most));
+    made = EndLongestWaiting(remote);
+  } else if (sessions.size() >= most) {
+    taken = fmt::format("all {} connections", most);
+    made = EndLongestWaiting([](const Place&) { return true; });
+  }
+  if (!taken.empty()) ++shared->services.counts->refused;
+  if (made) return {};
+  return Error{ErrorCode::kResourceExhausted, taken + " are in use; close one or raise " + setting};
 }
 
 asio::awaitable<void> Gateway::Running::Accept() {
@@ -160,29 +192,35 @@ asio::awaitable<void> Gateway::Running::Accept() {
     auto [error, socket] = co_await acceptor.async_accept(kAwait);
     if (error) {
       if (!acceptor.is_open()) break;
+      SPDLOG_ERROR("http: a connection can't be accepted: {}; raise LimitNOFILE, or end some clients",
+                   error.message());
       asio::steady_timer pause(shared->loop, kAcceptPause);
       co_await pause.async_wait(kAwait);
       continue;
     }
-    if (!MakeRoom()) continue;  // the socket closes
     boost::system::error_code ignored;
+    const std::string peer = PeerText(socket.remote_endpoint(ignored));
+    const Place place = PlaceOf(peer);
+    if (const auto room = MakeRoom(place); !room) {
+      SPDLOG_INFO("http {}: connection refused: {}", peer, room.error().message);
+      continue;  // the socket closes
+    }
     socket.set_option(tcp::no_delay(true), ignored);
-    const tcp::endpoint remote = socket.remote_endpoint(ignored);
     auto current = CurrentTls();
     if (tls_material && !current) continue;
-    auto session = std::make_shared<Session>(shared, MakeConnection(std::move(socket), std::move(current)),
-                                             PeerText(remote));
+    auto session =
+        std::make_shared<Session>(shared, MakeConnection(std::move(socket), std::move(current)), peer);
+    sessions.emplace(session, place);
     asio::co_spawn(shared->loop, Serve(std::move(session)), asio::detached);
   }
 }
 
 asio::awaitable<void> Gateway::Running::Serve(std::shared_ptr<Session> session) {
-  sessions.insert(session);
   ++shared->services.counts->connections;
   try {
     co_await session->Run();
   } catch (const std::exception& e) {
-    spdlog::error("http: a connection failed: {}", e.what());
+    SPDLOG_ERROR("http: a connection failed: {}", e.what());
     session->Close();
   }
   --shared->services.counts->connections;
@@ -194,7 +232,7 @@ asio::awaitable<void> Gateway::Running::Sweep() {
     sweep_timer.expires_after(SweepInterval(shared->options));
     co_await sweep_timer.async_wait(kAwait);
     const auto now = steady_clock::now();
-    for (const auto& session : sessions) session->CloseIfLate(now);
+    for (const auto& [session, place] : sessions) session->CloseIfLate(now);
   }
 }
 
@@ -208,7 +246,7 @@ void Gateway::Running::Stop() {
   stopping = true;
   StopListening();
   sweep_timer.cancel();
-  for (const auto& session : sessions) session->Close();
+  for (const auto& [session, place] : sessions) session->Close();
 }
 
 Gateway::Gateway(std::unique_ptr<Running> running) : running_(std::move(running)) {}

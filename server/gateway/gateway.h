@@ -18,9 +18,10 @@ class Channel;
 namespace taclink::server {
 
 struct GatewayOptions {
-  std::string listen = {};    ///< host:port or [ip6]:port; port 0: any free one
-  std::string web_root = {};  ///< folder of the web page; empty: the one built in
-  size_t max_connections = 128;
+  std::string listen = {};               ///< host:port or [ip6]:port; port 0: any free one
+  std::string web_root = {};             ///< folder of the web page; empty: the one built in
+  size_t max_connections = 128;          ///< a quarter is kept for this machine
+  size_t max_connections_per_peer = 32;  ///< of one address
   std::chrono::milliseconds header_timeout{10'000};
   std::chrono::milliseconds idle_timeout{60'000};
   std::chrono::milliseconds write_timeout{120'000};

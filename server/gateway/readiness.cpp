@@ -2,7 +2,7 @@
 
 namespace taclink::server {
 
-Readiness CheckReadiness(const Arm& arm) {
+Readiness CheckReadiness(const Arm& arm, const Security& security) {
   Readiness out;
   std::string not_ready;
   for (size_t link = 0; link < arm.links().size(); ++link) {
@@ -17,7 +17,18 @@ Readiness CheckReadiness(const Arm& arm) {
     if (latest && !latest->state().status_reason.empty()) not_ready += ", " + latest->state().status_reason;
     not_ready += "\n";
   }
-  out.text = (out.ready ? "ready\n" : "not ready: no link has frames\n") + not_ready;
+  // Anybody may read this: the log names the files.
+  const SecurityStatus access = security.Status();
+  const bool measures = out.ready;
+  out.ready = measures && !access.refuses_all;
+  out.text = out.ready  ? "ready\n"
+             : measures ? "not ready: no token is good\n"
+                        : "not ready: no link has frames\n";
+  out.text += not_ready;
+  if (!access.trouble.empty())
+    out.text += access.refuses_all
+                    ? "security: nobody is let in, for no token is good; the log says why\n"
+                    : "security: tokens or certificates can't be read anew; the log says why\n";
   return out;
 }
 

@@ -5,7 +5,8 @@
 
 namespace taclink::server {
 
-/// Ready while at least one link measures or will soon (neither STARTING nor LOST); tells which are not.
-Readiness CheckReadiness(const Arm& arm);
+/// Ready while at least one link measures or will soon (neither STARTING nor LOST), and somebody may call;
+/// tells what is not.
+Readiness CheckReadiness(const Arm& arm, const Security& security);
 
 }  // namespace taclink::server

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/gateway/http_target.h"
+#include "server/party.h"
 
 namespace taclink::server {
 namespace {
@@ -43,6 +44,10 @@ int HttpStatusOf(ErrorCode code) {
       return 403;
     case ErrorCode::kNotFound:
       return 404;
+    case ErrorCode::kResourceExhausted:
+      return 429;
+    case ErrorCode::kFailedPrecondition:
+      return 503;
     default:
       return 400;
   }
@@ -54,6 +59,10 @@ int GrpcStatusOf(ErrorCode code) {
       return 3;
     case ErrorCode::kPermissionDenied:
       return 7;
+    case ErrorCode::kResourceExhausted:
+      return 8;
+    case ErrorCode::kFailedPrecondition:
+      return 9;
     case ErrorCode::kUnsupported:
       return 12;
     case ErrorCode::kUnauthenticated:
@@ -203,7 +212,8 @@ Session::Outcome Session::Answer(const HttpRequest& request) {
 
 Session::Outcome Session::AnswerPage(const HttpRequest& request, const std::string& path) {
   if (path != "/healthz" && path != "/readyz" && path != "/metrics") return AnswerFile(request, path);
-  const auto caller = shared_->services.security->Check(path, request.Header("authorization"));
+  const auto caller =
+      shared_->services.security->Check(path, request.Header("authorization"), PlaceOf(peer_).address);
   if (!caller)
     return AnswerText(request, HttpStatusOf(caller.error().code), kPlainText, caller.error().message + "\n");
   if (path == "/healthz") return AnswerText(request, 200, kPlainText, "ok\n");
@@ -214,9 +224,10 @@ Session::Outcome Session::AnswerPage(const HttpRequest& request, const std::stri
 
 Session::Outcome Session::AnswerText(const HttpRequest& request, int status, std::string_view type,
                                      std::string text) {
-  const bool keep = request.keep_alive && status != 503;
+  const bool keep = request.keep_alive && status != 503 && status != 429;
   HttpHeaders headers = CommonHeaders(type, "no-store");
   if (status == 401) headers.emplace_back("WWW-Authenticate", "Bearer");
+  if (status == 429) headers.emplace_back("Retry-After", "60");
   if (status == 405) headers.emplace_back("Allow", "GET, HEAD, POST");
   std::string out = ResponseHead(status, headers, text.size(), keep);
   if (request.method != "HEAD") out += text;
@@ -249,9 +260,10 @@ Session::Outcome Session::AnswerFile(const HttpRequest& request, const std::stri
 }
 
 Result<GrpcCallRequest> Session::ToCall(const HttpRequest& request, WebFormat format) const {
-  const auto caller = shared_->services.security->Check(request.target, request.Header("authorization"));
+  const auto caller = shared_->services.security->Check(request.target, request.Header("authorization"),
+                                                        PlaceOf(peer_).address);
   if (!caller) {
-    spdlog::info("http {}: {} refused: {}", peer_, request.target, caller.error().message);
+    SPDLOG_INFO("http {}: {} refused: {}", peer_, request.target, caller.error().message);
     return caller.error();
   }
   auto messages = DecodeMessages(format, request.body);

@@ -14,11 +14,11 @@ namespace taclink::server {
 /// The gateway of an arm's server, as configured. Null: it is off, or no address was configured and the usual
 /// one is taken (which is logged). Arm, server and publisher (null: none) outlive it.
 Result<std::unique_ptr<Gateway>> StartGateway(const HttpConfig& config, const Arm& arm, RpcServer& server,
-                                              std::shared_ptr<const Security> security,
+                                              const std::shared_ptr<const Security>& security,
                                               const Publisher* publisher = nullptr);
 
 /// What /metrics tells.
 std::string MetricsOf(const Arm& arm, const RpcServer& server, const GatewayCounts& counts,
-                      const Publisher* publisher = nullptr);
+                      const Security& security, const Publisher* publisher = nullptr);
 
 }  // namespace taclink::server

@@ -1,13 +1,12 @@
 #include "server/kinematics/arm_kinematics.h"
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <kdl/chainfksolverpos_recursive.hpp>
 #include <kdl/chainjnttojacsolver.hpp>
 #include <set>
 #include <utility>
 
+#include "sensing/core/read_file.h"
 #include "server/kinematics/urdf_tree.h"
 
 namespace taclink::server {
@@ -77,13 +76,9 @@ ArmKinematics::~ArmKinematics() = default;
 
 Result<std::shared_ptr<const ArmKinematics>> ArmKinematics::Load(const std::string& path,
                                                                  const std::string& base) {
-  std::error_code code;
-  const auto size = std::filesystem::file_size(path, code);
-  std::ifstream in(path);
-  if (code || !in)
-    return Error{ErrorCode::kNotFound, path + ": cannot be opened; check the path of the URDF"};
-  if (size > kMaxFileBytes) return Error{ErrorCode::kInvalidArgument, path + ": too large for a URDF"};
-  return Parse(path, std::string(std::istreambuf_iterator<char>(in), {}), base);
+  const auto xml = ReadFile(path);
+  if (!xml) return Error{xml.error().code, "URDF " + xml.error().message};
+  return Parse(path, *xml, base);
 }
 
 Result<std::shared_ptr<const ArmKinematics>> ArmKinematics::Parse(const std::string& name,

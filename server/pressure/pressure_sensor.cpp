@@ -7,12 +7,12 @@
 #include <exception>
 #include <utility>
 
+#include "sensing/core/units.h"
 #include "server/thread_setup.h"
 
 namespace taclink::server {
 namespace {
 
-constexpr double kMpaPerKpa = 1e-3;
 constexpr double kLargestMpa = 0.1;  // as the configuration's constant
 constexpr std::chrono::milliseconds kPoll{100};
 
@@ -105,9 +105,9 @@ void PressureSensor::SetTrouble(std::string trouble) {
     trouble_ = trouble;
   }
   if (trouble.empty()) {
-    spdlog::info("link {}: the pressure sensor gives readings", name_);
+    SPDLOG_INFO("link {}: the pressure sensor gives readings", name_);
   } else {
-    spdlog::warn("link {}: pressure sensor: {}", name_, trouble);
+    SPDLOG_WARN("link {}: pressure sensor: {}", name_, trouble);
   }
 }
 

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/security/secret_file.h"
+
 namespace taclink::server {
 namespace {
 
@@ -47,9 +49,11 @@ Error Wrong(const std::string& what, natsStatus status) {
 }
 
 Result<std::string> ReadToken(const std::string& file) {
-  std::ifstream in(file);
+  const auto text = ReadSecretFile("publish.token_file", file);
+  if (!text) return text.error();
   std::string token;
-  if (!(in >> token)) return Error{ErrorCode::kNotFound, "publish.token_file: " + file + " holds no token"};
+  if (!(std::istringstream(*text) >> token))
+    return Error{ErrorCode::kNotFound, "publish.token_file: " + file + " holds no token"};
   return token;
 }
 
@@ -63,12 +67,13 @@ Result<void> SetSecrets(const PublishConfig& config, natsOptions* options) {
   if (good && !config.tls_ca.empty())
     good = check("tls_ca " + config.tls_ca,
                  natsOptions_LoadCATrustedCertificates(options, config.tls_ca.c_str()));
+  if (good && !config.key.empty()) good = CheckSecretFile("publish.key", config.key);
   if (good && !config.certificate.empty())
     good = check("certificate " + config.certificate,
                  natsOptions_LoadCertificatesChain(options, config.certificate.c_str(), config.key.c_str()));
   if (good && !config.credentials.empty()) {
-    if (!std::ifstream(config.credentials))
-      return Error{ErrorCode::kNotFound, "publish.credentials: " + config.credentials + " cannot be read"};
+    if (const auto text = ReadSecretFile("publish.credentials", config.credentials); !text)
+      return text.error();
     good = check("credentials",
                  natsOptions_SetUserCredentialsFromFiles(options, config.credentials.c_str(), nullptr));
   }

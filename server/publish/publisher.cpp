@@ -134,7 +134,7 @@ void Publisher::Close(std::chrono::milliseconds limit) {
   connection_.reset();
   const OutboxCounts counts = outbox_.counts();
   const size_t left = counts.waiting + counts.in_flight;
-  if (left > 0) spdlog::warn("publish: {} messages were not acknowledged and are lost", left);
+  if (left > 0) SPDLOG_WARN("publish: {} messages were not acknowledged and are lost", left);
 }
 
 void Publisher::Run(const std::stop_token& stop) {
@@ -264,10 +264,10 @@ void Publisher::SetTrouble(const std::string& trouble) {
   if (trouble_ == trouble) return;
   const OutboxCounts counts = outbox_.counts();
   if (trouble.empty()) {
-    spdlog::info("publish: stream {} takes what comes; {} messages waited, {} frames gave way",
-                 config_.stream, counts.waiting, counts.frames_dropped);
+    SPDLOG_INFO("publish: stream {} takes what comes; {} messages waited, {} frames gave way", config_.stream,
+                counts.waiting, counts.frames_dropped);
   } else {
-    spdlog::warn("publish: {}; events and contacts wait, up to {} MB", trouble, config_.queue_mb);
+    SPDLOG_WARN("publish: {}; events and contacts wait, up to {} MB", trouble, config_.queue_mb);
   }
   trouble_ = trouble;
 }

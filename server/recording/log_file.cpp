@@ -1,5 +1,6 @@
 #include "server/recording/log_file.h"
 
+#include <filesystem>
 #include <utility>
 
 namespace taclink::server {
@@ -7,20 +8,29 @@ namespace taclink::server {
 Result<std::unique_ptr<LogFile>> LogFile::Create(const LogFolder& folder, const std::string& name,
                                                  const LogPreamble& preamble, mcap::WriterOptions options,
                                                  int64_t utc_ns) {
-  auto sink = mcap::FileSink::Create(folder.PartPath(name));
+  auto sink = mcap::FileSink::Create(folder.PartPath(name), folder.calls());
   if (!sink) return sink.error();
   std::unique_ptr<LogFile> file(new LogFile(folder, name, std::move(*sink), utc_ns));
-  auto writer = wire::log::LogWriter::Create(*file->sink_, std::move(options));
-  if (!writer) return writer.error();
-  file->writer_ = std::move(*writer);
-  for (const auto& [record, content] : preamble.metadata) {
-    if (const auto added = file->writer_->AddMetadata(record, content); !added) return added.error();
-  }
-  for (const LogPreamble::File& one : preamble.files) {
-    const auto added = file->writer_->AddAttachment(one.name, one.media_type, one.text, utc_ns);
-    if (!added) return added.error();
+  if (const auto begun = file->Begin(preamble, std::move(options)); !begun) {
+    std::error_code ignored;  // nothing is in it
+    std::filesystem::remove(folder.PartPath(name), ignored);
+    return begun.error();
   }
   return file;
+}
+
+Result<void> LogFile::Begin(const LogPreamble& preamble, mcap::WriterOptions options) {
+  auto writer = wire::log::LogWriter::Create(*sink_, std::move(options));
+  if (!writer) return writer.error();
+  writer_ = std::move(*writer);
+  for (const auto& [record, content] : preamble.metadata) {
+    if (const auto added = writer_->AddMetadata(record, content); !added) return added.error();
+  }
+  for (const LogPreamble::File& one : preamble.files) {
+    const auto added = writer_->AddAttachment(one.name, one.media_type, one.text, started_utc_ns_);
+    if (!added) return added.error();
+  }
+  return {};
 }
 
 Result<void> LogFile::Close(mcap::TextMap totals) {
@@ -29,6 +39,8 @@ Result<void> LogFile::Close(mcap::TextMap totals) {
     return added.error();
   if (const auto closed = writer_->mcap().Close(); !closed) return closed.error();
   if (const auto synced = sink_->Sync(); !synced) return synced.error();
+  is_complete_ = true;
+  if (WhereItIs() == mcap::FileSink::Place::kElsewhere) return {};
   return folder_.Finish(name_);
 }
 

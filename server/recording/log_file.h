@@ -36,19 +36,30 @@ class LogFile {
   /// Chunks that the file has taken: what was written before the newest one ended is in it.
   uint64_t chunks() const { return writer_->mcap().statistics().chunk_count; }
 
-  /// All that was written is safe from a power cut. Errors: the system's; then the open chunk is lost.
+  /// The open chunk is in the file. Errors: the system's; then it is lost.
+  Result<void> Flush() { return writer_->mcap().Flush(); }
+  /// All that was written is safe from a power cut. Errors: the system's; then what was written since the
+  /// last Sync may be lost, also what the file has taken: the system has dropped it, and the next Sync would
+  /// not tell (Rebello et al., Can applications recover from fsync failures?, 2020).
   Result<void> Sync() { return writer_->mcap().Sync(); }
-  /// Ends the log and gives it its final name. Errors: the system's; then it stays ".part".
+  mcap::FileSink::Place WhereItIs() const { return sink_->WhereItIs(); }
+  /// Ends the log and gives it its final name, or, where its file was moved, leaves it there. Errors: the
+  /// system's; then it stays ".part".
   Result<void> Close(mcap::TextMap totals);
+  /// All of it is safe from a power cut, by Close, whatever its name.
+  bool is_complete() const { return is_complete_; }
 
  private:
   LogFile(LogFolder folder, std::string name, std::unique_ptr<mcap::FileSink> sink, int64_t utc_ns)
       : folder_(std::move(folder)), name_(std::move(name)), sink_(std::move(sink)), started_utc_ns_(utc_ns) {}
 
+  Result<void> Begin(const LogPreamble& preamble, mcap::WriterOptions options);
+
   const LogFolder folder_;
   const std::string name_;
   const std::unique_ptr<mcap::FileSink> sink_;
   const int64_t started_utc_ns_;
+  bool is_complete_ = false;
   std::unique_ptr<wire::log::LogWriter> writer_;
 };
 

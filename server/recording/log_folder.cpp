@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
+#include <span>
+#include <utility>
 
 #include "wire/mcap/file_sink.h"
 #include "wire/mcap/recover.h"
@@ -22,15 +24,32 @@ namespace fs = std::filesystem;
 constexpr std::string_view kSuffix = ".mcap", kPart = ".part", kRecovering = ".recovering";
 
 Error FromSystem(const std::string& what, const std::error_code& error) {
-  const bool denied = error == std::errc::permission_denied || error == std::errc::read_only_file_system;
+  const bool denied = error == std::errc::permission_denied || error == std::errc::operation_not_permitted ||
+                      error == std::errc::read_only_file_system;
   return {denied ? ErrorCode::kPermissionDenied : ErrorCode::kUnavailable, what + ": " + error.message()};
 }
 
-Result<void> SyncFolder(const std::string& path) {
-  const int folder = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  const bool synced = folder >= 0 && ::fsync(folder) == 0;
+/// Gives nothing more once it is to stop: a log can be of any size.
+class StoppableSource final : public mcap::ByteSource {
+ public:
+  StoppableSource(const mcap::ByteSource& source, std::stop_token stop)
+      : source_(source), stop_(std::move(stop)) {}
+  uint64_t size() const override { return source_.size(); }
+  Result<void> Read(uint64_t offset, std::span<std::byte> out) const override {
+    if (stop_.stop_requested()) return Error{ErrorCode::kUnavailable, "stopped"};
+    return source_.Read(offset, out);
+  }
+
+ private:
+  const mcap::ByteSource& source_;
+  const std::stop_token stop_;
+};
+
+Result<void> SyncFolder(mcap::FileCalls& calls, const std::string& path) {
+  const int folder = calls.Open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC, 0);
+  const bool synced = folder >= 0 && calls.SyncFolder(folder) == 0;
   const std::error_code error(errno, std::generic_category());
-  if (folder >= 0) ::close(folder);
+  if (folder >= 0) calls.Close(folder);
   if (!synced) return FromSystem(path, error);
   return {};
 }
@@ -38,7 +57,8 @@ Result<void> SyncFolder(const std::string& path) {
 }  // namespace
 
 std::string LogName(const std::string& prefix, int64_t utc_ns, int part) {
-  const std::chrono::sys_seconds time{std::chrono::seconds(utc_ns / 1'000'000'000)};
+  // Not of a time point, which fmt 9 takes for one of the local time zone.
+  const std::tm time = fmt::gmtime(static_cast<std::time_t>(utc_ns / 1'000'000'000));
   return fmt::format("{}-{:%Y%m%dT%H%M%SZ}-{:03}{}", prefix, time, part, kSuffix);
 }
 
@@ -53,14 +73,20 @@ bool IsLogName(const std::string& name) {
 
 Result<void> LogFolder::Prepare() const {
   std::error_code error;
-  fs::create_directories(path_, error);
+  if (fs::create_directories(path_, error))
+    fs::permissions(path_, fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec, error);
   if (error) return FromSystem("recording.folder " + path_, error);
   const std::string probe = path_ + "/.taclink-" + std::to_string(::getpid());
-  const int file = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+  const int file = calls_.Open(probe, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
   if (file < 0) return FromSystem("recording.folder " + path_, {errno, std::generic_category()});
-  ::close(file);
+  calls_.Close(file);
   fs::remove(probe, error);
   return {};
+}
+
+Result<void> LogFolder::CheckWritable() const {
+  if (calls_.Access(path_, W_OK | X_OK) == 0) return {};
+  return FromSystem("recording.folder " + path_, {errno, std::generic_category()});
 }
 
 bool LogFolder::Exists() const {
@@ -76,8 +102,10 @@ std::vector<LogFileEntry> LogFolder::List() const {
     log.open = log.name.ends_with(kPart);
     if (log.open) log.name.resize(log.name.size() - kPart.size());
     std::error_code gone;
+    // A link could lead out of the folder.
+    if (at->symlink_status(gone).type() != fs::file_type::regular || !IsLogName(log.name)) continue;
     log.bytes = at->file_size(gone);
-    if (!gone && IsLogName(log.name)) logs.push_back(std::move(log));
+    if (!gone) logs.push_back(std::move(log));
   }
   // A log that is closed at this very moment may show twice, or an open one beside its recovered twin.
   std::sort(logs.begin(), logs.end(), [](const auto& a, const auto& b) {
@@ -96,6 +124,7 @@ Result<LogFileEntry> LogFolder::Find(const std::string& name) const {
   for (const bool open : {false, true}) {
     LogFileEntry log{.name = name, .open = open};
     std::error_code gone;
+    if (fs::symlink_status(PathOf(log), gone).type() != fs::file_type::regular) continue;
     log.bytes = fs::file_size(PathOf(log), gone);
     if (!gone) return log;
   }
@@ -107,10 +136,9 @@ std::string LogFolder::PathOf(const LogFileEntry& log) const {
 }
 
 Result<void> LogFolder::Finish(const std::string& name) const {
-  std::error_code error;
-  fs::rename(PartPath(name), FinalPath(name), error);
-  if (error) return FromSystem(PartPath(name), error);
-  return SyncFolder(path_);
+  if (calls_.Rename(PartPath(name), FinalPath(name)) != 0)
+    return FromSystem(PartPath(name), {errno, std::generic_category()});
+  return SyncFolder(calls_, path_);
 }
 
 Result<void> LogFolder::Delete(const std::string& name) const {
@@ -155,7 +183,7 @@ std::vector<LogFileEntry> LogFolder::Unfinished() const {
   return logs;
 }
 
-std::string LogFolder::Recover(const std::string& name) const {
+std::string LogFolder::Recover(const std::string& name, const std::stop_token& stop) const {
   const std::string part = PartPath(name), fresh = FinalPath(name) + std::string(kRecovering);
   std::error_code ignored;
   fs::remove(fresh, ignored);  // of a recovery that was cut off
@@ -169,7 +197,8 @@ std::string LogFolder::Recover(const std::string& name) const {
   if (!sink) return failed(sink.error());
   mcap::RecoverOptions options;
   options.writer.compression = mcap::Compression::kLz4;
-  const auto report = mcap::Recover(**source, **sink, options);
+  const auto report = mcap::Recover(StoppableSource(**source, stop), **sink, options);
+  if (stop.stop_requested()) return failed({ErrorCode::kUnavailable, "the server stops"});
   if (!report) return failed(report.error());
   const mcap::Statistics& kept = report->written;
   const bool nothing = kept.message_count + kept.attachment_count + kept.metadata_count == 0;
@@ -177,9 +206,11 @@ std::string LogFolder::Recover(const std::string& name) const {
     return failed({ErrorCode::kInvalidArgument, "nothing in it is intact"});
   if (const auto synced = (*sink)->Sync(); !synced) return failed(synced.error());
   std::error_code error;
+  if (fs::exists(FinalPath(name), error))
+    return failed({ErrorCode::kFailedPrecondition, FinalPath(name) + " is there already"});
   fs::rename(fresh, FinalPath(name), error);
   if (error) return failed(FromSystem(fresh, error));
-  if (const auto synced = SyncFolder(path_); !synced) return failed(synced.error());
+  if (const auto synced = SyncFolder(calls_, path_); !synced) return failed(synced.error());
   fs::remove(part, ignored);
   return name + " was not closed; made whole: " + report->scan.Text();
 }

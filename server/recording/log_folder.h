@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "sensing/core/result.h"
+#include "wire/mcap/file_calls.h"
 
 namespace taclink::server {
 
@@ -18,12 +20,18 @@ struct LogFileEntry {
 /// The folder that the server's logs are in. Holds no state: any thread, any number of objects.
 class LogFolder {
  public:
-  explicit LogFolder(std::string path) : path_(std::move(path)) {}
+  /// `calls` must outlive it: what it asks of the system while a log is written.
+  explicit LogFolder(std::string path, mcap::FileCalls& calls = mcap::FileCalls::System())
+      : path_(std::move(path)), calls_(calls) {}
 
-  /// Makes the folder if it is missing and tries to write. Errors: kPermissionDenied, kUnavailable.
+  /// Makes the folder, for owner and group alone, if it is missing and tries to write. Errors:
+  /// kPermissionDenied, kUnavailable.
   Result<void> Prepare() const;
+  /// Whether a log could be begun there, without trying. Errors: as Prepare.
+  Result<void> CheckWritable() const;
   bool Exists() const;
   const std::string& path() const { return path_; }
+  mcap::FileCalls& calls() const { return calls_; }
 
   /// Oldest first, as the names tell it.
   std::vector<LogFileEntry> List() const;
@@ -46,10 +54,11 @@ class LogFolder {
   std::vector<LogFileEntry> Unfinished() const;
   /// Makes such a log whole: what is intact goes to a log under its final name. Returns what came of it, for
   /// people.
-  std::string Recover(const std::string& name) const;
+  std::string Recover(const std::string& name, const std::stop_token& stop = {}) const;
 
  private:
   const std::string path_;
+  mcap::FileCalls& calls_;
 };
 
 /// "PREFIX-20261122T120137Z-001.mcap".

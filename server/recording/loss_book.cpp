@@ -1,25 +1,52 @@
 #include "server/recording/loss_book.h"
 
+#include <algorithm>
+
 namespace taclink::server {
+namespace {
+
+constexpr size_t Place(LogStage stage) {
+  return static_cast<size_t>(stage);
+}
+
+}  // namespace
 
 void LossBook::Wrote(size_t link, uint64_t sequence) {
   ++written_;
-  ++links_[link].open;
+  ++links_[link].batches[Place(LogStage::kOpen)].frames;
   links_[link].newest = sequence;
 }
 
 void LossBook::Told(size_t link, uint64_t count) {
   PerLink& at = links_[link];
-  at.open_told += count;
+  at.batches[Place(LogStage::kOpen)].told += count;
   at.untold = 0;
+  at.lost_until = 0;
   at.text.clear();
 }
 
-void LossBook::Kept() {
+void LossBook::MoveOn(LogStage from) {
   for (PerLink& link : links_) {
-    link.kept = link.newest;
-    link.open = link.open_told = 0;
+    Batch& batch = link.batches[Place(from)];
+    Batch& next = link.batches[Place(from) - 1];
+    next.frames += batch.frames;
+    next.told += batch.told;
+    // What is behind it begins where it ended.
+    const bool is_last = from == LogStage::kOpen;
+    batch = {.after = is_last ? link.newest : link.batches[Place(from) + 1].after};
   }
+}
+
+void LossBook::Taken() {
+  MoveOn(LogStage::kOpen);
+}
+
+void LossBook::Synced() {
+  MoveOn(LogStage::kTaken);
+}
+
+void LossBook::NextLog() {
+  for (PerLink& link : links_) link.batches.fill({.after = link.newest});
 }
 
 void LossBook::Lose(PerLink& link, uint64_t count, uint64_t after, v1::LossReason reason,
@@ -30,17 +57,23 @@ void LossBook::Lose(PerLink& link, uint64_t count, uint64_t after, v1::LossReaso
   link.text = text;
 }
 
-void LossBook::ChunkLost(const std::string& text) {
+void LossBook::Lost(LogStage stage, const std::string& text) {
   for (PerLink& link : links_) {
-    lost_ += link.open;
-    written_ -= link.open;
-    const uint64_t untold = link.open + link.open_told;
-    if (untold > 0) {
-      Lose(link, untold, link.kept, v1::LOSS_REASON_DISK, text);
-      link.after = link.kept;  // also of what was lost after the chunk had begun
+    const uint64_t after = link.batches[Place(stage)].after;
+    uint64_t frames = 0, told = 0;
+    for (size_t i = Place(stage); i < link.batches.size(); ++i) {
+      frames += link.batches[i].frames;
+      told += link.batches[i].told;
+      link.batches[i] = {.after = after};
     }
-    link.newest = link.kept;
-    link.open = link.open_told = 0;
+    lost_ += frames;
+    written_ -= frames;
+    if (frames + told > 0) {
+      Lose(link, frames + told, after, v1::LOSS_REASON_DISK, text);
+      link.after = std::min(link.after, after);  // also of what was lost after these had been handed over
+      link.lost_until = std::max(link.lost_until, link.newest);
+    }
+    link.newest = after;
   }
 }
 
@@ -57,7 +90,7 @@ std::optional<v1::RecordingLoss> LossBook::Untold(size_t link, uint64_t next_seq
   v1::RecordingLoss loss;
   loss.set_count(at.untold);
   loss.set_after_sequence(at.after);
-  loss.set_before_sequence(next_sequence);
+  loss.set_before_sequence(next_sequence == 0 ? 0 : std::max(next_sequence, at.lost_until + 1));
   loss.set_reason(at.reason);
   loss.set_text(at.text);
   return loss;

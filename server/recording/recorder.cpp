@@ -2,32 +2,14 @@
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <utility>
 
+#include "sensing/core/name.h"
 #include "server/link_names.h"
 #include "server/thread_setup.h"
 
 namespace taclink::server {
 namespace {
-
-constexpr size_t kLongestName = 64, kLongestNote = 4096;
-
-bool IsNamePart(const std::string& name) {
-  const auto good = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
-  };
-  return !name.empty() && name.size() <= kLongestName && std::all_of(name.begin(), name.end(), good);
-}
-
-// The arm's name with what a log's name can't have replaced.
-std::string NameOf(const Arm& arm) {
-  std::string name = arm.name().substr(0, kLongestName);
-  for (char& c : name) {
-    if (!IsNamePart(std::string(1, c))) c = '_';
-  }
-  return name.empty() ? "arm" : name;
-}
 
 std::optional<mcap::Compression> FromWire(v1::LogCompression compression) {
   switch (compression) {
@@ -44,8 +26,12 @@ std::optional<mcap::Compression> FromWire(v1::LogCompression compression) {
 
 }  // namespace
 
-Recorder::Recorder(Arm& arm, const RecordingConfig& config, LogPreamble preamble)
-    : arm_(arm), config_(config), preamble_(std::move(preamble)), folder_(config.folder), catalog_(folder_) {}
+Recorder::Recorder(Arm& arm, const RecordingConfig& config, LogPreamble preamble, mcap::FileCalls& calls)
+    : arm_(arm),
+      config_(config),
+      preamble_(std::move(preamble)),
+      folder_(config.folder, calls),
+      catalog_(folder_) {}
 
 Recorder::~Recorder() {
   Close();
@@ -58,7 +44,11 @@ void Recorder::Close() {
     const std::lock_guard lock(mutex_);
     recording = std::exchange(recording_, nullptr);
   }
-  if (recording) recording->Stop();
+  if (!recording) return;
+  recording->Stop();
+  const v1::RecorderStatus status = recording->Status();
+  SPDLOG_INFO("recording {} ends with the server: {} frames, {} lost", status.log(), status.frames(),
+              status.frames_lost());
 }
 
 Result<void> Recorder::CheckFolder() const {
@@ -71,7 +61,7 @@ Result<void> Recorder::CheckFolder() const {
 void Recorder::Open() {
   if (!config_.at_start && !folder_.Exists()) return;
   if (const auto good = folder_.Prepare(); !good) {
-    spdlog::error("recording: {}; nothing can be recorded until that is mended", good.error().message);
+    SPDLOG_ERROR("recording: {}; nothing can be recorded until that is mended", good.error().message);
     return;
   }
   const std::vector<LogFileEntry> unfinished = folder_.Unfinished();
@@ -80,7 +70,7 @@ void Recorder::Open() {
       SetUpThread("log-mender", {});
       for (const LogFileEntry& log : unfinished) {
         if (stop.stop_requested()) return;
-        spdlog::warn("recording: {}", folder.Recover(log.name));
+        SPDLOG_WARN("recording: {}", folder.Recover(log.name, stop));
       }
     });
   }
@@ -88,18 +78,15 @@ void Recorder::Open() {
   v1::StartRecordingRequest request;
   request.set_pictures(config_.pictures);
   const auto started = Start(request, "recording.at_start");
-  if (!started) spdlog::error("recording: did not begin: {}", started.error().message);
+  if (!started) SPDLOG_ERROR("recording: did not begin: {}", started.error().message);
 }
 
 Result<RecordingOrder> Recorder::ToOrder(const v1::StartRecordingRequest& request) const {
-  RecordingOrder order{.name = request.name().empty() ? NameOf(arm_) : request.name(),
+  RecordingOrder order{.name = request.name().empty() ? arm_.name() : request.name(),
                        .pictures = request.pictures(),
                        .note = request.note()};
-  if (!IsNamePart(order.name))
-    return Error{ErrorCode::kInvalidArgument,
-                 "name must be up to 64 letters, digits, '-' and '_', not '" + request.name() + "'"};
-  if (order.note.size() > kLongestNote)
-    return Error{ErrorCode::kInvalidArgument, "note must be shorter than 4096 bytes"};
+  if (const auto good = CheckName(order.name); !good)
+    return Error{good.error().code, "name " + good.error().message};
   const auto links = FindLinks(arm_.link_names(), request.links());
   if (!links) return links.error();
   order.links = *links;
@@ -124,14 +111,14 @@ Result<v1::RecorderStatus> Recorder::Start(const v1::StartRecordingRequest& requ
   metadata["started_by"] = who;
   metadata["pictures"] = order->pictures ? "true" : "false";
   if (!order->note.empty()) metadata["note"] = order->note;
-  auto started = Recording::Start(arm_, config_, *order, std::move(preamble));
+  auto started = Recording::Start(arm_, config_, folder_, *order, std::move(preamble));
   if (!started) return started.error();
   {
     const std::lock_guard lock(mutex_);
     recording_ = std::move(*started);
   }
   const v1::RecorderStatus status = Status();
-  spdlog::info("{}: recording {} begins", who, status.log());
+  SPDLOG_INFO("{}: recording {} begins", who, status.log());
   arm_.events().Post(EventKind::kRecording, std::nullopt,
                      {.who = who, .outcome = status.log() + " begins", .values = {}});
   return status;
@@ -152,8 +139,8 @@ Result<v1::RecorderStatus> Recorder::Stop(const std::string& who) {
     recording_.reset();
   }
   const v1::RecorderStatus status = Status();
-  spdlog::info("{}: recording {} ends: {} frames, {} lost", who, status.log(), status.frames(),
-               status.frames_lost());
+  SPDLOG_INFO("{}: recording {} ends: {} frames, {} lost", who, status.log(), status.frames(),
+              status.frames_lost());
   arm_.events().Post(EventKind::kRecording, std::nullopt,
                      {.who = who,
                       .outcome = status.log() + " ends",
@@ -167,8 +154,10 @@ v1::RecorderStatus Recorder::Status() const {
   {
     const std::lock_guard lock(mutex_);
     status = recording_ ? recording_->Status() : last_;
-    if (!recording_ && status.state() != v1::RECORDER_STATE_TROUBLE)
+    if (!recording_) {
       status.set_state(v1::RECORDER_STATE_IDLE);
+      status.clear_trouble();
+    }
   }
   status.set_folder(folder_.path());
   status.set_quota_bytes(static_cast<uint64_t>(config_.quota_mb * 1e6));

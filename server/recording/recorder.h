@@ -15,8 +15,9 @@ namespace taclink::server {
 /// The server's recordings: one at a time. Any thread; all but Status may wait for the disk.
 class Recorder {
  public:
-  /// `preamble`: what every log begins with. The arm must outlive it.
-  Recorder(Arm& arm, const RecordingConfig& config, LogPreamble preamble);
+  /// `preamble`: what every log begins with. The arm and `calls` must outlive it.
+  Recorder(Arm& arm, const RecordingConfig& config, LogPreamble preamble,
+           mcap::FileCalls& calls = mcap::FileCalls::System());
   ~Recorder();
 
   /// Ends the recording that is under way, if any.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <limits>
 #include <utility>
 
 #include "server/thread_setup.h"
@@ -17,11 +18,18 @@ namespace {
 using wire::log::TopicKind;
 
 constexpr std::chrono::milliseconds kPoll{20};
+constexpr int64_t kRoundNs = 200'000'000;
 constexpr size_t kQueuedFrames = 4096;
 constexpr int64_t kNsPerS = 1'000'000'000;
+constexpr int64_t kLookPeriodNs = kNsPerS / 2, kQuietNs = 10 * kNsPerS;
 constexpr int64_t kQuotaPeriodNs = 10 * kNsPerS;
 constexpr int kFailuresBeforeNewFile = 5;
 constexpr uint64_t kPictureChunkBytes = uint64_t{4} << 20;
+
+constexpr const char* kBehind =
+    "frames come faster than they are written, and are lost; record fewer links or without pictures, onto a "
+    "faster "
+    "disk, or raise recording.queue_mb";
 
 uint64_t Megabytes(double mb) {
   return static_cast<uint64_t>(mb * 1e6);
@@ -35,22 +43,24 @@ mcap::WriterOptions ToWriter(const RecordingOrder& order) {
 
 }  // namespace
 
-Recording::Recording(Arm& arm, const RecordingConfig& config, RecordingOrder order, LogPreamble preamble)
+Recording::Recording(Arm& arm, const RecordingConfig& config, const LogFolder& folder, RecordingOrder order,
+                     LogPreamble preamble)
     : arm_(arm),
       config_(config),
       order_(std::move(order)),
       preamble_(std::move(preamble)),
-      folder_(config.folder),
+      folder_(folder),
       losses_(arm.links().size()),
       dropped_(arm.links().size(), 0) {}
 
 Result<std::unique_ptr<Recording>> Recording::Start(Arm& arm, const RecordingConfig& config,
-                                                    const RecordingOrder& order, LogPreamble preamble) {
-  std::unique_ptr<Recording> out(new Recording(arm, config, order, std::move(preamble)));
+                                                    const LogFolder& folder, const RecordingOrder& order,
+                                                    LogPreamble preamble) {
+  std::unique_ptr<Recording> out(new Recording(arm, config, folder, order, std::move(preamble)));
   auto file = out->NewFile();
   if (!file) return file.error();
   out->file_ = std::move(*file);
-  out->synced_ns_ = out->quota_ns_ = arm.clock().MonotonicNs();
+  out->synced_ns_ = out->looked_ns_ = out->quota_ns_ = out->file_begun_ns_ = arm.clock().MonotonicNs();
   out->status_.set_started_utc_ns(out->file_->started_utc_ns());
   out->status_.set_pictures(order.pictures);
   out->others_ = std::make_unique<ArmRecorder>(
@@ -83,11 +93,13 @@ Result<std::unique_ptr<LogFile>> Recording::NewFile() {
   const int64_t utc_ns = arm_.clock().UtcNs();
   LogPreamble preamble = preamble_;
   preamble.metadata[wire::log::kMetadataName]["part"] = std::to_string(part_ + 1);
+  // Another recording may have begun within the same second.
+  int number = part_ + 1;
+  while (folder_.Find(LogName(order_.name, utc_ns, number))) ++number;
   auto file =
-      LogFile::Create(folder_, LogName(order_.name, utc_ns, part_ + 1), preamble, ToWriter(order_), utc_ns);
+      LogFile::Create(folder_, LogName(order_.name, utc_ns, number), preamble, ToWriter(order_), utc_ns);
   if (!file) return file.error();
   ++part_;
-  chunks_ = 0;
   return file;
 }
 
@@ -97,16 +109,16 @@ void Recording::Run(const std::stop_token& stop) {
   std::condition_variable_any stopped;
   while (!stop.stop_requested()) {
     std::unique_lock lock(mutex);
-    stopped.wait_for(lock, stop, kPoll, [] { return false; });
-    const int64_t utc_ns = arm_.clock().UtcNs();  // what was published before is in the log after Drain
+    if (subscription_->waiting() == 0) stopped.wait_for(lock, stop, kPoll, [] { return false; });
     Guarded([&] {
-      Drain();
-      SyncIfDue(utc_ns);
+      Drain(kRoundNs);
+      LookIfDue();
+      SyncIfDue();
       SplitIfDue();
     });
     UpdateStatus();
   }
-  Guarded([this] { Drain(); });
+  Guarded([this] { Drain(std::numeric_limits<int64_t>::max()); });
   Guarded([this] {
     for (size_t link = 0; link < losses_.links(); ++link) TellLosses(link, 0);
     CloseFile(*file_);
@@ -119,18 +131,33 @@ void Recording::Guarded(const std::function<void()>& step) {
   try {
     step();
   } catch (const std::exception& e) {
-    SetTrouble(e.what());
+    SetTrouble(trouble_, e.what());
   }
 }
 
-void Recording::Drain() {
+// What waits at the call, and no longer than that takes or `most_ns`: where frames come faster than they are
+// written, the round must end all the same for the log to be synced and the status to be told.
+void Recording::Drain(int64_t most_ns) {
+  const int64_t begun_ns = arm_.clock().MonotonicNs(), begun_utc_ns = arm_.clock().UtcNs();
+  size_t waiting = subscription_->waiting();
   PicturesPtr pictures;
-  while (const auto publication = subscription_->Take(nullptr, &pictures)) {
+  int64_t taken_ns = 0;  // published when
+  for (; waiting > 0 && arm_.clock().MonotonicNs() - begun_ns < most_ns; --waiting) {
+    const auto publication = subscription_->Take(nullptr, &pictures);
+    if (!publication) {
+      waiting = 0;
+      break;
+    }
+    taken_ns = publication->state().times.published_ns;
     NoteDrops();
     TakeFrame(*publication, pictures);
     pictures.reset();
   }
   others_->TakeRest();
+  if (waiting == 0)
+    written_utc_ns_ = begun_utc_ns;
+  else if (taken_ns != 0)
+    written_utc_ns_ = begun_utc_ns - (begun_ns - taken_ns);
 }
 
 // The queue counts a frame that fell out before the next one is taken.
@@ -142,6 +169,7 @@ void Recording::NoteDrops() {
     losses_.Dropped(link, counts[link].dropped - dropped_[link]);
     dropped_[link] = counts[link].dropped;
   }
+  if (!std::exchange(is_behind_, true)) TellTrouble("behind", kBehind);
 }
 
 int64_t Recording::UtcOf(const LinkState& state) const {
@@ -187,78 +215,154 @@ void Recording::TellLosses(size_t link, uint64_t next_sequence) {
 // After each message that was handed over: whether a chunk has gone into the file, or was lost.
 void Recording::Wrote(const Result<void>& written) {
   if (!written) {
-    losses_.ChunkLost(written.error().message);
-    SetTrouble(written.error().message);
+    losses_.Lost(LogStage::kOpen, written.error().message);
+    SetTrouble(trouble_, written.error().message);
   }
-  if (file_->chunks() == chunks_) return;
-  chunks_ = file_->chunks();
-  losses_.Kept();
+  if (std::exchange(chunks_, file_->chunks()) != file_->chunks()) losses_.Taken();
 }
 
-void Recording::SyncIfDue(int64_t utc_ns) {
+// Whether what is written is what people will find.
+void Recording::LookIfDue() {
+  const int64_t now_ns = arm_.clock().MonotonicNs();
+  if (now_ns - looked_ns_ < kLookPeriodNs) return;
+  looked_ns_ = now_ns;
+  if (file_->WhereItIs() == mcap::FileSink::Place::kThere) {
+    const auto writable = folder_.CheckWritable();
+    if (writable) return place_trouble_.text.clear();
+    return SetTrouble(place_trouble_, writable.error().message +
+                                          "; the log that is being written goes on, but no other can begin");
+  }
+  const std::string what = Misplaced(*file_);
+  TellTrouble("misplaced", what);
+  auto next = folder_.Prepare();
+  if (next) next = NextFile();
+  if (next) return place_trouble_.text.clear();
+  SetTrouble(place_trouble_, what + "; the next one can't begin: " + next.error().message);
+}
+
+// What that means for a log that is not what was written; counts what is lost.
+std::string Recording::Misplaced(const LogFile& file) {
+  using Place = mcap::FileSink::Place;
+  const std::string path = folder_.PartPath(file.name());
+  const Place place = file.WhereItIs();
+  if (place == Place::kElsewhere)
+    return path +
+           " was moved, or its disk was taken away, while it was written: what was recorded is where it is "
+           "now";
+  std::string gone =
+      path + (place == Place::kCut ? " was cut by another program" : " was deleted while it was written");
+  gone += ": what was recorded is lost";
+  losses_.Lost(LogStage::kSafe, gone);
+  return gone;
+}
+
+void Recording::SyncIfDue() {
   const int64_t now_ns = arm_.clock().MonotonicNs();
   if (static_cast<double>(now_ns - synced_ns_) < config_.sync_s * 1e9) return;
   synced_ns_ = now_ns;
-  const auto synced = file_->Sync();
-  Wrote(synced);
-  if (!synced) {
-    if (++failures_ % kFailuresBeforeNewFile == 0) NextFile();
-    return;
-  }
+  if (!Sync()) return;
   failures_ = 0;
-  if (!trouble_.empty()) spdlog::info("recording: goes on; {} frames were lost", losses_.lost());
-  trouble_.clear();
+  const bool was_in_trouble = is_behind_ || !trouble_.text.empty();
+  trouble_.text.clear();
+  is_behind_ = is_behind_ && std::exchange(dropped_synced_, dropped_total_) != dropped_total_;
+  if (was_in_trouble && !is_behind_) SPDLOG_INFO("recording: goes on; {} frames were lost", losses_.lost());
   const std::lock_guard lock(mutex_);
-  status_.set_synced_utc_ns(utc_ns);
+  status_.set_synced_utc_ns(written_utc_ns_);
+}
+
+// What a file has taken but could not sync, it may have lost, and would not say so again.
+bool Recording::Sync() {
+  const auto flushed = file_->Flush();
+  Wrote(flushed);
+  const auto synced = flushed ? file_->Sync() : flushed;
+  if (synced) {
+    losses_.Synced();
+    return true;
+  }
+  if (flushed) {
+    losses_.Lost(LogStage::kTaken, synced.error().message);
+    SetTrouble(trouble_, synced.error().message);
+  }
+  const bool is_doubtful = flushed.ok() && failures_ == 0;
+  if (++failures_ % kFailuresBeforeNewFile != 0 && !is_doubtful) return false;
+  static_cast<void>(NextFile());  // where that fails too, what is wrong with the disk is told already
+  return false;
 }
 
 void Recording::SplitIfDue() {
-  const int64_t age_ns = arm_.clock().UtcNs() - file_->started_utc_ns();
+  const int64_t now_ns = arm_.clock().MonotonicNs();
+  const int64_t age_ns = now_ns - file_begun_ns_;  // the wall clock may be set meanwhile
   const bool large = config_.split_mb > 0 && file_->bytes() >= Megabytes(config_.split_mb);
   const bool old = config_.split_s > 0 && static_cast<double>(age_ns) >= config_.split_s * 1e9;
-  if ((large || old) && trouble_.empty()) NextFile();
-  const int64_t now_ns = arm_.clock().MonotonicNs();
+  if ((large || old) && trouble_.text.empty() && place_trouble_.text.empty()) {
+    if (const auto next = NextFile(); !next) SetTrouble(split_trouble_, next.error().message);
+  }
   if (config_.quota_mb <= 0 || now_ns - quota_ns_ < kQuotaPeriodNs) return;
   quota_ns_ = now_ns;
   for (const std::string& name : folder_.EnforceQuota(Megabytes(config_.quota_mb)))
-    spdlog::info("recording: {} deleted for recording.quota_mb", name);
+    SPDLOG_INFO("recording: {} deleted for recording.quota_mb", name);
 }
 
-void Recording::NextFile() {
+// Errors: as LogFile::Create; the log that is there goes on.
+Result<void> Recording::NextFile() {
   auto next = NewFile();
-  if (!next) return SetTrouble(next.error().message);
+  if (!next) return next.error();
   const std::unique_ptr<LogFile> last = std::exchange(file_, std::move(*next));
   CloseFile(*last);
+  losses_.NextLog();
+  file_begun_ns_ = arm_.clock().MonotonicNs();
+  chunks_ = 0;
   frames_before_ = losses_.written();
   bytes_ += last->bytes();
   others_->BeginLog();
   quota_ns_ = 0;
+  split_trouble_.text.clear();
+  return {};
 }
 
 void Recording::CloseFile(LogFile& file) {
+  const auto place = file.WhereItIs();
+  if (place == mcap::FileSink::Place::kNowhere || place == mcap::FileSink::Place::kCut)
+    return TellTrouble("misplaced", Misplaced(file));
   const auto closed = file.Close({{"frames", std::to_string(losses_.written() - frames_before_)},
                                   {"contacts", std::to_string(others_->contacts_begun())},
                                   {"frames_lost", std::to_string(losses_.lost())}});
-  if (closed) {
-    losses_.Kept();
-  } else {
-    losses_.ChunkLost(closed.error().message);
-    SetTrouble(closed.error().message);
-  }
+  if (!closed) SetTrouble(trouble_, closed.error().message);
+  if (file.chunks() != chunks_) losses_.Taken();
+  if (!closed) losses_.Lost(LogStage::kOpen, closed.error().message);
+  if (file.is_complete() || file.Sync()) return losses_.Synced();
+  losses_.Lost(LogStage::kTaken, closed.error().message);
 }
 
-void Recording::SetTrouble(const std::string& trouble) {
-  if (trouble_ == trouble) return;
-  trouble_ = trouble;
-  spdlog::error("recording: {}", trouble);
+void Recording::SetTrouble(Trouble& trouble, const std::string& text) {
+  trouble.text = text;
+  TellTrouble(trouble.kind, text);
+}
+
+// What can't be mended comes back with every try, each time with other words: it is told once, and again when
+// it comes back after a quiet while.
+void Recording::TellTrouble(const std::string& kind, const std::string& trouble) {
+  const int64_t now_ns = arm_.clock().MonotonicNs();
+  {
+    const std::lock_guard lock(mutex_);
+    status_.set_last_trouble(trouble);
+    status_.set_last_trouble_utc_ns(arm_.clock().UtcNs());
+  }
+  const auto [came, is_first] = came_ns_.emplace(kind, now_ns);
+  if (!is_first && now_ns - std::exchange(came->second, now_ns) < kQuietNs) return;
+  SPDLOG_ERROR("recording: {}", trouble);
   arm_.events().Post(EventKind::kRecording, std::nullopt,
                      {.who = "server", .accepted = false, .outcome = trouble, .values = {}});
 }
 
 void Recording::UpdateStatus() {
   const std::lock_guard lock(mutex_);
-  status_.set_state(trouble_.empty() ? v1::RECORDER_STATE_RECORDING : v1::RECORDER_STATE_TROUBLE);
-  status_.set_trouble(trouble_);
+  std::string trouble = is_behind_ ? kBehind : "";
+  for (const Trouble* one : {&split_trouble_, &place_trouble_, &trouble_}) {
+    if (!one->text.empty()) trouble = one->text;
+  }
+  status_.set_state(trouble.empty() ? v1::RECORDER_STATE_RECORDING : v1::RECORDER_STATE_TROUBLE);
+  status_.set_trouble(trouble);
   status_.set_log(file_->name());
   status_.set_logs(static_cast<uint32_t>(part_));
   status_.set_bytes(bytes_ + file_->bytes());

@@ -35,7 +35,7 @@ void JointReplay::Run(const std::stop_token& stop) {
       Take(*item);
     }
   } catch (const std::exception& e) {
-    spdlog::error("the log's joint states are given up: {}", e.what());
+    SPDLOG_ERROR("the log's joint states are given up: {}", e.what());
   }
 }
 

@@ -75,7 +75,7 @@ class ReplaySource final : public FrameSource {
       auto decoded = wire::DecodeFrame(mcap::AsText(item->data));
       if (!decoded) {
         if (!std::exchange(complained_, true))
-          spdlog::warn("link {}: a frame of the log is left out: {}", link_.link, decoded.error().message);
+          SPDLOG_WARN("link {}: a frame of the log is left out: {}", link_.link, decoded.error().message);
         continue;
       }
       due_ns_ = item->due_ns;
@@ -95,7 +95,7 @@ class ReplaySource final : public FrameSource {
 
   std::shared_ptr<const LinkState> Gap() const {
     auto state = std::make_shared<LinkState>();
-    ResetTo(*state, LinkStatus::kLost, "the log has no frames of this link here");
+    ResetTo(*state, LinkStatus::kLost, "the log has no frames of this link here", ReasonId::kNoFrames);
     state->sequence = sequence_;
     state->replayed = true;
     return state;

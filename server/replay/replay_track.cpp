@@ -11,7 +11,7 @@ namespace {
 // Between the last message of a round and the first of the next; and a log of one message plays once a
 // second.
 constexpr int64_t kPauseNs = 50'000'000, kShortestRoundNs = 1'000'000'000;
-constexpr int64_t kLateNs = 500'000'000;  // who joins the first round earlier begins at its start
+constexpr int64_t kJoinsLateNs = 500'000'000;  // who joins the first round earlier begins at its start
 
 }  // namespace
 
@@ -43,7 +43,7 @@ void ReplaySchedule::Reached(uint64_t round) {
   uint64_t before = round_;
   while (before < round) {
     if (!round_.compare_exchange_weak(before, round)) continue;
-    spdlog::info("the log has ended and begins anew, round {}", round + 1);
+    SPDLOG_INFO("the log has ended and begins anew, round {}", round + 1);
     return;
   }
 }
@@ -58,7 +58,7 @@ Result<std::unique_ptr<ReplayTrack>> ReplayTrack::Open(std::shared_ptr<const mca
   if (!player) return player.error();
   schedule->Begin();
   std::unique_ptr<ReplayTrack> track(new ReplayTrack(std::move(*player), std::move(schedule)));
-  if (track->schedule_->PassedNs() > kLateNs) track->CatchUp();
+  if (track->schedule_->PassedNs() > kJoinsLateNs) track->CatchUp();
   return track;
 }
 

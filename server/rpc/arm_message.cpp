@@ -2,7 +2,6 @@
 
 #include "server/rpc/contacts_message.h"
 #include "server/rpc/event_message.h"
-#include "server/rpc/joint_state_call.h"
 #include "wire/convert.h"
 #include "wire/units.h"
 
@@ -90,6 +89,36 @@ void FillCameras(const SourceCondition& source, const LinkStatistics& statistics
     message.set_unpaired(counters.unpaired[i]);
     message.set_stamped_on_arrival(counters.stamped_on_arrival[i]);
     if (!camera.device.empty()) FillSettings(camera.settings, message);
+  }
+}
+
+v1::JointKind ToWire(JointKind kind) {
+  switch (kind) {
+    case JointKind::kRevolute:
+      return v1::JOINT_KIND_REVOLUTE;
+    case JointKind::kContinuous:
+      return v1::JOINT_KIND_CONTINUOUS;
+    case JointKind::kPrismatic:
+      return v1::JOINT_KIND_PRISMATIC;
+  }
+  return v1::JOINT_KIND_UNSPECIFIED;
+}
+
+// The base frame and the joints of the URDF, with their positions now.
+void FillJoints(const Arm& arm, v1::Arm& out) {
+  out.set_base_frame(arm.poses().base_frame());
+  JointStateBuffer::Instant now;
+  arm.poses().joints().At(arm.clock().MonotonicNs(), now);
+  for (const JointInfo& joint : arm.poses().joints().joints()) {
+    const auto i = static_cast<size_t>(out.joints_size());
+    v1::Joint& message = *out.add_joints();
+    message.set_name(joint.name);
+    message.set_kind(ToWire(joint.kind));
+    if (joint.limits) message.set_lower(joint.limits->lower);
+    if (joint.limits) message.set_upper(joint.limits->upper);
+    if (now.validity[i] == PoseValidity::kUnknown) continue;
+    message.set_position(now.positions[i]);
+    message.set_position_age_s(static_cast<double>(now.distance_ns[i]) * 1e-9);
   }
 }
 

@@ -1,24 +1,10 @@
 #include "server/rpc/contact_stream.h"
 
-#include <grpcpp/impl/codegen/proto_utils.h>
-
-#include <cmath>
 #include <utility>
 
 #include "server/rpc/contacts_message.h"
 
 namespace taclink::server {
-Result<double> ContactStream::ParseRequest(const grpc::ByteBuffer& bytes) {
-  v1::StreamContactsRequest request;
-  grpc::ByteBuffer copy(bytes);  // parsing empties it
-  if (!grpc::SerializationTraits<v1::StreamContactsRequest>::Deserialize(&copy, &request).ok())
-    return Error{ErrorCode::kInvalidArgument, "the request is no StreamContactsRequest message"};
-  if (!std::isfinite(request.max_rate_hz()) || request.max_rate_hz() < 0) {
-    return Error{ErrorCode::kInvalidArgument,
-                 "max_rate_hz must be a positive number of Hz, or 0 for no limit"};
-  }
-  return request.max_rate_hz();
-}
 
 ContactStream::ContactStream(Arm& arm, double max_rate_hz, StreamRegistry& registry,
                              std::shared_ptr<boost::asio::thread_pool> senders)
@@ -31,7 +17,8 @@ ContactStream::ContactStream(Arm& arm, double max_rate_hz, StreamRegistry& regis
 }
 
 void ContactStream::Begin() {
-  subscription_ = arm_.hub().Subscribe({.delivery = Delivery::kLatest}, Notifier());
+  subscription_ =
+      arm_.hub().Subscribe({.delivery = Delivery::kLatest, .party_bytes = party_bytes()}, Notifier());
   Open();
 }
 

@@ -15,9 +15,6 @@ namespace taclink::server {
 /// One client's StreamContacts call: whenever it can write, the newest of all links in one message.
 class ContactStream final : public PumpedStream {
  public:
-  /// Errors: kInvalidArgument.
-  static Result<double> ParseRequest(const grpc::ByteBuffer& bytes);  ///< max_rate_hz
-
   /// `max_rate_hz` 0: no limit. The arm must outlive it.
   ContactStream(Arm& arm, double max_rate_hz, StreamRegistry& registry,
                 std::shared_ptr<boost::asio::thread_pool> senders);

@@ -18,6 +18,7 @@ static_assert(static_cast<int>(PoseValidity::kUnknown) + 1 == v1::POSE_VALIDITY_
 void FillStatus(const LinkContacts& link, v1::LinkContactsStatus& out) {
   out.set_status(wire::ToWire(link.status));
   out.set_sequence(link.sequence);
+  out.set_forces_unknown(link.forces_unknown);
   wire::Fill(link.times, *out.mutable_times());
   wire::Fill(link.pose.base_from_link, *out.mutable_base_from_link());
   out.set_validity(ToWire(link.pose.validity));
@@ -72,6 +73,7 @@ void Fill(const std::vector<std::shared_ptr<const LinkContacts>>& newest,
     v1::LinkContactsStatus& status = *out.add_links();
     status.set_link(link_names[i]);
     status.set_status(v1::LINK_STATUS_STARTING);
+    status.set_forces_unknown(true);
     if (!newest[i]) continue;
     const LinkContacts& link = *newest[i];
     FillStatus(link, status);
@@ -83,9 +85,14 @@ void Fill(const std::vector<std::shared_ptr<const LinkContacts>>& newest,
       moment_nmm += contact.moment_nmm;
     }
   }
-  wire::Fill(force_n, 1, *out.mutable_total()->mutable_force_n());
-  wire::Fill(moment_nmm, kMetresPerMm, *out.mutable_total()->mutable_moment_nm());
-  FillJoints(loads, out);
+  // A sum over nothing is no zero.
+  const auto is_unknown = [](const auto& link) { return link.forces_unknown(); };
+  if (!std::ranges::all_of(out.links(), is_unknown)) {
+    wire::Fill(force_n, 1, *out.mutable_total()->mutable_force_n());
+    wire::Fill(moment_nmm, kMetresPerMm, *out.mutable_total()->mutable_moment_nm());
+    FillJoints(loads, out);
+  }
+  if (std::ranges::any_of(out.links(), is_unknown)) out.clear_joint_torque_sigmas();
   for (const JointInfo& joint : joints) out.add_joint_names(joint.name);
   out.set_validity(ToWire(worst));
 }

@@ -7,14 +7,13 @@
 
 namespace taclink::server {
 
-Result<EventStreamOptions> ParseRequest(const v1::StreamEventsRequest& request, std::vector<bool> links,
-                                        const EventHistory& history) {
+Result<EventStreamOptions> ToEventStreamOptions(const v1::StreamEventsRequest& request,
+                                                std::vector<bool> links, const EventHistory& history) {
   EventStreamOptions options{.start = {}, .filter = {.links = std::move(links)}};
   options.filter.all_kinds = request.kinds().empty();
   for (const int kind : request.kinds()) {
-    if (!v1::EventKind_IsValid(kind) || kind == v1::EVENT_KIND_UNSPECIFIED)
-      return Error{ErrorCode::kInvalidArgument,
-                   "kinds has " + std::to_string(kind) + ", which is no EventKind"};
+    if (kind == v1::EVENT_KIND_UNSPECIFIED)
+      return Error{ErrorCode::kInvalidArgument, "kinds has 0, which is no kind of event"};
     options.filter.kinds[static_cast<size_t>(kind) - 1] = true;
   }
   const auto after =

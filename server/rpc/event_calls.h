@@ -14,8 +14,8 @@ struct EventStreamOptions {
   EventFilter filter;
 };
 /// `links`: by link, wanted. Errors: kInvalidArgument.
-Result<EventStreamOptions> ParseRequest(const v1::StreamEventsRequest& request, std::vector<bool> links,
-                                        const EventHistory& history);
+Result<EventStreamOptions> ToEventStreamOptions(const v1::StreamEventsRequest& request,
+                                                std::vector<bool> links, const EventHistory& history);
 
 /// Errors: as EventEngine::SetThresholds.
 Result<void> SetThresholds(Arm& arm, size_t link, const v1::SetThresholdsRequest& request,

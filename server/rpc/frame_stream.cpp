@@ -32,7 +32,9 @@ FrameStream::FrameStream(FrameStreamOptions options, std::vector<std::string> li
       link_names_(std::move(link_names)) {}
 
 void FrameStream::Begin(Hub& hub) {
-  subscription_ = hub.Subscribe(options_.subscriber, Notifier());
+  SubscriberOptions options = options_.subscriber;
+  options.party_bytes = party_bytes();
+  subscription_ = hub.Subscribe(std::move(options), Notifier());
   Open();
 }
 

@@ -11,9 +11,8 @@ namespace taclink::server {
 namespace {
 
 constexpr double kExposureUnitsPerS = 1e4;
-constexpr double kLongestExposureS = 1;
 
-Error Invalid(std::string message) {
+Error InvalidOrder(std::string message) {
   return {ErrorCode::kInvalidArgument, std::move(message)};
 }
 
@@ -30,22 +29,20 @@ Result<CameraOrder> ParseCameraRequest(const v1::SetCameraRequest& request) {
   CameraOrder order;
   for (const CameraId id : kBothCameras)
     order.cameras[Index(id)] = request.camera().empty() || request.camera() == Name(id);
-  if (!order.cameras[0] && !order.cameras[1]) return Invalid("camera must be top, bottom or empty for both");
+  if (!order.cameras[0] && !order.cameras[1])
+    return InvalidOrder("camera must be top, bottom or empty for both");
   switch (request.exposure_case()) {
     case v1::SetCameraRequest::kAutomatic:
       if (!request.automatic())
-        return Invalid("automatic must be true; for a fixed exposure give exposure_s");
+        return InvalidOrder("automatic must be true; for a fixed exposure give exposure_s");
       order.settings.automatic_exposure = true;
       break;
     case v1::SetCameraRequest::kExposureS:
-      if (!std::isfinite(request.exposure_s()) || request.exposure_s() <= 0 ||
-          request.exposure_s() > kLongestExposureS)
-        return Invalid("exposure_s must be more than 0 and at most 1 s");
       order.settings.exposure_100us =
           std::max(1, static_cast<int>(std::lround(request.exposure_s() * kExposureUnitsPerS)));
       break;
     case v1::SetCameraRequest::EXPOSURE_NOT_SET:
-      if (!request.has_gain()) return Invalid("neither an exposure nor a gain is given");
+      if (!request.has_gain()) return InvalidOrder("neither an exposure nor a gain is given");
       break;
   }
   if (request.has_gain()) order.settings.gain = request.gain();
@@ -61,8 +58,8 @@ Operation ToOperation(const v1::SetCameraRequest& request, const Result<void>& e
 }
 
 Result<std::optional<ForceModel>> ParseForceModel(const v1::SetForceModelRequest& request) {
-  if (!v1::ForceModel_IsValid(request.model()) || request.model() == v1::FORCE_MODEL_UNSPECIFIED)
-    return Invalid("model must be AUTO, LINEAR, LITERAL, PRESSURISED or NONLINEAR");
+  if (request.model() == v1::FORCE_MODEL_UNSPECIFIED)
+    return InvalidOrder("model must be AUTO, LINEAR, LITERAL, PRESSURISED or NONLINEAR");
   if (request.model() == v1::FORCE_MODEL_AUTO) return std::optional<ForceModel>();
   return std::optional(wire::FromWire(request.model()));
 }

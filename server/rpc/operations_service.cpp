@@ -3,7 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include "server/replay/replay_link.h"
-#include "server/rpc/status.h"
+#include "server/rpc/refusal.h"
+#include "server/rpc/request_check.h"
 #include "server/rpc/who.h"
 
 namespace taclink::server {
@@ -11,14 +12,14 @@ namespace taclink::server {
 grpc::ServerUnaryReactor* OperationsService::RestartLink(grpc::CallbackServerContext* context,
                                                          const v1::RestartLinkRequest* request,
                                                          v1::RestartLinkResponse*) {
-  auto* reactor = context->DefaultReactor();
+  constexpr const char* kCall = "RestartLink";
+  if (const auto good = CheckRequest(*request); !good) return RefuseCall(*context, kCall, good.error());
   const auto link = arm_.FindLink(request->link());
-  if (!link || arm_.plays_log()) {
-    reactor->Finish(ToGrpc(link ? PlaysLog() : link.error()));
-    return reactor;
-  }
-  spdlog::info("link {}: restart ordered by {}", request->link(), Who(*context, *security_));
+  if (!link) return RefuseCall(*context, kCall, link.error());
+  if (arm_.plays_log()) return RefuseCall(*context, kCall, PlaysLog());
+  SPDLOG_INFO("link {}: restart ordered by {}", request->link(), Who(*context, *security_));
   arm_.worker(*link).Restart();
+  auto* reactor = context->DefaultReactor();
   reactor->Finish(grpc::Status::OK);
   return reactor;
 }

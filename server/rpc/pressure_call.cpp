@@ -5,6 +5,7 @@
 
 #include "server/client_time.h"
 #include "server/replay/replay_link.h"
+#include "server/rpc/request_check.h"
 #include "wire/units.h"
 
 namespace taclink::server {
@@ -17,6 +18,7 @@ class PressureIntake {
 
   Result<void> Take(const v1::UpdatePressureRequest& request) {
     if (arm_.plays_log()) return PlaysLog();
+    if (auto good = CheckRequest(request); !good) return good;
     if (!request.link().empty()) {
       const auto link = arm_.FindLink(request.link());
       if (!link) return link.error();
@@ -49,13 +51,14 @@ class PressureIntake {
 }  // namespace
 
 grpc::ServerReadReactor<v1::UpdatePressureRequest>* TakePressure(Arm& arm, UpdateRegistry& registry,
+                                                                 const Party& party,
                                                                  v1::UpdatePressureResponse& response) {
   using Stream = UpdateStream<v1::UpdatePressureRequest>;
   auto intake = std::make_shared<PressureIntake>(arm);
   auto stream = std::make_shared<Stream>(
       registry, [intake](const v1::UpdatePressureRequest& request) { return intake->Take(request); },
       [intake, &response] { intake->Fill(response); });
-  stream->Begin(registry.Add(stream));
+  stream->Begin(registry.Add(stream, party));
   return stream.get();  // the registry, or if refused itself, holds it until gRPC is done
 }
 

@@ -8,6 +8,7 @@ namespace taclink::server {
 
 /// Serves one UpdatePressure call; gRPC owns what is returned.
 grpc::ServerReadReactor<v1::UpdatePressureRequest>* TakePressure(Arm& arm, UpdateRegistry& registry,
+                                                                 const Party& party,
                                                                  v1::UpdatePressureResponse& response);
 
 }  // namespace taclink::server

@@ -1,34 +1,24 @@
 #include "server/rpc/preview_stream.h"
 
-#include <grpcpp/impl/codegen/proto_utils.h>
-
-#include <cmath>
 #include <utility>
 
 #include "server/link_names.h"
+#include "server/rpc/request_check.h"
 #include "wire/convert.h"
 
 namespace taclink::server {
 namespace {
 
-constexpr double kDefaultRateHz = 5, kMaxRateHz = 30;
-
-Error Invalid(std::string message) {
-  return {ErrorCode::kInvalidArgument, std::move(message)};
-}
+constexpr double kDefaultRateHz = 5;
 
 }  // namespace
 
 Result<PreviewOptions> ParsePreviewRequest(const grpc::ByteBuffer& bytes,
                                            const std::vector<std::string>& link_names) {
-  v1::StreamPreviewRequest request;
-  grpc::ByteBuffer copy(bytes);  // parsing empties it
-  if (!grpc::SerializationTraits<v1::StreamPreviewRequest>::Deserialize(&copy, &request).ok())
-    return Invalid("the request is no StreamPreviewRequest message");
-  const double rate_hz = request.max_rate_hz();
-  if (!std::isfinite(rate_hz) || rate_hz < 0 || rate_hz > kMaxRateHz)
-    return Invalid("max_rate_hz must be 0 to 30 Hz");
-  const auto link = FindLink(link_names, request.link());
+  const auto request = ParseRequest<v1::StreamPreviewRequest>(bytes);
+  if (!request) return request.error();
+  const double rate_hz = request->max_rate_hz();
+  const auto link = FindLink(link_names, request->link());
   if (!link) return link.error();
   return PreviewOptions{.link = *link, .max_rate_hz = rate_hz == 0 ? kDefaultRateHz : rate_hz};
 }
@@ -43,6 +33,7 @@ void PreviewStream::Begin(Hub& hub) {
   subscription_ = hub.Subscribe({.links = std::move(links),
                                  .delivery = Delivery::kLatest,
                                  .max_rate_hz = options_.max_rate_hz,
+                                 .party_bytes = party_bytes(),
                                  .pictures = true},
                                 Notifier());
   Open();

@@ -10,9 +10,11 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace taclink::server {
 
+class ByteBudget;
 class StreamRegistry;
 
 /// One client's server-streaming call with one message under way at a time: while the client does not read,
@@ -25,6 +27,9 @@ class PumpedStream : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   /// The server ends the stream and tells why. Any thread.
   void End(const std::string& reason);
+  /// Memory for what waits, shared with the other streams of the same party. By the registry, which admits
+  /// it.
+  void SetPartyBytes(std::shared_ptr<ByteBudget> bytes) { party_bytes_ = std::move(bytes); }
 
  protected:
   /// Sending goes on in `senders`, so that those who notify are not kept by gRPC.
@@ -34,6 +39,7 @@ class PumpedStream : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   void Open();
   /// To be called, by any thread, when Next may have something again. Outlives the stream.
   std::function<void()> Notifier();
+  const std::shared_ptr<ByteBudget>& party_bytes() const { return party_bytes_; }
 
   /// The next message, or none yet: then a notification will follow when there is one. One thread at a time.
   virtual std::optional<grpc::ByteBuffer> Next() = 0;
@@ -55,6 +61,7 @@ class PumpedStream : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   // Constant after construction.
   StreamRegistry& registry_;
   const std::shared_ptr<boost::asio::thread_pool> senders_;
+  std::shared_ptr<ByteBudget> party_bytes_;  // set by the registry, before it begins
 
   std::mutex mutex_;
   // Guarded by mutex_.

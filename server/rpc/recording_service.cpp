@@ -8,8 +8,9 @@
 
 #include "server/replay/log_pictures.h"
 #include "server/rpc/download_stream.h"
-#include "server/rpc/refused_stream.h"
+#include "server/rpc/refusal.h"
 #include "server/rpc/replay_stream.h"
+#include "server/rpc/request_check.h"
 #include "server/rpc/status.h"
 #include "server/rpc/who.h"
 
@@ -50,7 +51,7 @@ grpc::ServerUnaryReactor* RecordingService::Later(grpc::CallbackServerContext* c
   auto* reactor = context->DefaultReactor();
   boost::asio::post(*files_, [reactor, method, peer = PeerOf(*context), work = std::move(work)] {
     const Result<void> done = work();
-    if (!done) spdlog::info("{}: {} refused: {}", peer, method, done.error().message);
+    if (!done) SPDLOG_INFO("{}: {} refused: {}", peer, method, done.error().message);
     reactor->Finish(done ? grpc::Status::OK : ToGrpc(done.error()));
   });
   return reactor;
@@ -59,6 +60,8 @@ grpc::ServerUnaryReactor* RecordingService::Later(grpc::CallbackServerContext* c
 grpc::ServerUnaryReactor* RecordingService::StartRecording(grpc::CallbackServerContext* context,
                                                            const v1::StartRecordingRequest* request,
                                                            v1::StartRecordingResponse* response) {
+  if (const auto good = CheckRequest(*request); !good)
+    return RefuseCall(*context, "StartRecording", good.error());
   const auto work = [this, request, response, who = Who(*context, *security_)]() -> Result<void> {
     auto status = recorder_.Start(*request, who);
     if (!status) return status.error();
@@ -101,6 +104,8 @@ grpc::ServerUnaryReactor* RecordingService::ListLogs(grpc::CallbackServerContext
 grpc::ServerUnaryReactor* RecordingService::DescribeLog(grpc::CallbackServerContext* context,
                                                         const v1::DescribeLogRequest* request,
                                                         v1::DescribeLogResponse* response) {
+  if (const auto good = CheckRequest(*request); !good)
+    return RefuseCall(*context, "DescribeLog", good.error());
   return Later(context, "DescribeLog", [this, request, response]() -> Result<void> {
     auto described = recorder_.catalog().Describe(request->log());
     if (!described) return described.error();
@@ -112,9 +117,10 @@ grpc::ServerUnaryReactor* RecordingService::DescribeLog(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* RecordingService::DeleteLog(grpc::CallbackServerContext* context,
                                                       const v1::DeleteLogRequest* request,
                                                       v1::DeleteLogResponse*) {
+  if (const auto good = CheckRequest(*request); !good) return RefuseCall(*context, "DeleteLog", good.error());
   const auto work = [this, request, who = Who(*context, *security_)]() -> Result<void> {
     const auto deleted = recorder_.folder().Delete(request->log());
-    if (deleted) spdlog::info("{}: {} deleted", who, request->log());
+    if (deleted) SPDLOG_INFO("{}: {} deleted", who, request->log());
     return deleted;
   };
   return Later(context, "DeleteLog", work);
@@ -123,23 +129,20 @@ grpc::ServerUnaryReactor* RecordingService::DeleteLog(grpc::CallbackServerContex
 RecordingService::Stream* RecordingService::DownloadLog(grpc::CallbackServerContext* context,
                                                         const grpc::ByteBuffer* bytes) {
   constexpr const char* kCall = "DownloadLog";
-  v1::DownloadLogRequest request;
-  grpc::ByteBuffer copy(*bytes);  // parsing empties it
-  if (!grpc::SerializationTraits<v1::DownloadLogRequest>::Deserialize(&copy, &request).ok())
-    return RefuseStream(*context, kCall,
-                        {ErrorCode::kInvalidArgument, "the request is no DownloadLogRequest message"});
-  const auto found = recorder_.folder().Find(request.log());
+  const auto request = ParseRequest<v1::DownloadLogRequest>(*bytes);
+  if (!request) return RefuseStream(*context, kCall, request.error());
+  const auto found = recorder_.folder().Find(request->log());
   if (!found) return RefuseStream(*context, kCall, found.error());
   auto source = mcap::FileSource::Open(recorder_.folder().PathOf(*found));
   if (!source) return RefuseStream(*context, kCall, source.error());
-  if (request.offset() > (*source)->size())
+  if (request->offset() > (*source)->size())
     return RefuseStream(
         *context, kCall,
-        {ErrorCode::kEndOfData, "offset " + std::to_string(request.offset()) + " is past the end of " +
-                                    request.log() + ", " + std::to_string((*source)->size())});
+        {ErrorCode::kEndOfData, "offset " + std::to_string(request->offset()) + " is past the end of " +
+                                    request->log() + ", " + std::to_string((*source)->size())});
   auto stream =
-      std::make_shared<DownloadStream>(std::move(*source), request.offset(), registry_, senders_, files_);
-  if (const auto admitted = registry_.Admit(stream, PeerOf(*context)); !admitted)
+      std::make_shared<DownloadStream>(std::move(*source), request->offset(), registry_, senders_, files_);
+  if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_)); !admitted)
     return RefuseStream(*context, kCall, admitted.error());
   stream->Begin();
   return stream.get();  // the registry holds it until gRPC is done
@@ -152,7 +155,7 @@ RecordingService::Stream* RecordingService::Replay(grpc::CallbackServerContext* 
   if (!order) return RefuseStream(*context, kCall, order.error());
   const std::string log = order->log, peer = PeerOf(*context);
   auto stream = std::make_shared<ReplayStream>(std::move(*order), peer, desk_, registry_, senders_, players_);
-  if (const auto admitted = registry_.Admit(stream, peer); !admitted)
+  if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_)); !admitted)
     return RefuseStream(*context, kCall, admitted.error());
   stream->Begin(*files_, [this, log] { return OpenLog(recorder_, log); });
   return stream.get();  // the registry holds it until gRPC is done
@@ -161,6 +164,8 @@ RecordingService::Stream* RecordingService::Replay(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* RecordingService::ControlReplay(grpc::CallbackServerContext* context,
                                                           const v1::ControlReplayRequest* request,
                                                           v1::ControlReplayResponse*) {
+  if (const auto good = CheckRequest(*request); !good)
+    return RefuseCall(*context, "ControlReplay", good.error());
   auto* reactor = context->DefaultReactor();
   if (const auto stream = desk_->Find(request->player())) {
     (*stream)->Control(*request, [reactor](const grpc::Status& status) { reactor->Finish(status); });
@@ -173,6 +178,8 @@ grpc::ServerUnaryReactor* RecordingService::ControlReplay(grpc::CallbackServerCo
 grpc::ServerUnaryReactor* RecordingService::GetReplayPictures(grpc::CallbackServerContext* context,
                                                               const v1::GetReplayPicturesRequest* request,
                                                               v1::GetReplayPicturesResponse* response) {
+  if (const auto good = CheckRequest(*request); !good)
+    return RefuseCall(*context, "GetReplayPictures", good.error());
   auto* reactor = context->DefaultReactor();
   boost::asio::post(*files_, [this, reactor, request, response] {
     const auto stream = desk_->Find(request->player());

@@ -36,6 +36,8 @@ class RecordingService final
   /// What was asked for is done first. Only once all calls have ended.
   void Join();
 
+  const Recorder& recorder() const { return recorder_; }
+
  private:
   using Unary = grpc::ServerUnaryReactor;
   using Stream = grpc::ServerWriteReactor<grpc::ByteBuffer>;

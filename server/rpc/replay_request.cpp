@@ -1,19 +1,15 @@
 #include "server/rpc/replay_request.h"
 
-#include <grpcpp/impl/codegen/proto_utils.h>
-
+#include "server/rpc/request_check.h"
 #include "taclink/v1/recording.pb.h"
 #include "wire/convert.h"
 
 namespace taclink::server {
 
 Result<ReplayOrder> ParseReplayRequest(const grpc::ByteBuffer& bytes) {
-  v1::ReplayRequest request;
-  grpc::ByteBuffer copy(bytes);  // parsing empties it
-  if (!grpc::SerializationTraits<v1::ReplayRequest>::Deserialize(&copy, &request).ok())
-    return Error{ErrorCode::kInvalidArgument, "the request is no ReplayRequest message"};
-  if (!v1::Detail_IsValid(request.detail()))
-    return Error{ErrorCode::kInvalidArgument, "detail must be CONTACTS, GEOMETRY or FULL"};
+  const auto parsed = ParseRequest<v1::ReplayRequest>(bytes);
+  if (!parsed) return parsed.error();
+  const v1::ReplayRequest& request = *parsed;
   if (const auto good = LogPlayer::CheckSpeed(request.speed()); !good) return good.error();
   return ReplayOrder{.log = request.log(),
                      .selection = {.links = {request.links().begin(), request.links().end()},

@@ -71,7 +71,7 @@ Result<void> ReplayStream::MakePlayer(std::shared_ptr<const mcap::Reader> reader
 }
 
 void ReplayStream::Fail(const grpc::Status& status) {
-  spdlog::info("{}: Replay refused: {}", peer_, status.error_message());
+  SPDLOG_INFO("{}: Replay refused: {}", peer_, status.error_message());
   {
     const std::lock_guard lock(piece_mutex_);
     end_ = status;

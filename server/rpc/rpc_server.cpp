@@ -5,9 +5,11 @@
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
 
+#include <string_view>
 #include <utility>
 
 #include "server/rpc/credentials.h"
+#include "server/unix_socket.h"
 
 namespace taclink::server {
 namespace {
@@ -22,6 +24,16 @@ void EnablePlugins() {
     return true;
   }();
   static_cast<void>(once);
+}
+
+Result<void> CheckSocketIsFree(const std::string& listen) {
+  constexpr std::string_view kUnixScheme = "unix:";
+  if (!listen.starts_with(kUnixScheme)) return {};
+  const auto listener = ListenerOf(listen.substr(kUnixScheme.size()));
+  if (!listener) return {};
+  const std::string who = *listener == 0 ? "another program" : "process " + std::to_string(*listener);
+  return Error{ErrorCode::kUnavailable,
+               "cannot listen on " + listen + ": " + who + " does; stop it or choose another with --listen"};
 }
 
 std::string WithPort(const std::string& listen, int port) {
@@ -43,6 +55,7 @@ RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const
 Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, Arm& arm, ServiceLimits limits,
                                                     std::shared_ptr<const Security> security,
                                                     Recorder* recorder) {
+  if (const auto free = CheckSocketIsFree(listen); !free) return free.error();
   EnablePlugins();
   if (!security) security = std::make_shared<const Security>();
   std::unique_ptr<RpcServer> out(new RpcServer(arm, limits, security, recorder));

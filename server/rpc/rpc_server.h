@@ -34,6 +34,8 @@ class RpcServer {
   const std::string& address() const { return address_; }
   /// For calls from within this process.
   std::shared_ptr<grpc::Channel> InProcessChannel() { return server_->InProcessChannel({}); }
+  /// Null: there is none.
+  const Recorder* recorder() const { return recordings_ ? &recordings_->recorder() : nullptr; }
   size_t streams() const { return service_.streams(); }
   void SetLimits(ServiceLimits limits) { service_.SetLimits(limits); }
 

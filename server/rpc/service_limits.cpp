@@ -18,6 +18,7 @@ ServiceLimits ToServiceLimits(const LimitsConfig& config) {
           .max_streams_per_peer = size(config.max_streams_per_peer),
           .queue_messages = size(config.queue_messages),
           .queue_bytes = size(config.queue_mb) << 20,
+          .queue_bytes_per_peer = size(config.queue_mb_per_peer) << 20,
           .max_calls_per_connection = config.max_calls_per_connection,
           .max_message_bytes = config.max_message_kb * 1024,
           .memory_bytes = size(config.memory_mb) << 20,

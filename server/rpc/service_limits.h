@@ -12,9 +12,10 @@ namespace taclink::server {
 /// LimitsConfig, in the units that the services use.
 struct ServiceLimits {
   size_t max_streams = 64;
-  size_t max_streams_per_peer = 64;
+  size_t max_streams_per_peer = 16;
   size_t queue_messages = 256;
   size_t queue_bytes = size_t{32} << 20;
+  size_t queue_bytes_per_peer = size_t{64} << 20;
   int max_calls_per_connection = 100;
   int max_message_bytes = 64 * 1024;
   size_t memory_bytes = size_t{256} << 20;

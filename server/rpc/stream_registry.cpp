@@ -4,54 +4,50 @@
 
 namespace taclink::server {
 
-std::string PeerAddress(const std::string& peer) {
-  if (peer.starts_with("ipv4:") || peer.starts_with("ipv6:")) return peer.substr(0, peer.rfind(':'));
-  return peer.starts_with("unix:") ? "unix" : "";
-}
+StreamRegistry::StreamRegistry(const StreamLimits& limits)
+    : shares_(limits.streams, {.things = "streams",
+                               .all_setting = "limits.max_streams",
+                               .party_setting = "limits.max_streams_per_peer"}),
+      queue_bytes_per_party_(limits.queue_bytes_per_party) {}
 
-Result<void> StreamRegistry::Admit(std::shared_ptr<PumpedStream> stream, const std::string& peer) {
-  const auto full = [](size_t limit, const std::string& whose, const char* key) {
-    return Error{ErrorCode::kResourceExhausted, "all " + std::to_string(limit) + " streams " + whose +
-                                                    "are in use; close one or raise limits." + key};
-  };
-  std::string address = PeerAddress(peer);
+Result<void> StreamRegistry::Admit(std::shared_ptr<PumpedStream> stream, const Party& party) {
   const std::lock_guard lock(mutex_);
   if (closed_) return Error{ErrorCode::kUnavailable, "server is shutting down"};
-  if (streams_.size() >= max_streams_) return full(max_streams_, "", "max_streams");
-  if (!address.empty()) {
-    const auto used = by_address_.find(address);
-    if (used != by_address_.end() && used->second >= max_streams_per_peer_)
-      return full(max_streams_per_peer_, "for clients at " + address + " ", "max_streams_per_peer");
-    ++by_address_[address];
+  if (const auto taken = shares_.Take(party); !taken) return taken;
+  if (!party.who.empty()) {
+    auto& bytes = queue_bytes_[party.who];
+    if (!bytes) bytes = std::make_shared<ByteBudget>(queue_bytes_per_party_);
+    stream->SetPartyBytes(bytes);
   }
-  streams_.emplace(std::move(stream), std::move(address));
+  streams_.emplace(std::move(stream), party);
   return {};
 }
 
-void StreamRegistry::SetMaxStreams(size_t max_streams, size_t max_streams_per_peer) {
+void StreamRegistry::SetLimits(const StreamLimits& limits) {
   const std::lock_guard lock(mutex_);
-  max_streams_ = max_streams;
-  max_streams_per_peer_ = max_streams_per_peer;
+  shares_.SetLimits(limits.streams);
+  queue_bytes_per_party_ = limits.queue_bytes_per_party;
+  for (const auto& [party, bytes] : queue_bytes_) bytes->SetLimit(queue_bytes_per_party_);
 }
 
 void StreamRegistry::Remove(const std::shared_ptr<PumpedStream>& stream) {
   const std::lock_guard lock(mutex_);
   const auto at = streams_.find(stream);
   if (at == streams_.end()) return;
-  if (const auto used = by_address_.find(at->second); used != by_address_.end() && --used->second == 0)
-    by_address_.erase(used);
+  shares_.Give(at->second);
+  if (!shares_.Holds(at->second)) queue_bytes_.erase(at->second.who);
   streams_.erase(at);
   if (streams_.empty()) empty_.notify_all();
 }
 
 void StreamRegistry::Close(const std::string& reason) {
-  std::map<std::shared_ptr<PumpedStream>, std::string> streams;
+  std::map<std::shared_ptr<PumpedStream>, Party> streams;
   {
     const std::lock_guard lock(mutex_);
     closed_ = true;
     streams = streams_;
   }
-  for (const auto& [stream, address] : streams) stream->End(reason);
+  for (const auto& [stream, party] : streams) stream->End(reason);
 }
 
 size_t StreamRegistry::streams() const {

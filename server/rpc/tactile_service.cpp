@@ -10,7 +10,8 @@
 #include "server/rpc/event_calls.h"
 #include "server/rpc/link_calls.h"
 #include "server/rpc/preview_stream.h"
-#include "server/rpc/refused_stream.h"
+#include "server/rpc/refusal.h"
+#include "server/rpc/request_check.h"
 #include "server/rpc/status.h"
 #include "server/rpc/stream_request.h"
 #include "server/rpc/who.h"
@@ -19,18 +20,14 @@ namespace taclink::server {
 namespace {
 
 // A robot has one source of joint states, a few at most.
-constexpr size_t kMaxUpdateCalls = 16;
-constexpr uint32_t kDefaultPairs = 8, kMaxPairs = 300, kDefaultTareFrames = 10;
+constexpr ShareLimits kUpdateCalls = {.all = 16, .per_party = 8};
+constexpr uint32_t kDefaultPairs = 8, kDefaultTareFrames = 10;
 
 using StreamReactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
 
-Error Invalid(std::string message) {
-  return {ErrorCode::kInvalidArgument, std::move(message)};
-}
-
-std::string CountRange(const char* field, uint32_t unset) {
-  return std::string(field) + " must be 1 to " + std::to_string(kMaxPairs) + ", or 0 for " +
-         std::to_string(unset);
+StreamLimits ToStreamLimits(const ServiceLimits& limits) {
+  return {.streams = {.all = limits.max_streams, .per_party = limits.max_streams_per_peer},
+          .queue_bytes_per_party = limits.queue_bytes_per_peer};
 }
 
 }  // namespace
@@ -41,8 +38,8 @@ TactileService::TactileService(Arm& arm, ServiceLimits limits,
     : arm_(arm),
       senders_(std::move(senders)),
       security_(std::move(security)),
-      registry_(limits.max_streams, limits.max_streams_per_peer),
-      updates_(kMaxUpdateCalls),
+      registry_(ToStreamLimits(limits)),
+      updates_(kUpdateCalls),
       limits_(limits) {
   link_names_ = arm.link_names();
 }
@@ -62,7 +59,7 @@ ServiceLimits TactileService::limits() const {
 }
 
 void TactileService::SetLimits(ServiceLimits limits) {
-  registry_.SetMaxStreams(limits.max_streams, limits.max_streams_per_peer);
+  registry_.SetLimits(ToStreamLimits(limits));
   const std::lock_guard lock(limits_mutex_);
   limits_ = limits;
 }
@@ -87,9 +84,9 @@ StreamReactor* TactileService::StreamFrames(grpc::CallbackServerContext* context
 
 StreamReactor* TactileService::StreamContacts(grpc::CallbackServerContext* context,
                                               const grpc::ByteBuffer* request) {
-  const auto max_rate_hz = ContactStream::ParseRequest(*request);
-  if (!max_rate_hz) return RefuseStream(*context, "StreamContacts", max_rate_hz.error());
-  auto stream = std::make_shared<ContactStream>(arm_, *max_rate_hz, registry_, senders_);
+  const auto parsed = ParseRequest<v1::StreamContactsRequest>(*request);
+  if (!parsed) return RefuseStream(*context, "StreamContacts", parsed.error());
+  auto stream = std::make_shared<ContactStream>(arm_, parsed->max_rate_hz(), registry_, senders_);
   if (auto* refused = AddOrRefuse(*context, "StreamContacts", stream)) return refused;
   stream->Begin();
   return stream.get();  // the registry holds it until gRPC is done
@@ -98,13 +95,11 @@ StreamReactor* TactileService::StreamContacts(grpc::CallbackServerContext* conte
 StreamReactor* TactileService::StreamEvents(grpc::CallbackServerContext* context,
                                             const grpc::ByteBuffer* bytes) {
   constexpr const char* kCall = "StreamEvents";
-  v1::StreamEventsRequest request;
-  grpc::ByteBuffer copy(*bytes);  // parsing empties it
-  if (!grpc::SerializationTraits<v1::StreamEventsRequest>::Deserialize(&copy, &request).ok())
-    return RefuseStream(*context, kCall, Invalid("the request is no StreamEventsRequest message"));
-  const auto links = FindLinks(link_names_, request.links());
+  const auto request = ParseRequest<v1::StreamEventsRequest>(*bytes);
+  if (!request) return RefuseStream(*context, kCall, request.error());
+  const auto links = FindLinks(link_names_, request->links());
   if (!links) return RefuseStream(*context, kCall, links.error());
-  const auto options = server::ParseRequest(request, *links, arm_.events().history());
+  const auto options = ToEventStreamOptions(*request, *links, arm_.events().history());
   if (!options) return RefuseStream(*context, kCall, options.error());
   auto stream = std::make_shared<EventStream>(link_names_, arm_.clock(), registry_, senders_);
   if (auto* refused = AddOrRefuse(*context, kCall, stream)) return refused;
@@ -114,30 +109,31 @@ StreamReactor* TactileService::StreamEvents(grpc::CallbackServerContext* context
 
 StreamReactor* TactileService::AddOrRefuse(const grpc::CallbackServerContext& context, const char* method,
                                            std::shared_ptr<PumpedStream> stream) {
-  const auto admitted = registry_.Admit(std::move(stream), PeerOf(context));
+  const auto admitted = registry_.Admit(std::move(stream), PartyOf(context, *security_));
   return admitted ? nullptr : RefuseStream(context, method, admitted.error());
 }
 
 grpc::ServerReadReactor<v1::UpdateJointStatesRequest>* TactileService::UpdateJointStates(
-    grpc::CallbackServerContext*, v1::UpdateJointStatesResponse* response) {
-  return TakeJointStates(arm_, updates_, *response);
+    grpc::CallbackServerContext* context, v1::UpdateJointStatesResponse* response) {
+  return TakeJointStates(arm_, updates_, PartyOf(*context, *security_), *response);
 }
 
 grpc::ServerReadReactor<v1::UpdatePressureRequest>* TactileService::UpdatePressure(
-    grpc::CallbackServerContext*, v1::UpdatePressureResponse* response) {
-  return TakePressure(arm_, updates_, *response);
+    grpc::CallbackServerContext* context, v1::UpdatePressureResponse* response) {
+  return TakePressure(arm_, updates_, PartyOf(*context, *security_), *response);
 }
 
 grpc::ServerUnaryReactor* TactileService::SetThresholds(grpc::CallbackServerContext* context,
                                                         const v1::SetThresholdsRequest* request,
                                                         v1::SetThresholdsResponse* response) {
+  constexpr const char* kCall = "SetThresholds";
+  if (const auto good = CheckRequest(*request); !good) return RefuseCall(*context, kCall, good.error());
   const auto link = arm_.FindLink(request->link());
-  const Result<void> set =
-      link ? server::SetThresholds(arm_, *link, *request, Who(*context, *security_), *response)
-           : link.error();
-  if (!set) spdlog::info("{}: SetThresholds refused: {}", PeerOf(*context), set.error().message);
+  if (!link) return RefuseCall(*context, kCall, link.error());
+  const auto set = server::SetThresholds(arm_, *link, *request, Who(*context, *security_), *response);
+  if (!set) return RefuseCall(*context, kCall, set.error());
   auto* reactor = context->DefaultReactor();
-  reactor->Finish(set ? grpc::Status::OK : ToGrpc(set.error()));
+  reactor->Finish(grpc::Status::OK);
   return reactor;
 }
 
@@ -157,13 +153,13 @@ StreamReactor* TactileService::StreamPreview(grpc::CallbackServerContext* contex
 grpc::ServerUnaryReactor* TactileService::SetForceModel(grpc::CallbackServerContext* context,
                                                         const v1::SetForceModelRequest* request,
                                                         v1::SetForceModelResponse*) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  constexpr const char* kCall = "SetForceModel";
+  if (const auto good = CheckRequest(*request); !good) return RefuseCall(*context, kCall, good.error());
   const auto link = FindLiveLink(arm_, request->link());
+  if (!link) return RefuseCall(*context, kCall, link.error());
   const auto model = ParseForceModel(*request);
-  if (!link || !model) {
-    reactor->Finish(ToGrpc(link ? model.error() : link.error()));
-    return reactor;
-  }
+  if (!model) return RefuseCall(*context, kCall, model.error());
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
   boost::asio::post(*aside_, [this, reactor, link = *link, model = *model, who = Who(*context, *security_)] {
     const Result<void> set = arm_.worker(link).SetForceModel(model);
     arm_.events().Post(EventKind::kForceModel, link, ToOperation(model, set, who));
@@ -175,13 +171,13 @@ grpc::ServerUnaryReactor* TactileService::SetForceModel(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* TactileService::SetCamera(grpc::CallbackServerContext* context,
                                                     const v1::SetCameraRequest* request,
                                                     v1::SetCameraResponse*) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  constexpr const char* kCall = "SetCamera";
+  if (const auto good = CheckRequest(*request); !good) return RefuseCall(*context, kCall, good.error());
   const auto link = FindLiveLink(arm_, request->link());
+  if (!link) return RefuseCall(*context, kCall, link.error());
   const auto order = ParseCameraRequest(*request);
-  if (!link || !order) {
-    reactor->Finish(ToGrpc(link ? order.error() : link.error()));
-    return reactor;
-  }
+  if (!order) return RefuseCall(*context, kCall, order.error());
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
   const auto observer = [reactor, request, &arm = arm_, link = *link,
                          who = Who(*context, *security_)](const Result<void>& end) {
     arm.events().Post(EventKind::kCamera, link, ToOperation(*request, end, who));
@@ -194,10 +190,10 @@ grpc::ServerUnaryReactor* TactileService::SetCamera(grpc::CallbackServerContext*
 
 Result<void> TactileService::OrderCalibration(const std::string& who, const v1::CalibrateRequest& request,
                                               const std::shared_ptr<CalibrateStream>& stream) {
+  if (auto good = CheckRequest(request); !good) return good;
   const uint32_t pairs = request.pairs() == 0 ? kDefaultPairs : request.pairs();
   const auto link = arm_.FindLink(request.link());
   if (!link) return link.error();
-  if (pairs > kMaxPairs) return Invalid(CountRange("pairs", kDefaultPairs));
   return arm_.worker(*link).Calibrate(
       {.pairs = static_cast<int>(pairs), .save = request.save(), .force = request.force()},
       [stream, &arm = arm_, at = *link, who](const CalibrationProgress& progress) {
@@ -212,7 +208,7 @@ grpc::ServerWriteReactor<v1::CalibrateResponse>* TactileService::Calibrate(
   Result<void> ordered = calibrations_.Add(stream);
   if (ordered) ordered = OrderCalibration(Who(*context, *security_), *request, stream);
   if (!ordered) {
-    spdlog::info("{}: Calibrate refused: {}", PeerOf(*context), ordered.error().message);
+    SPDLOG_INFO("{}: Calibrate refused: {}", PeerOf(*context), ordered.error().message);
     stream->End(ordered.error());
   }
   return stream.get();  // holds itself until gRPC is done
@@ -220,15 +216,11 @@ grpc::ServerWriteReactor<v1::CalibrateResponse>* TactileService::Calibrate(
 
 grpc::ServerUnaryReactor* TactileService::Tare(grpc::CallbackServerContext* context,
                                                const v1::TareRequest* request, v1::TareResponse* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  if (const auto good = CheckRequest(*request); !good) return RefuseCall(*context, "Tare", good.error());
   const auto wanted = FindLinks(link_names_, request->links());
+  if (!wanted) return RefuseCall(*context, "Tare", wanted.error());
   const uint32_t frames = request->frames() == 0 ? kDefaultTareFrames : request->frames();
-  if (!wanted || frames > kMaxPairs) {
-    const Error error = !wanted ? wanted.error() : Invalid(CountRange("frames", kDefaultTareFrames));
-    spdlog::info("{}: Tare refused: {}", PeerOf(*context), error.message);
-    reactor->Finish(ToGrpc(error));
-    return reactor;
-  }
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
   std::vector<size_t> links;
   std::vector<std::string> names;
   for (size_t link = 0; link < link_names_.size(); ++link) {
@@ -245,7 +237,7 @@ grpc::ServerUnaryReactor* TactileService::Tare(grpc::CallbackServerContext* cont
   for (size_t place = 0; place < links.size(); ++place) {
     const auto observer = [call, place, &arm = arm_, link = links[place], name = names[place],
                            who = Who(*context, *security_)](const Result<TareSummary>& end) {
-      spdlog::info("{}: tare of link {}: {}", who, name, end ? "done" : end.error().message);
+      SPDLOG_INFO("{}: tare of link {}: {}", who, name, end ? "done" : end.error().message);
       arm.events().Post(EventKind::kTare, link, ToOperation(end, who));
       call->Answer(place, end);
     };

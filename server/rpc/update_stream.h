@@ -3,13 +3,14 @@
 #include <grpcpp/support/server_callback.h>
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string>
 #include <utility>
 
 #include "server/rpc/status.h"
+#include "server/shares.h"
 
 namespace taclink::server {
 
@@ -20,35 +21,37 @@ class UpdateCall {
   virtual void End(const grpc::Status& status) = 0;
 };
 
-/// The client-streaming calls of a server; bounds their number. Holds each until gRPC is done with it.
+/// The client-streaming calls of a server; bounds their number, of all and of each party. Holds each until
+/// gRPC is done with it.
 class UpdateRegistry {
  public:
-  explicit UpdateRegistry(size_t max_calls) : max_calls_(max_calls) {}
+  explicit UpdateRegistry(const ShareLimits& limits)
+      : shares_(limits, {.things = "calls that feed the server", .all_setting = "", .party_setting = ""}) {}
 
   /// Errors: kResourceExhausted, kUnavailable (closed).
-  Result<void> Add(std::shared_ptr<UpdateCall> call) {
+  Result<void> Add(std::shared_ptr<UpdateCall> call, const Party& party) {
     const std::lock_guard lock(mutex_);
     if (closed_) return Error{ErrorCode::kUnavailable, "server is shutting down"};
-    if (calls_.size() >= max_calls_) {
-      return Error{ErrorCode::kResourceExhausted,
-                   "all " + std::to_string(max_calls_) + " calls that feed the server are in use; end one"};
-    }
-    calls_.insert(std::move(call));
+    if (const auto taken = shares_.Take(party); !taken) return taken;
+    calls_.emplace(std::move(call), party);
     return {};
   }
   void Remove(const std::shared_ptr<UpdateCall>& call) {
     const std::lock_guard lock(mutex_);
-    calls_.erase(call);
+    const auto at = calls_.find(call);
+    if (at == calls_.end()) return;  // was refused
+    shares_.Give(at->second);
+    calls_.erase(at);
   }
   /// Ends all and takes no more.
   void Close(const std::string& reason) {
-    std::set<std::shared_ptr<UpdateCall>> calls;
+    std::map<std::shared_ptr<UpdateCall>, Party> calls;
     {
       const std::lock_guard lock(mutex_);
       closed_ = true;
       calls = calls_;
     }
-    for (const auto& call : calls) call->End({grpc::StatusCode::UNAVAILABLE, reason});
+    for (const auto& [call, party] : calls) call->End({grpc::StatusCode::UNAVAILABLE, reason});
   }
   size_t calls() const {
     const std::lock_guard lock(mutex_);
@@ -56,11 +59,10 @@ class UpdateRegistry {
   }
 
  private:
-  // Constant after construction.
-  const size_t max_calls_;
   mutable std::mutex mutex_;
   // Guarded by mutex_.
-  std::set<std::shared_ptr<UpdateCall>> calls_;
+  Shares shares_;
+  std::map<std::shared_ptr<UpdateCall>, Party> calls_;
   bool closed_ = false;
 };
 

@@ -1,7 +1,6 @@
 #include "server/rpc/who.h"
 
 #include "server/forwarded.h"
-#include "server/rpc/stream_registry.h"
 
 namespace taclink::server {
 namespace {
@@ -13,7 +12,7 @@ std::string Metadata(const grpc::ServerContextBase& context, const char* key) {
 }
 
 bool IsForwarded(const grpc::ServerContextBase& context) {
-  return PeerAddress(context.peer()).empty() && context.client_metadata().contains(kForwardedPeer);
+  return PlaceOf(context.peer()).address.empty() && context.client_metadata().contains(kForwardedPeer);
 }
 
 }  // namespace
@@ -34,6 +33,10 @@ Caller CallerOf(const grpc::ServerContextBase& context, const Security& security
   if (!auth || !auth->IsPeerAuthenticated()) return caller;
   for (const auto& identity : auth->GetPeerIdentity()) caller.name.assign(identity.data(), identity.size());
   return caller;
+}
+
+Party PartyOf(const grpc::ServerContextBase& context, const Security& security) {
+  return PartyOf(PeerOf(context), CallerOf(context, security).name);
 }
 
 std::string Who(const grpc::ServerContextBase& context, const Security& security) {

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "server/party.h"
 #include "server/security/security.h"
 
 namespace taclink::server {
@@ -14,6 +15,9 @@ std::string PeerOf(const grpc::ServerContextBase& context);
 
 /// Who the server takes a caller for.
 Caller CallerOf(const grpc::ServerContextBase& context, const Security& security);
+
+/// Whose share of streams and calls this one takes.
+Party PartyOf(const grpc::ServerContextBase& context, const Security& security);
 
 /// Who calls, for logs and the audit: the name of the token or of the certificate, if there is any, with the
 /// peer.

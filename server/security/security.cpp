@@ -2,15 +2,20 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
+#include "sensing/core/utc_time.h"
+#include "server/security/secret_file.h"
 #include "server/thread_setup.h"
 
 namespace taclink::server {
 namespace {
 
 constexpr std::chrono::seconds kWatchInterval{1};
+constexpr size_t kMostChanges = 16;
+constexpr int64_t kNsPerSecond = 1'000'000'000;
 
 bool SameWord(std::string_view a, std::string_view lower) {
   if (a.size() != lower.size()) return false;
@@ -19,6 +24,36 @@ bool SameWord(std::string_view a, std::string_view lower) {
     if (c != lower[i]) return false;
   }
   return true;
+}
+
+// Which files of TLS are others than before.
+std::string TlsChanges(const TlsMaterial& before, const TlsMaterial& after) {
+  std::string out;
+  const auto add = [&](const char* name, bool changed) {
+    if (changed) out += (out.empty() ? "" : ", ") + std::string(name);
+  };
+  add("certificate", before.certificate != after.certificate);
+  add("key", before.key != after.key);
+  add("client_ca", before.client_ca != after.client_ca);
+  return out.empty() ? out : out + " read anew";
+}
+
+// Whose tokens have expired between two moments.
+std::string ExpiredSince(const Tokens& tokens, int64_t before_s, int64_t now_s) {
+  std::string out;
+  for (const Tokens::Entry& entry : tokens.entries())
+    if (entry.ExpiredAt(now_s) && !entry.ExpiredAt(before_s))
+      out += (out.empty() ? "expired: " : ", ") + entry.caller.name;
+  return out;
+}
+
+void Count(const Tokens& tokens, int64_t now_s, SecurityStatus& out) {
+  for (const Tokens::Entry& entry : tokens.entries()) {
+    ++(entry.ExpiredAt(now_s) ? out.expired : out.tokens);
+    if (entry.expires_utc_s && !entry.ExpiredAt(now_s))
+      out.next_expiry_utc_s =
+          std::min(out.next_expiry_utc_s.value_or(*entry.expires_utc_s), *entry.expires_utc_s);
+  }
 }
 
 }  // namespace
@@ -33,53 +68,90 @@ std::string_view BearerToken(std::string_view authorization) {
   return begin == std::string_view::npos ? std::string_view() : authorization.substr(begin);
 }
 
-Result<std::shared_ptr<Security>> Security::Load(const SecurityConfig& config) {
-  std::shared_ptr<Security> out(new Security(config));
+Security::Security(SecurityConfig config, Clock& clock)
+    : config_(std::move(config)),
+      clock_(clock),
+      tls_part_{.name = "certificates", .consequence = "what was read before stays in use"},
+      token_part_{.name = "tokens",
+                  .consequence = config_.tokens_keep ? "the tokens that were read before stay in use"
+                                                     : "nobody's token is taken until it is mended"},
+      expiry_part_{.name = "expiry of tokens", .consequence = "nobody is let in; add a new one"},
+      tries_(config_.max_failed_tries) {}
+
+Result<std::shared_ptr<Security>> Security::Load(const SecurityConfig& config, Clock& clock) {
+  std::shared_ptr<Security> out(new Security(config, clock));
   const std::lock_guard lock(out->reload_mutex_);
-  const auto read = out->Read();
-  if (!read) return read.error();
+  for (const auto& read : {out->ReadTls(), out->ReadTokens()}) {
+    if (!read) return read.error();
+    if (!read->empty()) SPDLOG_WARN("security: {}", *read);  // has expired already
+  }
   return out;
 }
 
-Security::~Security() {
-  watcher_.request_stop();
-}
-
-Result<Caller> Security::Check(std::string_view path, std::string_view authorization) const {
+Result<Caller> Security::Check(std::string_view path, std::string_view authorization,
+                               const std::string& place) const {
   if (!needs_token()) return Caller{"", Role::kOperator};
   const Role needed = NeededRole(path);
-  if (needed == Role::kNobody) return Identify(authorization);
   const std::string_view token = BearerToken(authorization);
-  if (token.empty())
-    return Error{ErrorCode::kUnauthenticated,
-                 "this server asks for a token: send 'authorization: Bearer TOKEN' (taclink: --token or "
-                 "TACLINK_TOKEN)"};
-  const auto caller = Find(token);
-  if (!caller)
-    return Error{ErrorCode::kUnauthenticated, "the token is not known to this server; ask for a new one"};
-  if (caller->role < needed)
+  const Found found = Find(token);
+  if (found.caller.role == Role::kNobody) {
+    if (needed == Role::kNobody && token.empty()) return found.caller;
+    const Error refusal = Refuse(found, token, place);  // counted also where nobody has to be known
+    return needed == Role::kNobody ? Result<Caller>(found.caller) : refusal;
+  }
+  if (found.caller.role < needed)
     return Error{ErrorCode::kPermissionDenied,
-                 "'" + caller->name + "' is a viewer, but " + std::string(path) + " is for operators"};
-  return *caller;
+                 "'" + found.caller.name + "' is a viewer, but " + std::string(path) + " is for operators"};
+  return found.caller;
 }
 
-std::optional<Caller> Security::Find(std::string_view token) const {
+Security::Found Security::Find(std::string_view token) const {
+  if (token.empty())
+    return {.caller = {},
+            .why_not =
+                "this server asks for a token: send 'authorization: Bearer TOKEN' (taclink: --token or "
+                "TACLINK_TOKEN)",
+            .count = &without_};
   const auto tokens = [this] {
     const std::lock_guard lock(mutex_);
     return tokens_;
   }();
-  const Caller* const caller = tokens->Find(token);
-  return caller == nullptr ? std::nullopt : std::optional(*caller);
+  if (!tokens) return {};
+  const Tokens::Entry* const entry = tokens->Find(token);
+  if (entry == nullptr)
+    return {.caller = {},
+            .why_not = "the token is not known to this server; ask for a new one",
+            .count = &unknown_};
+  if (entry->ExpiredAt(clock_.UtcNs() / kNsPerSecond))
+    return {.caller = {},
+            .why_not = "the token of '" + entry->caller.name + "' has expired at " +
+                       UtcText(*entry->expires_utc_s) + "; ask for a new one",
+            .count = &expired_};
+  return {.caller = entry->caller, .why_not = {}};
+}
+
+Error Security::Refuse(const Found& found, std::string_view token, const std::string& place) const {
+  if (found.count == nullptr)
+    return {ErrorCode::kFailedPrecondition,
+            "this server cannot tell whose tokens are good: its token file is in error; its log says how"};
+  ++*found.count;
+  if (token.empty()) return {ErrorCode::kUnauthenticated, found.why_not};
+  const FailedTries::Verdict verdict = tries_.Count(place, clock_.MonotonicNs());
+  if (verdict.tell) {
+    const std::string text = fmt::format("more than {} tries a minute with tokens that are not good from {}",
+                                         config_.max_failed_tries, place.empty() ? "unknown" : place);
+    SPDLOG_WARN("security: {}", text);
+    if (listener_) listener_(false, text);
+  }
+  if (!verdict.too_many) return {ErrorCode::kUnauthenticated, found.why_not};
+  return {ErrorCode::kResourceExhausted, found.why_not + "; more than " +
+                                             std::to_string(config_.max_failed_tries) +
+                                             " such tries came from there within a minute: wait one"};
 }
 
 Caller Security::Identify(std::string_view authorization) const {
   if (!needs_token()) return {"", Role::kOperator};
-  const std::string_view token = BearerToken(authorization);
-  return token.empty() ? Caller{} : Find(token).value_or(Caller{});
-}
-
-std::string Security::NameOf(std::string_view authorization) const {
-  return Identify(authorization).name;
+  return Find(BearerToken(authorization)).caller;
 }
 
 std::shared_ptr<const TlsMaterial> Security::tls() const {
@@ -87,52 +159,100 @@ std::shared_ptr<const TlsMaterial> Security::tls() const {
   return tls_;
 }
 
-Result<void> Security::Read() {
-  std::shared_ptr<const TlsMaterial> tls;
-  if (!config_.certificate.empty()) {
-    auto material = ReadTlsFiles(config_);
-    if (!material) return material.error();
-    const std::string warnings = TlsWarnings(config_, *material);
-    if (!warnings.empty() && warnings != warnings_) spdlog::warn("security: {}", warnings);
-    warnings_ = warnings;
-    tls = std::make_shared<const TlsMaterial>(std::move(*material));
+SecurityStatus Security::Status() const {
+  SecurityStatus out;
+  const int64_t now_s = clock_.UtcNs() / kNsPerSecond;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const Part* part : {&tls_part_, &token_part_, &expiry_part_})
+      if (!part->complaint.empty())
+        out.trouble += (out.trouble.empty() ? "" : "; ") + part->complaint + "; " + part->consequence;
+    if (tokens_) Count(*tokens_, now_s, out);
   }
-  std::shared_ptr<const Tokens> tokens;
-  std::string text;
-  if (needs_token()) {
-    auto read = ReadSecurityFile("security.tokens", config_.tokens);
-    if (!read) return read.error();
-    text = std::move(*read);
-    auto parsed = Tokens::Parse(config_.tokens, text);
-    if (!parsed) return parsed.error();
-    tokens = std::make_shared<const Tokens>(std::move(*parsed));
-  }
+  out.refuses_all = needs_token() && out.tokens == 0;
+  out.tries_without = without_;
+  out.tries_unknown = unknown_;
+  out.tries_expired = expired_;
+  out.tries_throttled = tries_.throttled();
+  return out;
+}
+
+Result<std::string> Security::ReadTls() {
+  if (config_.certificate.empty()) return std::string();
+  auto material = ReadTlsFiles(config_);
+  if (!material) return material.error();
+  const std::string warnings = TlsWarnings(config_, *material);
+  if (!warnings.empty() && warnings != warnings_) SPDLOG_WARN("security: {}", warnings);
+  warnings_ = warnings;
   const std::lock_guard lock(mutex_);
-  const bool first = !tls_ && !tokens_;
-  if (tls && (!tls_ || *tls != *tls_)) {
-    if (!first) spdlog::info("security: certificates read anew");
-    tls_ = std::move(tls);
+  if (tls_ && *tls_ == *material) return std::string();
+  const auto before = std::exchange(tls_, std::make_shared<const TlsMaterial>(std::move(*material)));
+  return before ? TlsChanges(*before, *tls_) : std::string();
+}
+
+Result<std::string> Security::ReadTokens() {
+  if (!needs_token()) return std::string();
+  const auto text = config_.tokens_open ? ReadSecurityFile("security.tokens", config_.tokens)
+                                        : ReadSecretFile("security.tokens", config_.tokens);
+  if (!text) return text.error();
+  std::string changes;
+  if (!good_tokens_ || *text != token_text_) {
+    auto tokens = Tokens::Parse(config_.tokens, *text);
+    if (!tokens) return tokens.error();
+    const auto before = std::exchange(good_tokens_, std::make_shared<const Tokens>(std::move(*tokens)));
+    token_text_ = *text;
+    if (before) changes = TokenChanges(*before, *good_tokens_);
   }
-  if (tokens && text != token_text_) {
-    if (!first) spdlog::info("security: {} tokens read anew", tokens->size());
-    tokens_ = std::move(tokens);
-    token_text_ = std::move(text);
-  }
-  return {};
+  const int64_t now_s = clock_.UtcNs() / kNsPerSecond;
+  const std::string expired = ExpiredSince(*good_tokens_, std::exchange(tokens_read_s_, now_s), now_s);
+  if (!expired.empty()) changes += (changes.empty() ? "" : "; ") + expired;
+  const std::lock_guard lock(mutex_);
+  tokens_ = good_tokens_;
+  return changes;
+}
+
+void Security::Tell(Part& part, const Result<std::string>& read) {
+  const std::string complaint = read ? "" : read.error().message;
+  const std::string before = [&] {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(part.complaint, complaint);
+  }();
+  const auto tell = [&](bool good, const std::string& text) {
+    good ? SPDLOG_INFO("security: {}", text) : SPDLOG_ERROR("security: {}", text);
+    if (listener_) listener_(good, text);
+  };
+  if (!complaint.empty() && complaint != before) tell(false, complaint + "; " + part.consequence);
+  if (complaint.empty() && !before.empty()) tell(true, std::string(part.name) + ": good again");
+  if (!read || read->empty()) return;
+  changes_.push_back(std::string(part.name) + ": " + *read);
+  if (changes_.size() > kMostChanges) changes_.erase(changes_.begin());
+  tell(true, changes_.back());
 }
 
 void Security::Reload() {
   const std::lock_guard lock(reload_mutex_);
-  const auto read = Read();
-  const std::string complaint = read ? "" : read.error().message;
-  if (complaint != complaint_ && !read)
-    spdlog::error("security: {}; what was read before stays in use", complaint);
-  complaint_ = complaint;
+  Tell(tls_part_, ReadTls());
+  const auto tokens = ReadTokens();
+  if (!tokens && !config_.tokens_keep) {
+    const std::lock_guard tokens_lock(mutex_);
+    tokens_ = nullptr;
+  }
+  Tell(token_part_, tokens);
+  const SecurityStatus status = Status();
+  Tell(expiry_part_, status.tokens == 0 && status.expired > 0
+                         ? Result<std::string>(Error{ErrorCode::kFailedPrecondition,
+                                                     "every token of " + config_.tokens + " has expired"})
+                         : Result<std::string>(std::string()));
 }
 
-void Security::Watch() {
-  if (config_.certificate.empty() && !needs_token()) return;
-  watcher_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+std::vector<std::string> Security::TakeChanges() {
+  const std::lock_guard lock(reload_mutex_);
+  return std::exchange(changes_, {});
+}
+
+std::jthread Security::Watch() {
+  if (config_.certificate.empty() && !needs_token()) return {};
+  return std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
 
 void Security::Run(const std::stop_token& stop) {

@@ -3,11 +3,10 @@
 #include <openssl/err.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
-#include <sys/stat.h>
 
-#include <fstream>
 #include <memory>
-#include <sstream>
+
+#include "server/security/secret_file.h"
 
 namespace taclink::server {
 namespace {
@@ -52,21 +51,10 @@ Error Invalid(std::string message) {
 
 }  // namespace
 
-Result<std::string> ReadSecurityFile(const std::string& what, const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (in && in.peek() == std::ifstream::traits_type::eof() && !in.bad()) return std::string();
-  std::ostringstream text;
-  if (in) text << in.rdbuf();
-  if (!in || !text)
-    return Error{ErrorCode::kNotFound,
-                 what + " " + path + " cannot be read; check the path and who may read it"};
-  return text.str();
-}
-
 Result<TlsMaterial> ReadTlsFiles(const SecurityConfig& config) {
   auto certificate = ReadSecurityFile("security.certificate", config.certificate);
   if (!certificate) return certificate.error();
-  auto key = ReadSecurityFile("security.key", config.key);
+  auto key = ReadSecretFile("security.key", config.key);
   if (!key) return key.error();
   TlsMaterial out{.certificate = std::move(*certificate), .key = std::move(*key), .client_ca = {}};
   const Certificate own = FirstCertificate(out.certificate);
@@ -91,9 +79,6 @@ Result<TlsMaterial> ReadTlsFiles(const SecurityConfig& config) {
 std::string TlsWarnings(const SecurityConfig& config, const TlsMaterial& material) {
   std::string out;
   const auto add = [&](const std::string& text) { out += (out.empty() ? "" : "; ") + text; };
-  struct stat info{};
-  if (stat(config.key.c_str(), &info) == 0 && (info.st_mode & (S_IRWXG | S_IRWXO)) != 0)
-    add("others than its owner may use the key " + config.key + "; chmod 600 it");
   const Certificate own = FirstCertificate(material.certificate);
   if (own && X509_cmp_current_time(X509_get0_notAfter(own.get())) < 0)
     add("the certificate " + config.certificate + " has expired; clients will refuse it");

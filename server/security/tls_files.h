@@ -16,13 +16,11 @@ struct TlsMaterial {
   bool operator==(const TlsMaterial&) const = default;
 };
 
-/// Reads and checks the configured files. Errors: kNotFound, kInvalidArgument; they name the file.
+/// Reads and checks the configured files. Errors: kNotFound, kInvalidArgument,
+/// kPermissionDenied (see CheckSecretFile); they name the file.
 Result<TlsMaterial> ReadTlsFiles(const SecurityConfig& config);
 
-/// What is worth a warning but works: a key that others may read, a certificate out of its time. Empty: none.
+/// What is worth a warning but works: a certificate out of its time. Empty: none.
 std::string TlsWarnings(const SecurityConfig& config, const TlsMaterial& material);
-
-/// Errors: kNotFound (`what` names its use).
-Result<std::string> ReadSecurityFile(const std::string& what, const std::string& path);
 
 }  // namespace taclink::server

@@ -17,7 +17,7 @@ namespace {
 
 constexpr auto kSvk = MaterialLaw::kSaintVenantKirchhoff, kRubber = MaterialLaw::kNeoHookean;
 
-class MaterialOf : public testing::TestWithParam<MaterialLaw> {
+class MaterialOf : public ::testing::TestWithParam<MaterialLaw> {
  protected:
   static void Print(const char* what, const MaterialFit& fit) {
     std::printf("%s, %s: %.4f +- %.4f MPa", what, Name(fit.material.law), fit.material.youngs_modulus_mpa,
@@ -47,7 +47,7 @@ class MaterialOf : public testing::TestWithParam<MaterialLaw> {
   const LinkModel model_ = LoadLinkModel("cylinder").value();
 };
 
-std::string Named(const testing::TestParamInfo<MaterialLaw>& law) {
+std::string Named(const ::testing::TestParamInfo<MaterialLaw>& law) {
   return law.param == kRubber ? "NeoHookean" : "SaintVenantKirchhoff";
 }
 
@@ -183,7 +183,7 @@ TEST_P(MaterialOf, TheRealSkin) {
   EXPECT_GT(forces.sigma_mpa, 0.001);
 }
 
-INSTANTIATE_TEST_SUITE_P(Laws, MaterialOf, testing::Values(kSvk, kRubber), Named);
+INSTANTIATE_TEST_SUITE_P(Laws, MaterialOf, ::testing::Values(kSvk, kRubber), Named);
 
 }  // namespace
 }  // namespace taclink

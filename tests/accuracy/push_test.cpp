@@ -41,7 +41,7 @@ Scene PushScene(const LinkModel& model, int marker) {
   return scene;
 }
 
-class PushTest : public testing::TestWithParam<std::string> {
+class PushTest : public ::testing::TestWithParam<std::string> {
  protected:
   struct Solved {
     LinkState state;
@@ -114,7 +114,7 @@ TEST_P(PushTest, EveryPlaceOfTheSkin) {
 TEST_P(PushTest, OnlyWhatTouchesAnInflatedSkinIsAContact) {
   Scene scene = LoadScene("inflate").value();
   constexpr double kInflatedS = 4.5, kHeldS = 6.5;
-  EXPECT_THAT(Solve(scene, kInflatedS, std::nullopt).state.contacts, testing::IsEmpty());
+  EXPECT_THAT(Solve(scene, kInflatedS, std::nullopt).state.contacts, ::testing::IsEmpty());
   const Solved held = Solve(scene, kHeldS, std::nullopt);
   ASSERT_EQ(held.state.contacts.size(), 1u) << held.state.status_reason;
   const TrueContact& real = held.truth.contacts.at(0);
@@ -123,7 +123,7 @@ TEST_P(PushTest, OnlyWhatTouchesAnInflatedSkinIsAContact) {
   EXPECT_LT((held.state.contacts[0].center_mm - real.center_mm).norm(), 8);
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, PushTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, PushTest, ::testing::Values("cylinder", "barrel"));
 
 }  // namespace
 }  // namespace taclink

@@ -29,8 +29,8 @@ Scene NonlinearPress() {
 }
 
 // One link with its pictures at rest and touched.
-struct Bench {
-  explicit Bench(const std::string& model_name)
+struct PipelineBench {
+  explicit PipelineBench(const std::string& model_name)
       : model(LoadLinkModel(model_name).value()),
         scene(NonlinearPress()),
         skin(SimulatedSkin::Make(model, scene).value()),
@@ -68,14 +68,14 @@ struct Bench {
   StereoFrame rest, touched;
 };
 
-Bench& For(const benchmark::State& state) {
-  static Bench cylinder("cylinder"), barrel("barrel");
+PipelineBench& For(const benchmark::State& state) {
+  static PipelineBench cylinder("cylinder"), barrel("barrel");
   return state.range(0) == 0 ? cylinder : barrel;
 }
 
 // What one stage hands to the next, for the touched pictures.
 struct Stages {
-  explicit Stages(const Bench& bench)
+  explicit Stages(const PipelineBench& bench)
       : pipeline(bench.CalibratedPipeline()),
         tracker(bench.model, pipeline.calibration()->rig),
         skin(bench.model, *pipeline.calibration(), {}),
@@ -112,7 +112,7 @@ struct Stages {
 };
 
 void Decode(benchmark::State& state) {
-  Bench& bench = For(state);
+  PipelineBench& bench = For(state);
   Stages s(bench);
   for (auto _ : state) {
     for (size_t i = 0; i < kCameraCount; ++i) {
@@ -135,7 +135,7 @@ void Register(benchmark::State& state) {
 
 // Frames that follow one another: nothing moves, or a dent of 8 mm comes, slides at 30 mm/s and goes.
 void Track(benchmark::State& state, bool moving) {
-  Bench& bench = For(state);
+  PipelineBench& bench = For(state);
   Scene scene = bench.scene;
   scene.contacts.clear();
   if (moving) {
@@ -188,8 +188,8 @@ void Estimate(benchmark::State& state) {
   state.counters["contacts"] = static_cast<double>(s.state.contacts.size());
 }
 
-void Whole(benchmark::State& state, StereoFrame Bench::* frame) {
-  Bench& bench = For(state);
+void Whole(benchmark::State& state, StereoFrame PipelineBench::* frame) {
+  PipelineBench& bench = For(state);
   LinkPipeline pipeline = bench.CalibratedPipeline();
   LinkState result;
   for (auto _ : state) pipeline.Process(bench.*frame, result);
@@ -198,7 +198,7 @@ void Whole(benchmark::State& state, StereoFrame Bench::* frame) {
 }
 
 void Simulate(benchmark::State& state) {
-  Bench& bench = For(state);
+  PipelineBench& bench = For(state);
   StereoFrame frame;
   for (auto _ : state) bench.Take(kTouchedS, frame);
 }
@@ -213,8 +213,8 @@ BENCHMARK(Register)->Apply(BothModels);
 BENCHMARK_CAPTURE(Track, rest, false)->Apply(BothModels);
 BENCHMARK_CAPTURE(Track, moving, true)->Apply(BothModels);
 BENCHMARK(Estimate)->Apply(BothModels);
-BENCHMARK_CAPTURE(Whole, rest, &Bench::rest)->Apply(BothModels);
-BENCHMARK_CAPTURE(Whole, touched, &Bench::touched)->Apply(BothModels);
+BENCHMARK_CAPTURE(Whole, rest, &PipelineBench::rest)->Apply(BothModels);
+BENCHMARK_CAPTURE(Whole, touched, &PipelineBench::touched)->Apply(BothModels);
 BENCHMARK(Simulate)->Apply(BothModels);
 
 }  // namespace

@@ -11,8 +11,8 @@
 namespace taclink {
 namespace {
 
-struct Bench {
-  explicit Bench(int refinement)
+struct ShellBench {
+  explicit ShellBench(int refinement)
       : model(LoadLinkModel("cylinder").value()),
         shell(SkinSurface(MakeShellMesh(model, refinement)), model.material),
         state(shell.Rest()),
@@ -31,23 +31,23 @@ struct Bench {
 };
 
 void Gradient(benchmark::State& state) {
-  Bench b(static_cast<int>(state.range(0)));
+  ShellBench b(static_cast<int>(state.range(0)));
   for (auto _ : state) benchmark::DoNotOptimize(b.shell.Gradient(b.state, b.loads, b.gradient));
 }
 
 void Hessian(benchmark::State& state) {
-  Bench b(static_cast<int>(state.range(0)));
+  ShellBench b(static_cast<int>(state.range(0)));
   for (auto _ : state) benchmark::DoNotOptimize(b.shell.Hessian(b.state, b.loads, b.gradient, b.hessian));
 }
 
 void Factorise(benchmark::State& state) {
-  Bench b(static_cast<int>(state.range(0)));
+  ShellBench b(static_cast<int>(state.range(0)));
   b.shell.Hessian(b.state, b.loads, b.gradient, b.hessian);
   for (auto _ : state) benchmark::DoNotOptimize(b.factor.Factorise(b.hessian));
 }
 
 void SolveOne(benchmark::State& state) {
-  Bench b(static_cast<int>(state.range(0)));
+  ShellBench b(static_cast<int>(state.range(0)));
   b.shell.Hessian(b.state, b.loads, b.gradient, b.hessian);
   b.factor.Factorise(b.hessian);
   for (auto _ : state) b.factor.Solve(b.gradient, b.solution);

@@ -59,7 +59,7 @@ TEST_F(SampleArm, MistakesSayWhatToDo) {
   EXPECT_THAT(complaint(", frame: elbow_link", urdf),
               HasSubstr("no link 'elbow_link'; there are: base_link, shoulder, upper_arm"));
   EXPECT_THAT(complaint("", urdf + "  base: floor\n"), HasSubstr("no link 'floor'"));
-  EXPECT_THAT(complaint("", "  urdf: none.urdf\n"), HasSubstr("none.urdf: cannot be opened"));
+  EXPECT_THAT(complaint("", "  urdf: none.urdf\n"), HasSubstr("none.urdf cannot be read"));
 }
 
 TEST_F(SampleArm, JointsThatAreNotThereAreNamed) {

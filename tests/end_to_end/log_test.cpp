@@ -1,6 +1,8 @@
 // taclink log, on small logs of the fuzz targets' corpus.
 #include <gmock/gmock.h>
 
+#include <filesystem>
+
 #include "tests/end_to_end/support.h"
 
 namespace taclink::testing {
@@ -38,6 +40,12 @@ TEST_F(LogTest, ATornLogIsSaidToBeAndIsMended) {
   const Finished checked = Taclink({"log", "check", mended});
   EXPECT_EQ(checked.exit_code, 0) << checked.out << checked.err;
   EXPECT_THAT(checked.out, HasSubstr("good"));
+  EXPECT_THAT(run.out, HasSubstr("% of the bytes were intact"));
+  const std::string nothing = Write("nothing", std::string(5000, 'x'));
+  const Finished none = Taclink({"log", "recover", nothing, "-o", nothing + ".new"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_THAT(none.err, HasSubstr("no message in it is intact"));
+  EXPECT_FALSE(std::filesystem::exists(nothing + ".new"));
   const Finished again = Taclink({"log", "recover", Log("truncated"), "-o", mended});
   EXPECT_EQ(again.exit_code, 1) << "it is there already";
   EXPECT_THAT(again.err, HasSubstr("mended.mcap"));

@@ -121,7 +121,7 @@ TEST_F(MaterialTest, BadFilesAreNamedWithTheirLine) {
   EXPECT_THAT(probe(head + "5,5,0,0.1\n"), HasSubstr("forces.csv:2: expected 5 columns"));
   EXPECT_THAT(probe(head + "5,5,0,1,-0.1\n"), HasSubstr("forces.csv:2: the depth must be finite"));
   EXPECT_THAT(probe(head), HasSubstr("holds no row"));
-  EXPECT_THAT(Refused({"--probe", Path("none.csv")}), HasSubstr("cannot be opened"));
+  EXPECT_THAT(Refused({"--probe", Path("none.csv")}), HasSubstr("cannot be read"));
   const auto markers = [&](const std::string& rows, const std::string& kpa = "1") {
     return Refused({"--inflation", kpa, Write("m.csv", "path,ring,ux,uy,uz\n" + rows)});
   };

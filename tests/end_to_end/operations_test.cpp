@@ -10,17 +10,18 @@ namespace taclink::testing {
 namespace {
 
 using std::chrono::seconds;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 constexpr const char* kArm =
     "arm:\n  name: test\n  links:\n"
     "    - {name: a, model: cylinder, source: simulated, scene: rest.yaml}\n";
-constexpr const char* kScene =
+constexpr const char* kRestScene =
     "taclink_scene: 1\nname: rest\nmodel: cylinder\nframe_rate_hz: 20\nduration_s: 600\n";
 
 class OperationsTest : public ScratchFolder {
  protected:
-  OperationsTest() { Write("rest.yaml", kScene); }
+  OperationsTest() { Write("rest.yaml", kRestScene); }
   std::string Config(const std::string& sections) const {
     return Write("arm.yaml", "taclink_config: 1\n" + sections + kArm);
   }
@@ -48,7 +49,9 @@ TEST_F(OperationsTest, SighupTakesOverWhatItCanAndNamesTheRest) {
   const auto line = server.ReadUntil("SIGHUP", seconds(60), true);
   ASSERT_TRUE(line.has_value());
   const json told = json::parse(*line);
-  EXPECT_EQ(told.at("message"), "SIGHUP: taken over: limits, log; needs a restart: server");
+  EXPECT_EQ(told.at("message"),
+            "SIGHUP: taken over: limits, log; needs a restart: server; changed keys: server.listen, "
+            "limits.max_streams, log.format; access: nothing");
   EXPECT_EQ(told.at("level"), "info");
   Config("limits: {max_streams: none}\n");
   server.Signal(SIGHUP);
@@ -72,7 +75,10 @@ TEST_F(OperationsTest, CheckConfigFindsAllThatIsWrongAndStartsNothing) {
              "    - {name: a, model: cube, source: simulated, scene: rest.yaml}\n"
              "    - {name: b, model: cylinder, source: simulated, scene: nowhere.yaml}\n"
              "    - {name: c, model: cylinder, source: v4l2, devices: [/dev/video9990, /dev/video9991]}\n"
-             "    - {name: d, model: cylinder, source: v4l2, devices: [/dev/video9990, /dev/video9992]}\n")});
+             "    - {name: d, model: cylinder, source: v4l2, devices: [/dev/video9990, /dev/video9992]}\n"
+             "    - {name: e, model: cylinder, source: files, folder: no-such-pictures}\n"
+             "    - {name: f, model: cylinder, source: files, folder: .}\n"
+             "    - {name: g, model: cylinder, source: simulated, scene: inflate, force_model: linear}\n")});
   EXPECT_EQ(bad.exit_code, 1);
   EXPECT_THAT(bad.err, HasSubstr("no-such-tokens"));
   EXPECT_THAT(bad.err, HasSubstr("no-such-secret"));
@@ -83,6 +89,9 @@ TEST_F(OperationsTest, CheckConfigFindsAllThatIsWrongAndStartsNothing) {
   EXPECT_THAT(bad.err, HasSubstr("nowhere.yaml"));
   EXPECT_THAT(bad.err, HasSubstr("/dev/video9990 is used by link 'c' already"));
   EXPECT_THAT(bad.err, HasSubstr("note: link 'c': /dev/video9991 may be another camera tomorrow"));
+  EXPECT_THAT(bad.err, ContainsRegex("link 'e': .*no-such-pictures: .*; expected a folder with"));
+  EXPECT_THAT(bad.err, ContainsRegex("link 'f': .*: has no pictures named top_000001"));
+  EXPECT_THAT(bad.err, HasSubstr("link 'g': force_model is 'linear', which does not hold"));
   EXPECT_EQ(bad.out, "");
 }
 

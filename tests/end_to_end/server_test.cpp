@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 
 // 20 frames a second with a steady touch after 2 s of rest. It comes back, so that a machine so busy that it
 // missed the rest finds it later.
-constexpr const char* kScene = R"(taclink_scene: 1
+constexpr const char* kServedScene = R"(taclink_scene: 1
 name: steady
 model: cylinder
 frame_rate_hz: 20
@@ -34,7 +34,7 @@ class ServerTest : public ScratchFolder {
   }
 
   void StartSteadyArm(const std::string& of_links = "", const std::string& sections = "") {
-    Write("steady.yaml", kScene);
+    Write("steady.yaml", kServedScene);
     const std::string settings = "model: cylinder, source: simulated, scene: steady.yaml" + of_links;
     StartServer("taclink_config: 1\n" + sections + "arm:\n  name: test\n  links:\n    - {name: a, " +
                 settings + "}\n    - {name: b, " + settings + "}\n");
@@ -120,8 +120,8 @@ TEST_F(ServerTest, KilledServerIsNoticed) {
 }
 
 TEST_F(ServerTest, PicturesOfAFolderAreServed) {
-  const Finished simulated = Taclink(
-      {"simulate", "--scene", Write("steady.yaml", kScene), "--out", Path("pictures"), "--frames", "80"});
+  const Finished simulated = Taclink({"simulate", "--scene", Write("steady.yaml", kServedScene), "--out",
+                                      Path("pictures"), "--frames", "80"});
   ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
   StartServer(
       "taclink_config: 1\narm:\n  name: test\n  links:\n"
@@ -154,7 +154,7 @@ TEST_F(ServerTest, CalibrationIsSavedAndUsedFromTheNextStartOn) {
 }
 
 TEST_F(ServerTest, MissingCameraIsAStatusAndNoOtherLinkMinds) {
-  Write("steady.yaml", kScene);
+  Write("steady.yaml", kServedScene);
   StartServer(
       "taclink_config: 1\narm:\n  name: test\n  links:\n"
       "    - {name: blind, model: cylinder, source: v4l2, devices: [/dev/taclink-none-0, "

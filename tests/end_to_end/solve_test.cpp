@@ -46,7 +46,8 @@ class SolveTest : public ScratchFolder, public ::testing::WithParamInterface<Cas
   }
 
   static json Solve(const std::vector<std::string>& arguments) {
-    std::vector<std::string> command = {"solve", "--model", GetParam().model, "--json"};
+    std::vector<std::string> command = {"solve",          "--model", GetParam().model,
+                                        "--pressure-kpa", "0",       "--json"};
     command.insert(command.end(), arguments.begin(), arguments.end());
     const Finished run = Taclink(command);
     EXPECT_EQ(run.exit_code, 0) << run.err;
@@ -101,11 +102,37 @@ TEST_P(SolveTest, MarkersGiveThePushBack) {
   EXPECT_EQ(solved.at("force_model"), "nonlinear") << "auto: a dent of some millimetres";
 }
 
+// A skin that was inflated before the rest picture looks slack.
+TEST_P(SolveTest, APressureThatNobodyTellsIsSaid) {
+  Simulate(6);
+  const Finished run =
+      Taclink({"solve", "--model", GetParam().model, "--json", "--rest", Path("out/rest_top.png"),
+               Path("out/rest_bottom.png"), "--images", Picture("top", 5), Picture("bottom", 5)});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, ::testing::HasSubstr("pressure_unknown"));
+  const json validity = json::parse(run.out).at("validity");
+  EXPECT_EQ(validity.at("status"), "degraded");
+  EXPECT_EQ(validity.at("reasons")[0].at("id"), "pressure_unknown");
+}
+
 TEST_P(SolveTest, UntouchedSkinHasNoContact) {
   Simulate(6);
   const json solved = Solve({"--rest", Path("out/rest_top.png"), Path("out/rest_bottom.png"), "--images",
                              Picture("top", 5), Picture("bottom", 5)});
   EXPECT_TRUE(solved.at("contacts").empty()) << solved.at("contacts");
+}
+
+// Of a single rest pair no scatter is known; how noisy it is shows against a calibration as without one.
+TEST_P(SolveTest, UntouchedSkinHasNoContactByACalibration) {
+  Simulate(6);
+  const std::string top = Path("out/rest_top.png"), bottom = Path("out/rest_bottom.png");
+  const Finished run = Taclink(
+      {"calibrate", "--model", GetParam().model, "--rest", top, bottom, "--out", Path("calibration.yaml")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json solved = Solve({"--calibration", Path("calibration.yaml"), "--rest", top, bottom, "--images",
+                             Picture("top", 5), Picture("bottom", 5)});
+  EXPECT_TRUE(solved.at("contacts").empty()) << solved.at("contacts");
+  EXPECT_EQ(solved.at("validity").at("status"), "ok") << solved.at("validity");
 }
 
 INSTANTIATE_TEST_SUITE_P(Skins, SolveTest,

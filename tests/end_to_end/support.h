@@ -48,8 +48,10 @@ class ScratchFolder : public ::testing::Test {
   ~ScratchFolder() override { std::filesystem::remove_all(folder_); }
 
   std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+  /// For this user alone.
   std::string Write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name) << text;
+    std::filesystem::permissions(folder_ / name, std::filesystem::perms(0600));
     return Path(name);
   }
 

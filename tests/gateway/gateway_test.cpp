@@ -15,9 +15,9 @@ namespace taclink::server {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST(Gateway, ServesTheBuiltInPage) {
   TestGateway gateway;
@@ -64,7 +64,7 @@ TEST(Gateway, ServesAFolderAndNothingOutsideOfIt) {
        {"/../secret.txt", "/%2e%2e/secret.txt", "/assets/../../secret.txt", "/..%2fsecret.txt", "/.hidden",
         "/out.txt", "/assets", "/assets/", "/secret.txt", "//secret.txt"}) {
     const RawResponse response = Get(gateway.address(), bad);
-    EXPECT_THAT(response.status, testing::AnyOf(400, 404)) << bad;
+    EXPECT_THAT(response.status, ::testing::AnyOf(400, 404)) << bad;
     EXPECT_THAT(response.body, Not(HasSubstr("not for anybody"))) << bad;
     EXPECT_THAT(response.body, Not(HasSubstr("app-Bx"))) << "no list of a folder";
   }
@@ -148,6 +148,21 @@ TEST(Gateway, WhoOnlyHoldsConnectionsKeepsNobodyOut) {
   EXPECT_GT(gateway.counts().refused, 0u);
 }
 
+TEST(Gateway, OneAddressKeepsNobodyElseOut) {
+  TestGateway gateway({.max_connections = 4, .max_connections_per_peer = 2});
+  std::vector<std::unique_ptr<RawHttp>> held;
+  for (int i = 0; i < 4; ++i) {
+    held.push_back(std::make_unique<RawHttp>(gateway.address(), "127.0.0.2"));
+    held.back()->Send(
+        "POST /taclink.v1.TactileService/StreamFrames HTTP/1.1\r\nHost: localhost\r\n"
+        "Content-Type: application/grpc-web+proto\r\nContent-Length: 5\r\n\r\n" +
+        std::string(5, '\0'));
+    EXPECT_EQ(held.back()->ReadHead().status, i < 2 ? 200 : 0) << i;
+  }
+  EXPECT_EQ(gateway.counts().refused, 2u);
+  EXPECT_EQ(Get(gateway.address(), "/healthz").status, 200);
+}
+
 TEST(Gateway, AHalfClosedConnectionIsStillAnswered) {
   TestGateway gateway;
   RawHttp connection(gateway.address());
@@ -197,8 +212,8 @@ TEST(Gateway, MetricsTellOfLinksStreamsAndProcess) {
         "taclink_link_supervision{link=\"lower\",state=\"running\"} 1\n",
         "taclink_link_worker_restarts_total{link=\"upper\"} 0\n", "taclink_http_connections 1\n"})
     EXPECT_THAT(metrics.body, HasSubstr(line));
-  EXPECT_THAT(metrics.body, testing::ContainsRegex("process_resident_memory_bytes [1-9]"));
-  EXPECT_THAT(metrics.body, testing::ContainsRegex("process_cpu_seconds_total [0-9.]+\n"));
+  EXPECT_THAT(metrics.body, ::testing::ContainsRegex("process_resident_memory_bytes [1-9]"));
+  EXPECT_THAT(metrics.body, ::testing::ContainsRegex("process_cpu_seconds_total [0-9.]+\n"));
 }
 
 TEST(Gateway, ATakenAddressIsAnErrorAndAnEmptyOneIsNone) {

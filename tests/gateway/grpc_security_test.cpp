@@ -18,7 +18,7 @@ namespace taclink::server {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr milliseconds kSoon{400};  // for connections that are to fail
 
@@ -124,7 +124,7 @@ TEST_F(GrpcSecurity, EveryMethodOfEveryServiceIsInTheTable) {
       Call(arm_.server().InProcessChannel(), "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
            {"\x3a\x00", 2});
   const auto names = ServiceNames(listed.message);
-  EXPECT_THAT(names, testing::Contains("taclink.v1.TactileService"));
+  EXPECT_THAT(names, ::testing::Contains("taclink.v1.TactileService"));
   for (const std::string& name : names) {
     const auto* service = google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(name);
     if (service == nullptr) continue;  // gRPC's own
@@ -170,7 +170,7 @@ TEST_F(GrpcSecurity, TheAuditNamesTheTokenAndTheAddress) {
     auto otto = Connect({.token = kOperator});
     EXPECT_TRUE(otto.ok() && otto->SetThresholds("lower", "", {.warning_n = 1, .alarm_n = 2}, kForever).ok());
   });
-  EXPECT_THAT(who, testing::StartsWith("otto ipv4:127.0.0.1:"));
+  EXPECT_THAT(who, ::testing::StartsWith("otto ipv4:127.0.0.1:"));
 }
 
 TEST_F(GrpcSecurity, TheAuditNamesWhoCallsThroughTheGateway) {
@@ -183,7 +183,7 @@ TEST_F(GrpcSecurity, TheAuditNamesWhoCallsThroughTheGateway) {
             "Authorization: Bearer " + kOperator + "\r\nContent-Length: " + std::to_string(body.size()) +
             "\r\n\r\n" + body);
   });
-  EXPECT_THAT(who, testing::StartsWith("otto ipv4:127.0.0.1:"));
+  EXPECT_THAT(who, ::testing::StartsWith("otto ipv4:127.0.0.1:"));
 }
 
 TEST_F(GrpcSecurity, NobodyCallsInAnothersName) {
@@ -195,7 +195,7 @@ TEST_F(GrpcSecurity, NobodyCallsInAnothersName) {
                    .peer = "ipv4:192.0.2.1:1",
                    .name = "otto"});
   });
-  EXPECT_THAT(who, testing::StartsWith("ipv4:127.0.0.1:"));
+  EXPECT_THAT(who, ::testing::StartsWith("ipv4:127.0.0.1:"));
 }
 
 TEST_F(GrpcSecurity, HealthNeedsNoTokenAndReflectionDoes) {
@@ -216,6 +216,30 @@ TEST_F(GrpcSecurity, ATokenWithdrawnEndsItsRights) {
   Write("tokens", TokenLine("otto", "operator", kOperator));
   security_->Reload();
   EXPECT_EQ(client->GetArm(kForever).error().code, ErrorCode::kUnauthenticated) << "on the same connection";
+}
+
+TEST_F(GrpcSecurity, WrongTokensAreThrottledWhileARightOneCalls) {
+  SecurityConfig config = WithTokens();
+  config.max_failed_tries = 3;
+  Serve(config);
+  auto wrong = Connect({.token = "guess"}), right = Connect({.token = kViewer});
+  ASSERT_TRUE(wrong.ok() && right.ok());
+  for (int i = 0; i < 200; ++i) {
+    EXPECT_EQ(wrong->GetArm(kForever).error().code,
+              i < 3 ? ErrorCode::kUnauthenticated : ErrorCode::kResourceExhausted);
+    EXPECT_TRUE(right->GetArm(kForever).ok());
+  }
+  EXPECT_EQ(security_->Status().tries_unknown, 200u);
+}
+
+TEST_F(GrpcSecurity, AnEmptiedTokenFileIsNoFaultOfTheCallers) {
+  Serve(WithTokens());
+  auto client = Connect({.token = kViewer});
+  ASSERT_TRUE(client.ok() && client->GetArm(kForever).ok());
+  Write("tokens", "");
+  security_->Reload();
+  EXPECT_EQ(client->GetArm(kForever).error().code, ErrorCode::kFailedPrecondition)
+      << "on the same connection";
 }
 
 TEST_F(GrpcSecurity, TlsServesThoseWhoTrustIt) {

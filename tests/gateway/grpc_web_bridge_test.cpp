@@ -12,8 +12,8 @@
 namespace taclink::server {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 constexpr const char* kService = "/taclink.v1.TactileService/";
 

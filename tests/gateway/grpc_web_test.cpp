@@ -8,8 +8,8 @@
 namespace taclink::server {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 std::string Bytes(std::initializer_list<int> values) {
   std::string out;

@@ -8,7 +8,7 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr const char* kPost =
     "POST /a/b HTTP/1.1\r\nHost: here\r\nContent-Type: text/x\r\nContent-Length: 5\r\n\r\nhello";
@@ -118,8 +118,8 @@ TEST(HttpMessage, Responses) {
   EXPECT_EQ(ResponseHead(200, {{"A", "b"}}, 3, true),
             "HTTP/1.1 200 OK\r\nA: b\r\nContent-Length: 3\r\nConnection: keep-alive\r\n\r\n");
   EXPECT_THAT(ResponseHead(404, {}, {}, false),
-              testing::AllOf(HasSubstr("404 Not Found\r\n"), HasSubstr("Transfer-Encoding: chunked"),
-                             HasSubstr("Connection: close")));
+              ::testing::AllOf(HasSubstr("404 Not Found\r\n"), HasSubstr("Transfer-Encoding: chunked"),
+                               HasSubstr("Connection: close")));
   EXPECT_EQ(Chunk(std::string(26, 'x')), "1a\r\n" + std::string(26, 'x') + "\r\n");
   EXPECT_EQ(Chunk({}), "0\r\n\r\n");
 }

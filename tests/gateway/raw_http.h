@@ -16,8 +16,8 @@ struct RawResponse {
 /// A plain socket to a server, so that a test can send anything.
 class RawHttp {
  public:
-  /// `address` is host:port.
-  explicit RawHttp(const std::string& address);
+  /// `address` is host:port; `from`: one of this machine's addresses.
+  explicit RawHttp(const std::string& address, const char* from = "127.0.0.1");
   ~RawHttp();
   RawHttp(const RawHttp&) = delete;
   RawHttp& operator=(const RawHttp&) = delete;

@@ -16,16 +16,18 @@
 
 namespace taclink::server {
 
-inline std::string TokenLine(const std::string& name, const std::string& role, const std::string& token) {
+/// `more`: what stands behind the hash.
+inline std::string TokenLine(const std::string& name, const std::string& role, const std::string& token,
+                             const std::string& more = "") {
   std::array<uint8_t, SHA256_DIGEST_LENGTH> hash{};
   SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), hash.data());
   std::string line = name + " " + role + " ";
   for (const uint8_t byte : hash) line += {"0123456789abcdef"[byte >> 4], "0123456789abcdef"[byte & 0xf]};
-  return line + "\n";
+  return line + more + "\n";
 }
 
 /// A folder with what guards a server: tokens of a viewer and an operator, certificates of one authority.
-class SecurityTest : public testing::Test {
+class SecurityTest : public ::testing::Test {
  protected:
   static constexpr const char* kViewer = "token-of-a-viewer";
   static constexpr const char* kOperator = "token-of-an-operator";
@@ -33,7 +35,7 @@ class SecurityTest : public testing::Test {
   SecurityTest()
       : folder_(std::filesystem::temp_directory_path() /
                 ("taclink_security." + std::to_string(getpid()) + "." +
-                 testing::UnitTest::GetInstance()->current_test_info()->name())) {
+                 ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
     std::filesystem::create_directories(folder_);
     Write("tokens", TokenLine("eve", "viewer", kViewer) + TokenLine("otto", "operator", kOperator));
     WriteServer(authority_);
@@ -42,15 +44,18 @@ class SecurityTest : public testing::Test {
   ~SecurityTest() override { std::filesystem::remove_all(folder_); }
 
   std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+  /// For this user alone.
   void Write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name) << text;
+    SetMode(name, 0600);
+  }
+  void SetMode(const std::string& name, unsigned mode) const {
+    std::filesystem::permissions(folder_ / name, std::filesystem::perms(mode));
   }
   void WriteServer(const TestAuthority& authority) const { WritePair("server", authority.Issue("server")); }
   void WritePair(const std::string& name, const PemPair& pair) const {
     Write(name + ".pem", pair.certificate);
     Write(name + ".key", pair.key);
-    std::filesystem::permissions(folder_ / (name + ".key"),
-                                 std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
   }
 
   SecurityConfig Tls() const {
@@ -69,8 +74,8 @@ class SecurityTest : public testing::Test {
     return config;
   }
 
-  static std::shared_ptr<Security> Load(const SecurityConfig& config) {
-    auto security = Security::Load(config);
+  static std::shared_ptr<Security> Load(const SecurityConfig& config, Clock& clock = SystemClock()) {
+    auto security = Security::Load(config, clock);
     EXPECT_TRUE(security.ok()) << security.error().message;
     return security ? *security : nullptr;
   }

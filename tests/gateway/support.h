@@ -15,16 +15,19 @@ namespace taclink::server {
 class TestGateway {
  public:
   explicit TestGateway(GatewayOptions options = {},
-                       std::shared_ptr<const Security> security = std::make_shared<const Security>(),
+                       const std::shared_ptr<const Security>& security = std::make_shared<const Security>(),
                        const RecordingConfig& recording = {})
       : server_(std::make_unique<TestServer>(TestLimits(), nullptr, TestServer::MakePressure(), recording)) {
     options.listen = "127.0.0.1:0";
-    GatewayServices services{.channel = server_->server().InProcessChannel(),
-                             .security = std::move(security),
-                             .readiness = [this] { return CheckReadiness(server_->arm()); },
-                             .metrics = {}};
+    GatewayServices services{
+        .channel = server_->server().InProcessChannel(),
+        .security = security,
+        .readiness = [this, security] { return CheckReadiness(server_->arm(), *security); },
+        .metrics = {}};
     counts_ = services.counts;
-    services.metrics = [this] { return MetricsOf(server_->arm(), server_->server(), *counts_); };
+    services.metrics = [this, security] {
+      return MetricsOf(server_->arm(), server_->server(), *counts_, *security);
+    };
     auto gateway = Gateway::Start(std::move(options), std::move(services));
     EXPECT_TRUE(gateway.ok()) << gateway.error().message;
     gateway_ = std::move(*gateway);

@@ -10,7 +10,7 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr const char* kGet = "GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
 
@@ -47,7 +47,7 @@ TEST_F(TlsGateway, ServesThoseWhoTrustIt) {
   EXPECT_EQ(AskTls(gateway.address(), Path("other.pem"), "", kGet), "");
   RawHttp plain(gateway.address());
   plain.Send(kGet);
-  EXPECT_THAT(plain.ReadToEnd(), testing::Not(HasSubstr("HTTP/1.1"))) << "in the clear";
+  EXPECT_THAT(plain.ReadToEnd(), ::testing::Not(HasSubstr("HTTP/1.1"))) << "in the clear";
   EXPECT_THAT(AskTls(gateway.address(), Path("ca.pem"), "", kGet), HasSubstr("200 OK")) << "still";
 }
 
@@ -107,6 +107,38 @@ TEST_F(TlsGateway, TokensDecideOverGrpcWebToo) {
   EXPECT_THAT(call("GetArm", viewer), HasSubstr("grpc-status: 0\r\n"));
   EXPECT_THAT(call("Calibrate", viewer), HasSubstr("grpc-status: 7\r\ngrpc-message: 'eve' is a viewer"));
   EXPECT_THAT(call("Calibrate", admin), HasSubstr("grpc-status: 5\r\n")) << "no link of that name";
+}
+
+RawResponse GetWith(const TestGateway& gateway, const std::string& page, const std::string& token) {
+  return Get(gateway.address(), page, "Authorization: Bearer " + token + "\r\n");
+}
+
+TEST_F(TlsGateway, WrongTokensAreThrottledWhileARightOneCalls) {
+  SecurityConfig config = WithTokens();
+  config.max_failed_tries = 3;
+  const TestGateway gateway({}, Load(config));
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(GetWith(gateway, "/metrics", "guess").status, i < 3 ? 401 : 429);
+    EXPECT_EQ(GetWith(gateway, "/metrics", kViewer).status, 200);
+  }
+  EXPECT_EQ(GetWith(gateway, "/healthz", "guess").status, 200) << "asks for no token";
+  const std::string metrics = GetWith(gateway, "/metrics", kViewer).body;
+  EXPECT_THAT(metrics, HasSubstr("taclink_failed_tries_total{token=\"unknown\"} 21\n"));
+  EXPECT_THAT(metrics, HasSubstr("taclink_throttled_tries_total 18\n"));
+}
+
+TEST_F(TlsGateway, ReadinessTellsOfATokenFileInErrorWithoutItsName) {
+  const auto security = Load(WithTokens());
+  TestGateway gateway({}, security);
+  gateway.server().Publish(0, 1);
+  EXPECT_EQ(GetWith(gateway, "/readyz", "").status, 200);
+  Write("tokens", "");
+  security->Reload();
+  const RawResponse answer = GetWith(gateway, "/readyz", "");
+  EXPECT_EQ(answer.status, 503);
+  EXPECT_THAT(answer.body, HasSubstr("security: nobody is let in"));
+  EXPECT_THAT(answer.body, ::testing::Not(HasSubstr(Path("tokens"))));
+  EXPECT_EQ(GetWith(gateway, "/metrics", kViewer).status, 503);
 }
 
 }  // namespace

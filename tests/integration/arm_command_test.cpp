@@ -9,8 +9,8 @@
 namespace taclink::command {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 JointLine LineOf(JointLineReader& reader, const std::string& text) {
   const auto read = reader.Read(text);

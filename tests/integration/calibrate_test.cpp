@@ -7,9 +7,9 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-class CalibrateTest : public testing::Test {
+class CalibrateTest : public ::testing::Test {
  protected:
   void SetUp() override {
     server_.arm().Start();

@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+
+#include "client/command/contacts_view.h"
 #include "client/command/frame_json.h"
 #include "client/command/json.h"
 #include "client/command/watch_view.h"
@@ -8,9 +11,9 @@
 namespace taclink::command {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 client::Frame MakeFrame(double force_n) {
   client::Frame frame;
@@ -48,6 +51,28 @@ TEST(FrameJson, UsesTheKeysAndUnitsOfSolve) {
   EXPECT_EQ(json.at("total_force_n").at(0), -0.25);
   EXPECT_EQ(json.at("positions_mm").at(0), Json::array({500.0, 250.0, 125.0}));
   EXPECT_FALSE(json.contains("nodal_forces_n"));
+}
+
+TEST(FrameJson, TellsWhatIsKnownOfTheForces) {
+  client::Frame frame = MakeFrame(0.25);
+  const std::map<std::string, std::optional<double>*> numbers = {
+      {"detection_limit_n", &frame.detection_limit_n},
+      {"detection_limit_around_n", &frame.detection_limit_around_n},
+      {"force_residual", &frame.force_residual},
+  };
+  double place = 0;
+  for (const auto& [name, number] : numbers) {
+    EXPECT_TRUE(Json::parse(FrameJson(frame)).at(name).is_null()) << name;
+    *number = ++place;
+    EXPECT_EQ(Json::parse(FrameJson(frame)).at(name), place) << name;
+  }
+}
+
+TEST(ContactsJson, ASumOverNothingIsNoZero) {
+  client::ArmContacts arm;
+  EXPECT_TRUE(Json::parse(ContactsJson(arm)).at("total_force_n").is_null());
+  arm.total_force_n = {1, 2, 3};
+  EXPECT_EQ(Json::parse(ContactsJson(arm)).at("total_force_n"), Json::array({1.0, 2.0, 3.0}));
 }
 
 TEST(ChangeLog, OneLineForEachChange) {

@@ -9,9 +9,9 @@ namespace taclink::server {
 namespace {
 
 using std::chrono::seconds;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-class EventsTest : public testing::Test {
+class EventsTest : public ::testing::Test {
  protected:
   void TearDown() override { server_.arm().Stop(); }
 

@@ -11,8 +11,8 @@
 namespace taclink::server {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 constexpr int kWidth = 32, kHeight = 24;
 
@@ -87,16 +87,18 @@ class LinkCallsTest : public ::testing::Test {
 
   LinkCallsTest() {
     std::vector<LinkParts> links;
-    links.push_back(
-        {.description = {.name = "upper", .model = *LoadLinkModel("cylinder")},
-         .source = std::make_unique<Source>(script_, log_),
-         .processor = std::make_unique<Processor>(log_),
-         .factories = {
-             .estimator = [log = log_](std::optional<ForceModel> model) -> std::shared_ptr<StateEstimator> {
-               const std::lock_guard lock(log->mutex);
-               log->made.push_back(model);
-               return MakeStateEstimator(*LoadLinkModel("cylinder"), {.model = model});
-             }}});
+    links.push_back({.description = {.name = "upper", .model = *LoadLinkModel("cylinder")},
+                     .source = std::make_unique<Source>(script_, log_),
+                     .processor = std::make_unique<Processor>(log_),
+                     .factories = {.estimator = [log = log_](std::optional<ForceModel> model)
+                                       -> Result<std::shared_ptr<StateEstimator>> {
+                       const std::lock_guard lock(log->mutex);
+                       if (model == ForceModel::kLiteral)
+                         return Error{ErrorCode::kFailedPrecondition, "it does not hold"};
+                       log->made.push_back(model);
+                       return std::shared_ptr<StateEstimator>(
+                           MakeStateEstimator(*LoadLinkModel("cylinder"), {.model = model}));
+                     }}});
     arm_ = std::make_unique<Arm>("test", std::move(links), MakeEncoder({"upper"}), clock_,
                                  ArmOptions{.worker = {.poll = std::chrono::milliseconds(5)}});
     server_ = std::move(*RpcServer::Start("127.0.0.1:0", *arm_, TestLimits(), nullptr, nullptr));
@@ -221,6 +223,7 @@ TEST_F(LinkCallsTest, CameraSettingsThatCantBeAreRefusedWithTheReason) {
   request.set_camera("top");
   request.set_exposure_s(-1);
   EXPECT_EQ(SetCamera(request).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  request.set_exposure_s(0.01);
   request.set_link("other");
   EXPECT_EQ(SetCamera(request).error_code(), grpc::StatusCode::NOT_FOUND);
 }
@@ -241,6 +244,13 @@ TEST_F(LinkCallsTest, TheChoiceOfTheForceModelIsGivenBack) {
   log_->used.wait(0);
   const std::lock_guard lock(log_->mutex);
   EXPECT_THAT(log_->made, ElementsAre(std::nullopt));
+}
+
+TEST_F(LinkCallsTest, AForceModelThatDoesNotHoldIsRefused) {
+  WaitUntilRunning();
+  const auto refused = SetForceModel("upper", v1::FORCE_MODEL_LITERAL);
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_EQ(refused.error_message(), "link 'upper': it does not hold");
 }
 
 TEST_F(LinkCallsTest, NoForceModelNoChange) {

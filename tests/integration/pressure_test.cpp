@@ -11,7 +11,7 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 class PressureTest : public ::testing::Test {
  protected:
@@ -93,7 +93,7 @@ TEST_F(PressureTest, BadReadingsAreRefusedWithTheReason) {
   EXPECT_THAT(Tell("nobody", {1}).error_message(), HasSubstr("this arm has upper, lower"));
   EXPECT_THAT(Tell("", {1}).error_message(), HasSubstr("must name the link"));
   EXPECT_THAT(Tell("upper", {std::numeric_limits<double>::quiet_NaN()}).error_message(),
-              HasSubstr("nan kPa"));
+              HasSubstr("pressure_pa must be a finite number"));
   EXPECT_EQ(Tell("upper", {1e9}).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_THAT(Tell("upper", {1}, 5).error_message(), HasSubstr("behind the server's clock"));
   EXPECT_TRUE(Tell("upper", {}).ok());

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <atomic>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include "client/taclink/recordings.h"
 #include "taclink/v1/frame.pb.h"
@@ -25,11 +27,6 @@ using client::RecorderState;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using wire::log::TopicKind;
-
-std::string NewFolder() {
-  static int count = 0;
-  return ::testing::TempDir() + "recording." + std::to_string(::getpid()) + "." + std::to_string(++count);
-}
 
 std::string Content(const std::string& path) {
   std::ostringstream text;
@@ -63,7 +60,7 @@ std::vector<T> Read(const std::string& path, TopicKind kind, const std::string& 
 class RecordingTest : public ::testing::Test {
  protected:
   explicit RecordingTest(const RecordingConfig& config = {})
-      : folder_(NewFolder()), server_(TestLimits(), nullptr, {}, With(config)) {}
+      : folder_(NewFolder("recording")), server_(TestLimits(), nullptr, {}, With(config)) {}
   ~RecordingTest() override { fs::remove_all(folder_); }
   RecordingConfig With(RecordingConfig config) const {
     config.folder = folder_;
@@ -202,12 +199,15 @@ TEST_F(RecordingTest, PicturesAreThoseOfTheFrames) {
       }
       return {};
     });
-    WaitFor([&](const auto& status) { return status.frames >= i; });
+    // By sequence: what the link reports of itself before its first frame counts as a frame of the log, too.
+    WaitFor([&](const auto&) {
+      const auto latest = server_.arm().hub().Latest(0);
+      return latest != nullptr && latest->state().sequence >= i;
+    });
   }
+  server_.arm().Stop();  // the last one is with all subscribers then
   const std::string path = PathOf(Stop().log);
-  server_.arm().Stop();
   EXPECT_FALSE(server_.arm().hub().WantsPictures(0)) << "nobody reads them any more";
-  std::map<int64_t, std::vector<uint64_t>> seen;  // by exposure: sequences of frame and pictures
   auto source = mcap::FileSource::Open(path);
   const auto reader = mcap::Reader::Open(std::shared_ptr<const mcap::ByteSource>(std::move(*source)));
   mcap::MessageCursor cursor(**reader, {});
@@ -222,6 +222,31 @@ TEST_F(RecordingTest, PicturesAreThoseOfTheFrames) {
     }
   }
   EXPECT_EQ(pictures, 40);
+}
+
+TEST_F(RecordingTest, ItsStatusIsToldAlsoWhileFramesComeFasterThanTheyAreWritten) {
+  Start();
+  std::atomic<uint64_t> published = 0;
+  std::jthread flood([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) Publish(0, published + 1, published + 1), ++published;
+  });
+  const uint64_t first = WaitFor([](const auto& status) { return status.frames > 0; }).frames;
+  server_.clock().Advance(std::chrono::seconds(2));
+  EXPECT_NE(WaitFor([](const auto& status) { return status.synced_utc_ns != 0; }).synced_utc_ns, 0);
+  const auto behind = WaitFor([first](const auto& status) {
+    return status.frames > first && status.state == RecorderState::kTrouble;
+  });
+  EXPECT_GT(behind.frames_lost, 0u);
+  EXPECT_THAT(behind.trouble, HasSubstr("recording.queue_mb"));
+  flood.request_stop();
+  flood.join();
+  WaitFor([this](const auto& status) {
+    server_.clock().Advance(std::chrono::seconds(2));
+    return status.state == RecorderState::kRecording;
+  });
+  const auto stopped = Stop();
+  EXPECT_EQ(Read<v1::LinkFrame>(PathOf(stopped.log), TopicKind::kFrame, "upper").size(), stopped.frames);
+  EXPECT_EQ(stopped.frames + stopped.frames_lost, published);
 }
 
 class SplitTest : public RecordingTest {

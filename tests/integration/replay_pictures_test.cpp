@@ -9,6 +9,7 @@
 #include "sensing/capture/decode.h"
 #include "taclink/v1/recording.grpc.pb.h"
 #include "tests/integration/support.h"
+#include "tests/support/times.h"
 
 namespace taclink::server {
 namespace {
@@ -17,8 +18,6 @@ namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-constexpr int64_t kMs = 1'000'000;
 
 /// Twenty frames of "upper" with pictures whose grey is 10 times their number, every second one without the
 /// bottom one.

@@ -15,6 +15,7 @@
 #include "client/taclink/recordings.h"
 #include "taclink/v1/recording.grpc.pb.h"
 #include "tests/integration/support.h"
+#include "tests/support/times.h"
 #include "wire/convert.h"
 
 namespace taclink::server {
@@ -30,13 +31,6 @@ using std::chrono::milliseconds;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-constexpr int64_t kMs = 1'000'000;
-
-std::string NewFolder() {
-  static int count = 0;
-  return ::testing::TempDir() + "replay." + std::to_string(::getpid()) + "." + std::to_string(++count);
-}
 
 /// Everything that a replay has until it ends.
 struct Played {
@@ -133,7 +127,7 @@ class ReplayTest : public ::testing::Test {
     return reader.error().code;
   }
 
-  const std::string folder_ = NewFolder();
+  const std::string folder_ = NewFolder("replay");
   TestServer server_{TestLimits(), nullptr, {}, {.folder = folder_}};
   client::Client client_ = server_.Connect();
   client::Recordings recordings_ = client_.RecordingCalls();

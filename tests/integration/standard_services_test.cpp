@@ -9,7 +9,7 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 grpc::ByteBuffer ToBuffer(const std::string& text) {
   const grpc::Slice slice(text);

@@ -1,6 +1,8 @@
 // A real server on a free port, real clients over gRPC.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 
 #include <thread>
 
@@ -13,7 +15,7 @@ using client::Delivery;
 using client::Detail;
 using client::Frame;
 using std::chrono::milliseconds;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 TEST(Stream, FramesOfTwoLinksReachTwoClientsInOrder) {
   TestServer server;
@@ -316,6 +318,29 @@ TEST(Stream, AnAddressInUseIsRefused) {
   const auto second = RpcServer::Start(server.server().address(), server.arm(), {});
   ASSERT_FALSE(second.ok());
   EXPECT_THAT(second.error().message, HasSubstr("cannot listen"));
+}
+
+// gRPC would take the file from it.
+TEST(Stream, AUnixSocketInUseStaysItsServers) {
+  const std::string address = "unix:" + NewFolder("socket");
+  TestServer server(TestLimits(), nullptr, {}, {}, address);
+  const auto second = RpcServer::Start(address, server.arm(), {});
+  ASSERT_FALSE(second.ok());
+  EXPECT_THAT(second.error().message, HasSubstr("process " + std::to_string(getpid())));
+  EXPECT_TRUE(server.Connect().GetArm().ok());
+}
+
+// As after a kill: a file that nobody listens at.
+TEST(Stream, AUnixSocketThatWasLeftBehindIsTaken) {
+  const std::string path = NewFolder("socket");
+  sockaddr_un left{};
+  left.sun_family = AF_UNIX;
+  path.copy(left.sun_path, sizeof(left.sun_path) - 1);
+  const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  ASSERT_EQ(::bind(socket, reinterpret_cast<const sockaddr*>(&left), sizeof(left)), 0);
+  ::close(socket);
+  TestServer server(TestLimits(), nullptr, {}, {}, "unix:" + path);
+  EXPECT_TRUE(server.Connect().GetArm().ok());
 }
 
 }  // namespace

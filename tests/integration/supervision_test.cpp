@@ -11,10 +11,10 @@ namespace {
 
 using client::LinkStatus;
 using client::Supervision;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 /// One link, "arm", whose processor fails with every frame below 10.
-class SupervisionTest : public testing::Test {
+class SupervisionTest : public ::testing::Test {
  protected:
   SupervisionTest() {
     std::vector<LinkParts> links;

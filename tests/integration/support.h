@@ -1,6 +1,7 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <memory>
@@ -17,6 +18,12 @@
 
 namespace taclink::server {
 
+/// A path where nothing is yet.
+inline std::string NewFolder(const std::string& name) {
+  static int count = 0;
+  return ::testing::TempDir() + name + "." + std::to_string(::getpid()) + "." + std::to_string(++count);
+}
+
 inline constexpr size_t kQueueMessages = 32;
 inline constexpr size_t kMaxStreams = 4;
 
@@ -31,7 +38,8 @@ class TestServer {
   using MakePressure = std::function<std::unique_ptr<PressureSource>(size_t link, Clock& clock)>;
   explicit TestServer(ServiceLimits limits = TestLimits(), std::unique_ptr<ArmPoses> poses = nullptr,
                       const MakePressure& pressure = {}, const RecordingConfig& recording = {},
-                      const std::string& address = "127.0.0.1:0") {
+                      const std::string& address = "127.0.0.1:0",
+                      mcap::FileCalls& files = mcap::FileCalls::System()) {
     for (size_t link = 0; link < 2; ++link) {
       links_.push_back(MakeLink(link));
       if (pressure) links_.back().pressure = pressure(link, clock_);
@@ -40,7 +48,7 @@ class TestServer {
         std::make_unique<Arm>("test", std::move(links_), CountingEncoder(), clock_,
                               ArmOptions{.worker = {.poll = std::chrono::milliseconds(5)}}, std::move(poses));
     recorder_ = std::make_unique<Recorder>(
-        *arm_, recording, LogPreamble{.files = {}, .metadata = {{"taclink", {{"arm", "test"}}}}});
+        *arm_, recording, LogPreamble{.files = {}, .metadata = {{"taclink", {{"arm", "test"}}}}}, files);
     auto server = RpcServer::Start(address, *arm_, limits, nullptr, recorder_.get());
     EXPECT_TRUE(server.ok()) << server.error().message;
     server_ = std::move(*server);

@@ -6,11 +6,10 @@
 
 #include "tests/server/kinematics/arms.h"
 #include "tests/server/support.h"
+#include "tests/support/times.h"
 
 namespace taclink::server {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 Contact MakeContact() {
   Contact contact;

@@ -8,10 +8,10 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
-Result<Config> Parse(const std::string& section) {
+Result<Config> ParsePublish(const std::string& section) {
   return ParseConfig("arm.yaml",
                      "taclink_config: 1\n" + section +
                          "arm:\n  name: x\n  links:\n"
@@ -20,7 +20,7 @@ Result<Config> Parse(const std::string& section) {
 }
 
 TEST(ConfigPublish, ReadsAndPrintsTheSame) {
-  const auto config = Parse(
+  const auto config = ParsePublish(
       "publish: {url: 'tls://a:4222,nats://b:4222', site: lab-1, stream_mb: 10, tls_ca: ca.pem, token_file: "
       "/run/token, frames_detail: full, frames_rate_hz: 0, contacts_deadband_n: 0.1, queue_mb: 8}\n");
   ASSERT_TRUE(config.ok()) << config.error().message;
@@ -39,14 +39,14 @@ TEST(ConfigPublish, ReadsAndPrintsTheSame) {
 }
 
 TEST(ConfigPublish, IsOffUnlessTold) {
-  EXPECT_TRUE(Parse("")->publish.url.empty());
-  EXPECT_THAT(ConfigText(*Parse("")), Not(HasSubstr("publish")));
+  EXPECT_TRUE(ParsePublish("")->publish.url.empty());
+  EXPECT_THAT(ConfigText(*ParsePublish("")), Not(HasSubstr("publish")));
 }
 
 TEST(ConfigPublish, AUrlAloneIsEnough) {
-  const auto config = Parse("publish: nats://a:4222\n");
+  const auto config = ParsePublish("publish: nats://a:4222\n");
   ASSERT_TRUE(config.ok()) << config.error().message;
-  EXPECT_EQ(ConfigText(*config), ConfigText(*Parse("publish: {url: 'nats://a:4222'}\n")));
+  EXPECT_EQ(ConfigText(*config), ConfigText(*ParsePublish("publish: {url: 'nats://a:4222'}\n")));
 }
 
 TEST(ConfigPublish, MistakesAreNamed) {
@@ -56,7 +56,7 @@ TEST(ConfigPublish, MistakesAreNamed) {
         "publish: {url: 'nats://me:secret@a'}\n", "publish: {url: 'nats://a', site: a.b}\n",
         "publish: {url: 'nats://a', stream: 'x y'}\n", "publish: {url: 'nats://a', certificate: c.pem}\n",
         "publish: {url: 'nats://a', frames_detail: most}\n", "publish: {url: 'nats://a', que_mb: 1}\n"}) {
-    const auto config = Parse(wrong);
+    const auto config = ParsePublish(wrong);
     ASSERT_FALSE(config.ok()) << wrong;
     EXPECT_THAT(config.error().message, HasSubstr("arm.yaml:2")) << wrong;
   }

@@ -10,9 +10,9 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-Result<Config> Parse(const std::string& section) {
+Result<Config> ParseRecording(const std::string& section) {
   return ParseConfig("arm.yaml",
                      "taclink_config: 1\n" + section +
                          "arm:\n  name: x\n  links:\n"
@@ -21,7 +21,7 @@ Result<Config> Parse(const std::string& section) {
 }
 
 TEST(ConfigRecording, ReadsAndPrintsTheSame) {
-  const auto config = Parse(
+  const auto config = ParseRecording(
       "recording: {folder: logs, at_start: true, pictures: true, compression: lz4, picture_compression: "
       "zstd, "
       "split_mb: 10, split_s: 0, quota_mb: 100, sync_s: 0.5, queue_mb: 64, scene_rate_hz: 0}\n");
@@ -44,7 +44,7 @@ TEST(ConfigRecording, ReadsAndPrintsTheSame) {
 TEST(ConfigRecording, MistakesAreNamed) {
   for (const char* wrong : {"recording: {compression: zip}\n", "recording: {sync_s: 0}\n",
                             "recording: {quota: 5}\n", "recording: {folder: '', at_start: true}\n"}) {
-    const auto config = Parse(wrong);
+    const auto config = ParseRecording(wrong);
     ASSERT_FALSE(config.ok()) << wrong;
     EXPECT_THAT(config.error().message, HasSubstr("arm.yaml:2")) << wrong;
   }
@@ -52,9 +52,9 @@ TEST(ConfigRecording, MistakesAreNamed) {
 
 TEST(ConfigRecording, LogsAreInTheHomeFolderUnlessTold) {
   ASSERT_EQ(::setenv("XDG_STATE_HOME", "/state", 1), 0);
-  EXPECT_EQ(Parse("")->recording.folder, "/state/taclink/logs");
+  EXPECT_EQ(ParseRecording("")->recording.folder, "/state/taclink/logs");
   ASSERT_EQ(::unsetenv("XDG_STATE_HOME"), 0);
-  EXPECT_EQ(Parse("recording: {folder: ''}\n")->recording.folder, "");
+  EXPECT_EQ(ParseRecording("recording: {folder: ''}\n")->recording.folder, "");
 }
 
 }  // namespace

@@ -6,13 +6,13 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr const char* kGood = R"(taclink_config: 1
 server: {listen: "[::1]:6000"}
-limits: {max_streams: 3, max_streams_per_peer: 2, max_message_kb: 128, queue_mb: 32, keepalive_s: 7}
-http: {listen: "[::1]:80", web_root: ../web, max_connections: 7, idle_timeout_s: 2.5}
-security: {certificate: s.pem, key: s.key, client_ca: /c.pem, tokens: tokens}
+limits: {max_streams: 3, max_streams_per_peer: 2, max_message_kb: 128, queue_mb: 32, queue_mb_per_peer: 48, keepalive_s: 7}
+http: {listen: "[::1]:80", web_root: ../web, max_connections: 7, max_connections_per_peer: 5, idle_timeout_s: 2.5}
+security: {certificate: s.pem, key: s.key, client_ca: /c.pem, tokens: tokens, tokens_on_error: keep, tokens_permissions: any, max_failed_tries_per_minute: 3}
 events: {history: 50, update_rate_hz: 2, audit: audit.jsonl}
 arm:
   name: left
@@ -76,14 +76,19 @@ TEST(Config, ReadsEverything) {
   EXPECT_EQ(config->limits.max_streams_per_peer, 2);
   EXPECT_EQ(config->limits.max_message_kb, 128);
   EXPECT_EQ(config->limits.queue_mb, 32);
+  EXPECT_EQ(config->limits.queue_mb_per_peer, 48);
   EXPECT_EQ(config->limits.keepalive_s, 7);
   EXPECT_EQ(config->http.listen, "[::1]:80");
   EXPECT_EQ(config->http.web_root, "/etc/web");
   EXPECT_EQ(config->http.max_connections, 7);
+  EXPECT_EQ(config->http.max_connections_per_peer, 5);
   EXPECT_EQ(config->http.idle_timeout_s, 2.5);
   EXPECT_EQ(config->security.certificate, "/etc/taclink/s.pem");
   EXPECT_EQ(config->security.client_ca, "/c.pem");
   EXPECT_EQ(config->security.tokens, "/etc/taclink/tokens");
+  EXPECT_TRUE(config->security.tokens_keep);
+  EXPECT_TRUE(config->security.tokens_open);
+  EXPECT_EQ(config->security.max_failed_tries, 3);
   ASSERT_EQ(config->links.size(), 4u);
   const LinkConfig& upper = config->links[0];
   EXPECT_EQ(upper.model, "/etc/taclink/models/special.yaml");
@@ -130,6 +135,28 @@ TEST(Config, ReadsEverything) {
   EXPECT_EQ(std::get<SimulatedSourceConfig>(config->links[3].source).scene, "press");
   const Vec3 p_in_base = upper.FrameFromLink() * Vec3(10, 0, 0);
   EXPECT_NEAR((p_in_base - Vec3(1, 12, 3)).norm(), 0, 1e-12);
+}
+
+TEST(Config, LinearUnderPressureIsRefusedUnlessItIsMeant) {
+  const auto with = [](const std::string& more) {
+    return Complaint(Replaced(kGood, "      pressure_kpa: 1.5\n", more + "      force_model: linear\n"));
+  };
+  for (const char* inflated : {"      pressure_kpa: 1.5\n", "      pressure: {source: grpc}\n"}) {
+    EXPECT_THAT(with(inflated), ::testing::AllOf(HasSubstr("force_model"), HasSubstr("auto")));
+    EXPECT_EQ(with(std::string(inflated) + "      force_model_anyway: true\n"), "accepted");
+  }
+  EXPECT_EQ(with("      pressure_kpa: 0\n"), "accepted");
+  EXPECT_EQ(with(""), "accepted");
+}
+
+TEST(Config, WhatIsMeantIsPrinted) {
+  const auto config = ParseConfig(
+      "arm.yaml",
+      Replaced(kGood, "      pressure_kpa: 1.5\n",
+               "      pressure_kpa: 1.5\n      force_model: linear\n      force_model_anyway: true\n"),
+      "");
+  ASSERT_TRUE(config.ok());
+  EXPECT_EQ(Complaint(ConfigText(*config)), "accepted");
 }
 
 constexpr const char* kJointed = R"(taclink_config: 1
@@ -269,6 +296,25 @@ TEST(Config, MistakesAreNamedWithFileAndLine) {
   EXPECT_THAT(Complaint("taclink_config: 1\narm: {name: a}\n"), HasSubstr("at least one link"));
   EXPECT_THAT(Complaint("taclink_config: 1\n"), HasSubstr("arm"));
   EXPECT_THAT(Complaint(""), HasSubstr("mapping"));
+}
+
+// The parser would take one of two, and the first document, without a word.
+TEST(Config, KeysStandOnceAndTheFileIsOneDocument) {
+  EXPECT_THAT(Complaint(Replaced(kGood, "source: files", "source: files\n      source: v4l2")),
+              HasSubstr("'arm.links[1].source' stands here a second time"));
+  EXPECT_THAT(Complaint(std::string(kGood) + "\narm: {name: other}\n"),
+              HasSubstr("'arm' stands here a second"));
+  EXPECT_THAT(Complaint(std::string(kGood) + "\n---\nlog: {level: debug}\n"),
+              HasSubstr("holds more than one document"));
+}
+
+TEST(Config, LinksAreBounded) {
+  std::string text = "taclink_config: 1\nlimits: {max_links: 3}\narm:\n  name: a\n  links:\n";
+  for (int link = 1; link <= 3; ++link)
+    text += "    - {name: l" + std::to_string(link) + ", model: barrel, source: simulated, scene: press}\n";
+  EXPECT_TRUE(ParseConfig("arm.yaml", text, "").ok());
+  text += "    - {name: l4, model: barrel, source: simulated, scene: press}\n";
+  EXPECT_THAT(Complaint(text), HasSubstr("'arm.links' has 4, more than limits.max_links, which is 3"));
 }
 
 TEST(Config, AMissingFileSaysSo) {

@@ -5,11 +5,10 @@
 #include <limits>
 
 #include "tests/server/support.h"
+#include "tests/support/times.h"
 
 namespace taclink::server {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 // One contact of `force_n`, none if 0, and three markers at x = `x_mm`.
 LinkState Touched(double force_n, double x_mm = 0, LinkStatus status = LinkStatus::kOk) {
@@ -59,6 +58,16 @@ TEST(Deadband, AnotherStatusIsNews) {
   EXPECT_FALSE(Within(deadband, Touched(1), unmeasured));
 }
 
+TEST(Deadband, ForcesThatAreNoLongerKnownAreNews) {
+  const Deadband deadband{.force_n = 10, .move_mm = 10};
+  const LinkState known = Touched(0, 0, LinkStatus::kDegraded);
+  LinkState unknown = known;
+  unknown.forces.converged = false;
+  EXPECT_TRUE(Within(deadband, known, known));
+  EXPECT_FALSE(Within(deadband, known, unknown));
+  EXPECT_FALSE(Within(deadband, unknown, known));
+}
+
 TEST(Deadband, NumbersThatAreNoneAreNews) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(Within({.force_n = 1}, Touched(nan), Touched(nan)));
@@ -74,7 +83,7 @@ std::ostream& operator<<(std::ostream& out, const Taken& taken) {
   return out << taken.sequence << (taken.unchanged ? " unchanged" : "");
 }
 
-class DeadbandQueue : public testing::Test {
+class DeadbandQueue : public ::testing::Test {
  protected:
   void Subscribe(Delivery delivery, size_t capacity = 256) {
     subscription_ = hub_.Subscribe(

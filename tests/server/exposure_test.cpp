@@ -8,8 +8,8 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 Config Listening(const std::string& grpc, const std::string& http) {
   Config config;

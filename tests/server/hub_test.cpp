@@ -124,6 +124,40 @@ TEST(Hub, EveryIsBoundedInBytesToo) {
   EXPECT_EQ(stopped->waiting_bytes(), 0u);
 }
 
+TEST(Hub, SubscribersOfOnePartyShareItsBytes) {
+  constexpr size_t kMarkers = 1000, kBytes = 400'000;
+  Hub hub(1, Encode);
+  const auto bytes = std::make_shared<ByteBudget>(kBytes);
+  const SubscriberOptions party{
+      .delivery = Delivery::kEvery, .queue_capacity = 64, .queue_bytes = kBytes, .party_bytes = bytes};
+  SubscriberOptions other = party;
+  other.party_bytes.reset();
+  auto a = hub.Subscribe(party, [] {}), b = hub.Subscribe(party, [] {}), c = hub.Subscribe(other, [] {});
+  auto publish = [&hub, sequence = uint64_t{0}](int count) mutable {
+    for (int i = 0; i < count; ++i) {
+      auto state = std::make_shared<LinkState>();
+      state->sequence = ++sequence;
+      state->shape.positions_mm.resize(kMarkers);
+      hub.Publish(0, state);
+    }
+  };
+  publish(100);
+  const size_t each = sizeof(LinkState) + kMarkers * sizeof(Vec3);
+  EXPECT_EQ(bytes->used(), a->waiting_bytes() + b->waiting_bytes());
+  EXPECT_LE(bytes->used(), kBytes + 2 * each);
+  EXPECT_GT(c->waiting_bytes(), kBytes / 2) << "another party has its own";
+  EXPECT_GE(a->waiting(), 1u);
+  EXPECT_GE(b->waiting(), 1u) << "the newest always waits";
+  EXPECT_EQ(a->Counts()[0].dropped_for_bytes, a->Counts()[0].dropped);
+  EXPECT_EQ(a->Counts()[0].dropped + a->waiting(), 100u);
+  a.reset();
+  publish(100);
+  EXPECT_EQ(bytes->used(), b->waiting_bytes());
+  EXPECT_GT(b->waiting_bytes(), kBytes / 2) << "what one held is free for the other";
+  TakeAll(*b);
+  EXPECT_EQ(bytes->used(), 0u);
+}
+
 TEST(Hub, TheNewestStateWaitsHoweverLargeItIs) {
   Hub hub(1, Encode);
   const auto subscription = hub.Subscribe({.delivery = Delivery::kEvery, .queue_bytes = 1}, [] {});

@@ -10,12 +10,12 @@
 #include "server/joint_state_intake.h"
 #include "tests/server/kinematics/arms.h"
 #include "tests/server/support.h"
+#include "tests/support/times.h"
 
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
-constexpr int64_t kMs = 1'000'000;
+using ::testing::HasSubstr;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 JointStateBuffer MakeBuffer() {
@@ -199,8 +199,8 @@ TEST_F(JointIntake, BadMessagesSayWhy) {
   EXPECT_EQ(Take({{"pitch"}, {0.1}, {}, 0, Now()}), "accepted");
   EXPECT_THAT(
       Take({{}, {0.2}, {}, 0, Now() - 7 * kMs}),
-      testing::AllOf(HasSubstr("message 2 of this call"),
-                     HasSubstr("0.007 s before that of the message before"), HasSubstr("1 before it")));
+      ::testing::AllOf(HasSubstr("message 2 of this call"),
+                       HasSubstr("0.007 s before that of the message before"), HasSubstr("1 before it")));
 }
 
 TEST_F(JointIntake, UselessMessagesAreCounted) {

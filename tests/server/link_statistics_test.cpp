@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/times.h"
+
 namespace taclink::server {
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 TEST(LinkStatistics, EmptyIsZero) {
   const auto statistics = LinkStatisticsCollector().Snapshot(0);

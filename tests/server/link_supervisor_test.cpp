@@ -15,7 +15,7 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 using State = Supervision::State;
 
 constexpr milliseconds kPoll{1};
@@ -27,9 +27,10 @@ void Measure(const StereoFrame& frame, LinkState& state) {
   state.times = frame.times;
   state.status = LinkStatus::kOk;
   state.status_reason.clear();
+  state.reasons = {{ReasonId::kDrift, "of this frame"}};
 }
 
-class LinkSupervisorTest : public testing::Test {
+class LinkSupervisorTest : public ::testing::Test {
  protected:
   void TearDown() override {
     link_.reset();
@@ -155,7 +156,14 @@ TEST_F(LinkSupervisorTest, AHungFrameIsReportedInTheWorkersPlace) {
   EXPECT_THAT(first[0]->state().status_reason,
               HasSubstr("taking a frame through FEM takes more than the 1 s"));
   Pass(seconds(5));
-  EXPECT_GE(Published().size(), 4u) << "at least once a second";
+  const auto reports = Published();
+  EXPECT_GE(reports.size(), 4u) << "at least once a second";
+  for (const auto& report : reports) {
+    const LinkState& state = report->state();
+    ASSERT_EQ(state.reasons.size(), 1u) << "none of the frames before";
+    EXPECT_EQ(state.reasons[0].id, ReasonId::kWorker);
+    EXPECT_EQ(state.reasons[0].text, state.status_reason);
+  }
   EXPECT_EQ(link_->supervision().overruns, 1u);
 
   gate.Open();

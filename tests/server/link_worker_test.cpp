@@ -13,7 +13,7 @@ namespace taclink::server {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 void Copy(const StereoFrame& frame, LinkState& state) {
   state.times = frame.times;
@@ -21,7 +21,7 @@ void Copy(const StereoFrame& frame, LinkState& state) {
   state.status_reason.clear();
 }
 
-class LinkWorkerTest : public testing::Test {
+class LinkWorkerTest : public ::testing::Test {
  protected:
   void Run(FakeProcessor::Function process, std::optional<Error> calibration_refusal = {}) {
     auto processor = std::make_unique<FakeProcessor>(std::move(process), std::move(calibration_refusal));
@@ -90,7 +90,10 @@ TEST_F(LinkWorkerTest, LateMeansTheNewest) {
 TEST_F(LinkWorkerTest, SaysThatItStartsAndWhatIsWrong) {
   script_->FailStarts(-1);
   Run(Copy);
-  EXPECT_THAT(NextStatus(LinkStatus::kLost)->state().status_reason, HasSubstr("no camera"));
+  const auto lost = NextStatus(LinkStatus::kLost);
+  EXPECT_THAT(lost->state().status_reason, HasSubstr("no camera"));
+  ASSERT_EQ(lost->state().reasons.size(), 1u);
+  EXPECT_EQ(lost->state().reasons[0].id, ReasonId::kNoFrames);
   EXPECT_GE(script_->starts(), 1);
 }
 
@@ -135,6 +138,8 @@ TEST_F(LinkWorkerTest, AProcessorThatThrowsCostsOneFrame) {
   const auto failed = NextFrame();
   EXPECT_EQ(failed->state().status, LinkStatus::kLost);
   EXPECT_THAT(failed->state().status_reason, HasSubstr("singular matrix"));
+  ASSERT_EQ(failed->state().reasons.size(), 1u);
+  EXPECT_EQ(failed->state().reasons[0].id, ReasonId::kWorker);
   script_->Push(2);
   EXPECT_EQ(NextFrame()->state().status, LinkStatus::kOk);
 }

@@ -6,9 +6,9 @@
 namespace taclink::server {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 Config Parse(const std::string& sections) {
   const auto config = ParseConfig("arm.yaml",
@@ -34,12 +34,14 @@ TEST(Reload, WhatHasAHookIsTakenOverAndTheRestNamed) {
   const auto outcome = reloader.Reload(Parse("limits: {max_streams: 7}\nserver: {listen: '[::1]:1'}\n"));
   EXPECT_THAT(outcome.applied, ElementsAre("limits"));
   EXPECT_THAT(outcome.needs_restart, ElementsAre("server"));
+  EXPECT_THAT(outcome.keys, ElementsAre("server.listen", "limits.max_streams"));
   EXPECT_EQ(streams, 7);
 
   // Again: the limits are in use now, the address still is not.
   const auto again = reloader.Reload(Parse("limits: {max_streams: 7}\nserver: {listen: '[::1]:1'}\n"));
   EXPECT_THAT(again.applied, IsEmpty());
   EXPECT_THAT(again.needs_restart, ElementsAre("server"));
+  EXPECT_THAT(again.keys, IsEmpty()) << "since the last reload";
   EXPECT_THAT(reloader.Reload(Parse("")).applied, ElementsAre("limits"));
   EXPECT_EQ(streams, 64);
   EXPECT_EQ(always, 3);
@@ -65,9 +67,12 @@ TEST(Reload, SectionsOfAPrintedConfigurationAreAllThere) {
 
 TEST(ConfigOperations, ReadPrintedAndRefused) {
   const Config config = Parse(
-      "log: {level: error, format: json, file: '/var/log/a \"b\"', rate_limit: 0}\nshutdown: {limit_s: "
+      "log: {level: error, format: json, file: '/var/log/a \"b\"', rate_limit: 0, rate_limit_total: "
+      "7}\nshutdown: {limit_s: "
       "0.5}\n");
   EXPECT_EQ(config.log.format, LogFormat::kJson);
+  EXPECT_EQ(config.log.rates.per_site, 0);
+  EXPECT_EQ(config.log.rates.total, 7);
   EXPECT_EQ(config.shutdown.limit, std::chrono::milliseconds(500));
   const auto again = ParseConfig("printed", ConfigText(config), "");
   ASSERT_TRUE(again.ok()) << again.error().message;

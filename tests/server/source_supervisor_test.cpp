@@ -11,10 +11,10 @@ namespace taclink::server {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 using State = SourceCondition::State;
 
-class SupervisorTest : public testing::Test {
+class SupervisorTest : public ::testing::Test {
  protected:
   SupervisorTest() : supervisor_("arm", std::make_unique<FakeSource>(script_), clock_) {
     clock_.LetSleepingPassTime();
@@ -82,6 +82,20 @@ TEST_F(SupervisorTest, ASilentSourceIsStartedAgain) {
   EXPECT_EQ(supervisor_.condition().state, State::kLost);
   EXPECT_THAT(supervisor_.condition().reason, HasSubstr("no frame for 2 s"));
   EXPECT_EQ(UntilNextStart(), milliseconds(100));
+}
+
+TEST_F(SupervisorTest, ASourceThatBeginsLaterIsWaitedFor) {
+  constexpr milliseconds kLater{5000};
+  SourceInfo info;
+  info.begins_at_ns = clock_.MonotonicNs() + kLater.count() * 1'000'000;
+  script_->Describe(info, {});
+  EXPECT_FALSE(Step());
+  clock_.Advance(kLater + milliseconds(1900));
+  EXPECT_FALSE(Step());
+  EXPECT_EQ(supervisor_.condition().state, State::kStarting);
+  clock_.Advance(milliseconds(200));
+  EXPECT_FALSE(Step());
+  EXPECT_EQ(supervisor_.condition().state, State::kLost);
 }
 
 TEST_F(SupervisorTest, ASourceThatFallsSilentIsLostBeforeItIsStartedAgain) {

@@ -13,7 +13,7 @@
 namespace taclink::server {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 struct Seen {
   std::string name;
@@ -65,7 +65,7 @@ TEST(ThreadSetup, PriorityIsGivenOrTheMissingRightNamed) {
   const Seen seen = Try("x", {.priority = 1});
   if (seen.policy == SCHED_FIFO) {
     EXPECT_EQ(seen.priority, 1);
-    EXPECT_THAT(log.text(), testing::IsEmpty());
+    EXPECT_THAT(log.text(), ::testing::IsEmpty());
   } else {
     EXPECT_THAT(log.text(), HasSubstr("CAP_SYS_NICE"));
     EXPECT_THAT(log.text(), HasSubstr("LimitRTPRIO=1"));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <random>
 #include <vector>
 
@@ -36,15 +37,47 @@ inline Vec3 Deform(const LinkModel& model, const std::vector<Dent>& dents, const
   return {r * std::cos(a), r * std::sin(a), rest.z() + axial};
 }
 
+/// Where a marker is that is here at rest.
+using Motion = std::function<Vec3(const Vec3& rest)>;
+
+/// A patch at an angle of 1 rad that is dragged.
+inline Motion Dragged(const LinkModel& model, const Vec3& by_mm, double z_mm) {
+  const Vec3 center = model.PointAtDepth(1, z_mm, model.thickness_mm);
+  return [=](const Vec3& rest) -> Vec3 {
+    const double off = (rest - center).norm() / 20;
+    return rest + std::exp(-0.5 * off * off) * by_mm;
+  };
+}
+
+/// What the model's cameras see, each of a skin of its own, rightly labeled and with noise.
+inline LabelledMarkers LabelsOf(const LinkModel& model, const Motion& top, const Motion& bottom,
+                                double noise_px, std::mt19937& random) {
+  LabelledMarkers markers;
+  std::normal_distribution<double> noise(0, noise_px);
+  for (const CameraId id : kBothCameras) {
+    const Projector projector(model.nominal_rig[id]);
+    for (int m = 0; m < model.markers.count(); ++m) {
+      MarkerObservation observation;
+      const Vec3 rest = model.RestMarker(m);
+      if (const auto pixel = projector.Project(id == CameraId::kTop ? top(rest) : bottom(rest))) {
+        observation.seen = true;
+        observation.center_px = *pixel + Vec2(noise(random), noise(random));
+        observation.covariance_px2 = noise_px * noise_px * Mat2::Identity();
+      }
+      markers.cameras[Index(id)].push_back(observation);
+    }
+  }
+  return markers;
+}
+
 /// True if another part of the same meridian hides part of the marker from a camera on the axis.
-inline bool Hidden(const LinkModel& model, const std::vector<Dent>& dents, const Vec3& rest,
-                   const Vec3& camera) {
-  const Vec3 p = Deform(model, dents, rest);
+inline bool Hidden(const LinkModel& model, const Motion& motion, const Vec3& rest, const Vec3& camera) {
+  const Vec3 p = motion(rest);
   const double slope = p.head<2>().norm() / std::abs(p.z() - camera.z());
   const double toward = camera.z() < rest.z() ? -1 : 1;
   for (double z = rest.z() + toward * 3; z > 0 && z < model.length_mm; z += toward * 3) {
     const double angle = std::atan2(rest.y(), rest.x());
-    const Vec3 q = Deform(model, dents, model.PointAtDepth(angle, z, model.thickness_mm));
+    const Vec3 q = motion(model.PointAtDepth(angle, z, model.thickness_mm));
     const double margin = 0.25 * model.markers.diameter_mm;
     if ((q.head<2>().norm() - margin) / std::abs(q.z() - camera.z()) < slope) return true;
   }
@@ -80,8 +113,8 @@ struct SyntheticView {
   std::array<std::vector<int>, kCameraCount> markers;
 };
 
-inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std::vector<Dent>& dents,
-                         const SyntheticOptions& options, std::mt19937& random) {
+inline SyntheticView SeeMoved(const LinkModel& model, const StereoRig& rig, const Motion& motion,
+                              const SyntheticOptions& options, std::mt19937& random) {
   SyntheticView view;
   std::normal_distribution<double> noise(0, options.noise_px);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -94,8 +127,8 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
     std::vector<std::pair<Detection, int>> all;
     for (int i = 0; i < model.markers.count(); ++i) {
       const Vec3 rest = model.RestMarker(i);
-      const auto pixel = projector.Project(Deform(model, dents, rest));
-      if (!pixel || uniform(random) < options.drop || Hidden(model, dents, rest, projector.center_in_link()))
+      const auto pixel = projector.Project(motion(rest));
+      if (!pixel || uniform(random) < options.drop || Hidden(model, motion, rest, projector.center_in_link()))
         continue;
       Detection d;
       d.center_px = *pixel + DrawnVec2([&] { return noise(random); });
@@ -108,7 +141,7 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
       all.emplace_back(d, i);
     }
     DropCovered(all, [&](int marker) {
-      return (Deform(model, dents, model.RestMarker(marker)) - projector.center_in_link()).norm();
+      return (motion(model.RestMarker(marker)) - projector.center_in_link()).norm();
     });
     for (int i = 0; i < options.false_spots; ++i) {
       Detection d;
@@ -124,6 +157,11 @@ inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std
     }
   }
   return view;
+}
+
+inline SyntheticView See(const LinkModel& model, const StereoRig& rig, const std::vector<Dent>& dents,
+                         const SyntheticOptions& options, std::mt19937& random) {
+  return SeeMoved(model, rig, [&](const Vec3& rest) { return Deform(model, dents, rest); }, options, random);
 }
 
 struct LabelScore {

@@ -28,6 +28,7 @@ class Pictures {
       char comma = 0;
       Vec3 force;
       numbers >> frame >> comma >> force.x() >> comma >> force.y() >> comma >> force.z();
+      if (at_rest_ == forces_n_.size() && force.isZero()) ++at_rest_;
       forces_n_.push_back(force);
     }
     for (const CameraId id : kBothCameras) {
@@ -41,7 +42,8 @@ class Pictures {
   }
 
   size_t count() const { return forces_n_.size(); }
-  /// From the next exposure on; until then the first picture stands.
+  /// From the next exposure on; until then those of the untouched skin that the scene begins with are shown
+  /// in turn: a picture that is the one before, pixel by pixel, is of a camera that hangs.
   void Play(int64_t now_ns) { first_ = now_ns / interval_ns_ + 1; }
 
   /// Of the picture that was taken then. A driver's timestamp is a little later than the exposure.
@@ -60,12 +62,13 @@ class Pictures {
   }
   size_t FrameAt(int64_t exposure_ns) const {
     const int64_t exposure = exposure_ns / interval_ns_, first = first_;
-    if (first < 0 || exposure < first) return 0;
+    if (first < 0 || exposure < first) return static_cast<size_t>(exposure) % at_rest_;
     return static_cast<size_t>(exposure - first) % forces_n_.size();
   }
 
   const int64_t interval_ns_;
   std::vector<Vec3> forces_n_;
+  size_t at_rest_ = 0;  // pictures that the scene begins with
   std::array<std::vector<std::vector<uint8_t>>, kCameraCount> mjpeg_, yuyv_;
   std::atomic<int64_t> first_ = -1;
 };

@@ -14,7 +14,8 @@ std::string LinkConfig(const char* link, const char* format) {
          "\n      model: cylinder\n      source: v4l2\n      devices: [\"serial:" + name +
          "-top\", \"serial:" + name + "-bottom\"]\n      frame_rate_hz: " + std::to_string(kRigRateHz) +
          "\n      format: " + format +
-         "\n      force_model: linear\n";  // the scene's too; others cost the guest minutes
+         "\n      pressure_kpa: 0\n      force_model: linear\n";  // the scene's too; others cost the guest
+                                                                  // minutes
 }
 
 }  // namespace

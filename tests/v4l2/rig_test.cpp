@@ -33,6 +33,13 @@ enum : size_t { kATop, kABottom, kBTop, kBBottom };
 bool Blames(const client::Frame& frame, const std::string& reason) {
   return frame.status != LinkStatus::kOk && frame.status_reason.find(reason) != std::string::npos;
 }
+/// Ok, or degraded by nothing but the linear force model, which the rig's links are told to use (rig.cpp) and
+/// which holds near rest only: the pictures are as good as the scene's.
+bool SeesTheScene(const client::Frame& frame) {
+  return frame.status == LinkStatus::kOk ||
+         (frame.status == LinkStatus::kDegraded && frame.status_reasons.size() == 1 &&
+          frame.status_reasons.front().reason == client::Reason::kForceModel);
+}
 bool NamesNoCamera(const client::Frame& frame) {
   return frame.times.exposure_ns != 0 && frame.status_reason.find("camera") == std::string::npos;
 }
@@ -105,8 +112,7 @@ class RigTest : public ::testing::Test {
     ASSERT_TRUE(noticed) << fault.what;
     const int64_t undone_ns = MonotonicNs();
     fault.undo(*rig_);
-    const auto recovered =
-        rig_->Await("a", undone_ns, [](const auto& frame) { return frame.status == LinkStatus::kOk; });
+    const auto recovered = rig_->Await("a", undone_ns, SeesTheScene);
     ASSERT_TRUE(recovered) << fault.what;
     const auto others = rig_->Frames("b", injected_ns, recovered->received_ns);
     const double to_status_s = Seconds(injected_ns, noticed->received_ns);
@@ -118,7 +124,7 @@ class RigTest : public ::testing::Test {
     EXPECT_LE(to_recovery_s, kToRecoveryS) << fault.what;
     EXPECT_EQ(lost, 0) << fault.what;
     for (const ReceivedFrame& other : others)
-      EXPECT_EQ(other.frame.status, LinkStatus::kOk) << fault.what << ": " << other.frame.status_reason;
+      EXPECT_TRUE(SeesTheScene(other.frame)) << fault.what << ": " << other.frame.status_reason;
   }
 
   static Rig* rig_;
@@ -158,9 +164,9 @@ TEST_F(RigTest, AStartsWithoutCameras) {
   EXPECT_LE(Seconds(started_ns, absent->received_ns), kToStatusS);
   EXPECT_LE(Seconds(released_ns, a->frame.times.exposure_ns), kToRecoveryS);
   EXPECT_LE(Seconds(released_ns, b->frame.times.exposure_ns), kToRecoveryS);
-  const auto is_ok = [](const auto& frame) { return frame.status == LinkStatus::kOk; };
-  ASSERT_TRUE(rig_->Await("a", released_ns, is_ok));
-  ASSERT_TRUE(rig_->Await("b", released_ns, is_ok));
+  for (const char* link : {"a", "b"})
+    ASSERT_TRUE(rig_->Await(link, released_ns, SeesTheScene))
+        << rig_->Frames(link, 0, MonotonicNs()).back().frame.status_reason;
 }
 
 TEST_F(RigTest, BForcesAreTheTruths) {
@@ -175,7 +181,7 @@ TEST_F(RigTest, BForcesAreTheTruths) {
     double worst_n = 0, largest_n = 0, largest_measured_n = 0;
     for (const ReceivedFrame& each : frames) {
       const Vec3& truth = rig_->pictures().ForceN(each.frame.times.exposure_ns);
-      const auto& force = each.frame.total_force_n;
+      const auto force = each.frame.total_force_n.value_or(client::Vector3{});
       const Vec3 measured(force[0], force[1], force[2]);
       worst_n = std::max(worst_n, (measured - truth).norm());
       largest_measured_n = std::max(largest_measured_n, measured.norm());
@@ -254,8 +260,7 @@ TEST_F(RigTest, BSettingsGoToTheCameraAlsoWhenItComesBack) {
   EXPECT_EQ(client.SetCamera("a", "bottom", {.gain = 3}).error().code, ErrorCode::kUnavailable);
   const int64_t plugged_ns = MonotonicNs();
   ASSERT_EQ(rig_->camera(kABottom).Plug(kABottom), "");
-  ASSERT_TRUE(
-      rig_->Await("a", plugged_ns, [](const auto& frame) { return frame.status == LinkStatus::kOk; }));
+  ASSERT_TRUE(rig_->Await("a", plugged_ns, SeesTheScene));
   EXPECT_EQ(rig_->camera(kABottom).settings(), kManual);
   EXPECT_TRUE(read_back(bottom()));
 

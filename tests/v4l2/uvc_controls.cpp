@@ -6,7 +6,7 @@ namespace taclink::testing {
 namespace {
 
 enum : uint8_t { kGetCurrent = 0x81, kGetMin = 0x82, kGetMax = 0x83, kGetRes = 0x84 };
-enum : uint8_t { kGetInfo = 0x86, kGetDefault = 0x87 };
+enum : uint8_t { kGetControlInfo = 0x86, kGetDefault = 0x87 };
 constexpr uint8_t kGetAndSet = 3;
 constexpr uint32_t kModes = 1 | 8;  // manual and aperture priority
 
@@ -50,7 +50,7 @@ std::optional<std::vector<uint8_t>> ReadControl(const UvcSettings& settings, con
       return LittleEndian(found->step, found->bytes);
     case kGetDefault:
       return LittleEndian(UvcSettings().*found->value, found->bytes);
-    case kGetInfo:
+    case kGetControlInfo:
       return LittleEndian(kGetAndSet, 1);
     default:
       return std::nullopt;

@@ -23,8 +23,8 @@ namespace taclink {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 constexpr const char* kTopPath = "/dev/video0";
 constexpr const char* kBottomPath = "/dev/video1";
@@ -75,7 +75,7 @@ Error OpenError(const V4l2DeviceOptions& options) {
   return device ? Error{ErrorCode::kInternal, "it opened"} : device.error();
 }
 
-class Vivid : public testing::Test {
+class Vivid : public ::testing::Test {
  protected:
   void SetUp() override {
     for (const char* path : {kTopPath, kBottomPath}) {
@@ -337,7 +337,7 @@ TEST_F(Vivid, TimestampsThatWrapAreReplacedByTheTimeOfArrival) {
   EXPECT_GT(source->Counters().stamped_on_arrival[0], 150u);
 }
 
-class Loss : public Vivid, public testing::WithParamInterface<uint32_t> {};
+class Loss : public Vivid, public ::testing::WithParamInterface<uint32_t> {};
 
 TEST_P(Loss, LeavesTheOtherCameraAndIsMended) {
   const auto source = MakeV4l2Source(SmallCameras(), SystemClock());
@@ -372,9 +372,10 @@ TEST_P(Loss, LeavesTheOtherCameraAndIsMended) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Vivid, Loss, testing::Values(kDisconnect, kInjectFatalError), [](const auto& loss) {
-  return loss.param == kDisconnect ? "Unplugged" : "FatalError";
-});
+INSTANTIATE_TEST_SUITE_P(Vivid, Loss, ::testing::Values(kDisconnect, kInjectFatalError),
+                         [](const auto& loss) {
+                           return loss.param == kDisconnect ? "Unplugged" : "FatalError";
+                         });
 
 }  // namespace
 }  // namespace taclink

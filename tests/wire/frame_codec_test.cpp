@@ -26,6 +26,10 @@ LinkState MakeState(int markers) {
                  .published_ns = 15};
   state.status = LinkStatus::kDegraded;
   state.status_reason = "bottom camera lost; check its cable";
+  state.reasons = {{ReasonId::kCamera, state.status_reason},
+                   {ReasonId::kPressureMismatch, "the sensor", 0.0003, 0.00015},
+                   {ReasonId::kTooDeep, "press less", 17, 16},
+                   {ReasonId::kLate, "late", 0.25}};
   state.pressure_mpa = 0.002;
   state.pressure = {.origin = PressureOrigin::kSerial,
                     .stale = true,
@@ -44,9 +48,12 @@ LinkState MakeState(int markers) {
     state.shape.sources.push_back(static_cast<MarkerSource>(i % 4));
     state.forces.forces_n.push_back(Random3(random, 1));
     state.forces.sigmas_n.push_back(0.01 * i);
+    state.forces.limits_n.push_back(0.03 + 0.01 * (i % 5));
   }
   state.forces.residual = 1.25;
-  state.forces.converged = false;
+  state.forces.camera_shift_mm = 0.4;
+  state.forces.limit_around_n = 0.3;
+  state.forces.converged = true;
   Contact contact;
   contact.id = 42;
   contact.center_mm = Vec3(36.5, 0, 90);
@@ -118,10 +125,13 @@ TEST(FrameCodec, FullComesBack) {
   for (size_t i = 0; i < 8; ++i) {
     EXPECT_NEAR((back.shape.covariances_mm2[i] - state.shape.covariances_mm2[i]).norm(), 0, 1e-7);
     EXPECT_NEAR(back.forces.sigmas_n[i], state.forces.sigmas_n[i], 1e-7);
+    EXPECT_NEAR(back.forces.limits_n[i], state.forces.limits_n[i], 1e-7);
   }
   EXPECT_EQ(back.shape.sources, state.shape.sources);
   EXPECT_EQ(back.forces.residual, 1.25);
-  EXPECT_FALSE(back.forces.converged);
+  EXPECT_NEAR(back.forces.camera_shift_mm, 0.4, 1e-9);
+  EXPECT_EQ(back.forces.limit_around_n, 0.3);
+  EXPECT_TRUE(back.forces.converged);
   ASSERT_EQ(back.contacts.size(), 2u);
   EXPECT_EQ(back.contacts[0].id, 42u);
   EXPECT_NEAR((back.contacts[0].center_mm - state.contacts[0].center_mm).norm(), 0, 1e-12);
@@ -134,6 +144,67 @@ TEST(FrameCodec, FullComesBack) {
   EXPECT_FALSE(back.contacts[1].force_covariance_n2.has_value());
   EXPECT_NEAR(back.stage_ms.register_, 3, 1e-12);
   EXPECT_EQ(back.baseline_age_s, 61.5);
+}
+
+// At every level, in SI units.
+TEST(FrameCodec, ReasonsHaveNumbers) {
+  const LinkState state = MakeState(8);
+  for (const Detail detail : {Detail::kContacts, Detail::kFull}) {
+    v1::LinkFrame frame;
+    Fill(kLink, state, detail, frame);
+    ASSERT_EQ(frame.status_reasons_size(), 4);
+    EXPECT_EQ(frame.status_reasons(0).reason(), v1::REASON_CAMERA);
+    EXPECT_FALSE(frame.status_reasons(0).has_value() || frame.status_reasons(0).has_limit());
+    EXPECT_EQ(frame.status_reasons(1).reason(), v1::REASON_PRESSURE_MISMATCH);
+    EXPECT_EQ(frame.status_reasons(1).id(), "pressure_mismatch");
+    EXPECT_NEAR(frame.status_reasons(1).value(), 300, 1e-9);
+    EXPECT_NEAR(frame.status_reasons(1).limit(), 150, 1e-9);
+    EXPECT_EQ(frame.status_reasons(1).unit(), "Pa");
+    EXPECT_NEAR(frame.status_reasons(2).value(), 0.017, 1e-12);
+    EXPECT_EQ(frame.status_reasons(2).unit(), "m");
+    EXPECT_EQ(frame.status_reasons(3).value(), 0.25);
+    EXPECT_FALSE(frame.status_reasons(3).has_limit());
+    EXPECT_EQ(frame.status_reasons(3).unit(), "s");
+    EXPECT_NEAR(frame.detection_limit_n(), 0.07, 1e-9);
+    EXPECT_EQ(frame.force_residual(), 1.25);
+    EXPECT_NEAR(frame.camera_shift_m(), 4e-4, 1e-12);
+    EXPECT_EQ(frame.detection_limit_around_n(), 0.3);
+    const LinkState back = FromWire(frame)->state;
+    ASSERT_EQ(back.reasons.size(), 4u);
+    EXPECT_NEAR(back.reasons[2].limit.value(), 16, 1e-9);
+    EXPECT_FALSE(back.reasons[0].value);
+  }
+}
+
+TEST(FrameCodec, EveryReasonHasItsNumberOnTheWire) {
+  LinkState state = MakeState(0);
+  state.reasons.clear();
+  for (int i = 0; i < kReasonCount; ++i) state.reasons.push_back({static_cast<ReasonId>(i), "text"});
+  v1::LinkFrame frame;
+  Fill(kLink, state, Detail::kContacts, frame);
+  ASSERT_EQ(frame.status_reasons_size(), kReasonCount);
+  for (const v1::StatusReason& reason : frame.status_reasons()) {
+    std::string name = v1::Reason_Name(reason.reason()).substr(std::string("REASON_").size());
+    for (char& c : name) c = static_cast<char>(std::tolower(c));
+    EXPECT_EQ(reason.id(), name);
+  }
+}
+
+// Zeros would say that nothing presses.
+TEST(FrameCodec, ForcesThatCannotBeTrustedAreNotThere) {
+  LinkState state = MakeState(8);
+  state.forces.converged = false;
+  for (const Detail detail : {Detail::kContacts, Detail::kFull}) {
+    v1::LinkFrame frame;
+    Fill(kLink, state, detail, frame);
+    EXPECT_FALSE(frame.has_total_force_n());
+    EXPECT_EQ(frame.nodal_forces_n_size(), 0);
+    EXPECT_FALSE(frame.has_detection_limit_n());
+    EXPECT_FALSE(frame.has_detection_limit_around_n());
+    EXPECT_FALSE(frame.has_camera_shift_m());
+    EXPECT_EQ(frame.detection_limits_n_size(), 0);
+    EXPECT_FALSE(FromWire(frame)->state.forces.converged);
+  }
 }
 
 TEST(FrameCodec, WireIsInSi) {
@@ -150,11 +221,12 @@ TEST(FrameCodec, WireIsInSi) {
 }
 
 TEST(FrameCodec, EachLevelHoldsTheOneBefore) {
-  const LinkState state = MakeState(240);
+  LinkState state = MakeState(240);
+  state.reasons.clear();
   const auto contacts = EncodeFrame(kLink, state, Detail::kContacts);
   const auto geometry = EncodeFrame(kLink, state, Detail::kGeometry);
   const auto full = EncodeFrame(kLink, state, Detail::kFull);
-  EXPECT_LT(contacts.size(), 500u);
+  EXPECT_LT(contacts.size(), 550u);
   EXPECT_LT(geometry.size(), contacts.size() + 240 * 12 + 10);
   EXPECT_GT(full.size(), geometry.size());
   const auto decoded = DecodeFrame(contacts);

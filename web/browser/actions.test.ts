@@ -30,7 +30,7 @@ afterAll(async () => {
 });
 
 function makeToken(name: string, role: string): { line: string; token: string } {
-  const { stdout, stderr } = taclink("token", name, "--role", role);
+  const { stdout, stderr } = taclink("token", "new", name, "--role", role);
   return { line: stdout.trim(), token: stderr.trim().split(" ").pop()! };
 }
 

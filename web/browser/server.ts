@@ -27,7 +27,7 @@ export class Server {
   /** Of a file in the server's folder. */
   write(name: string, text: string): string {
     const path = join(this.folder, name);
-    writeFileSync(path, text);
+    writeFileSync(path, text, { mode: 0o640 });
     return path;
   }
 

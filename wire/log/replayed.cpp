@@ -65,11 +65,19 @@ void Strip(Detail detail, v1::LinkFrame& frame) {
   frame.clear_nodal_forces_n();
   frame.clear_nodal_force_sigmas_n();
   frame.clear_marker_sources();
-  frame.clear_force_residual();
+  frame.clear_detection_limits_n();
   frame.clear_force_not_converged();
   if (detail != Detail::kContacts) return;
   frame.clear_positions_m();
   for (v1::Contact& contact : *frame.mutable_contacts()) contact.clear_outline_m();
+}
+
+void ClearForces(v1::LinkFrame& frame) {
+  frame.clear_total_force_n();
+  frame.clear_nodal_forces_n();
+  frame.clear_nodal_force_sigmas_n();
+  frame.clear_force_residual();
+  frame.clear_camera_shift_m();
 }
 
 template <typename T>
@@ -93,11 +101,17 @@ Result<std::optional<std::string>> EncodeReplayed(TopicKind kind, mcap::Bytes da
     if (!*is_of) return std::optional<std::string>();
   }
   const std::string mark = kind == TopicKind::kFrame ? ReplayedMark() : std::string();
-  if (kind != TopicKind::kFrame || form.detail == Detail::kFull)
-    return std::optional(Wrap(field, mcap::AsText(data), mark, log_utc_ns));
+  if (kind != TopicKind::kFrame) return std::optional(Wrap(field, mcap::AsText(data), mark, log_utc_ns));
   thread_local v1::LinkFrame frame;  // keeps its arrays from frame to frame
   if (!Parse(data, frame)) return NoMessage("LinkFrame");
-  Strip(form.detail, frame);
+  const bool has_zeros = frame.force_not_converged() && frame.has_total_force_n();  // in older logs
+  if (form.detail == Detail::kFull && !has_zeros)
+    return std::optional(Wrap(field, mcap::AsText(data), mark, log_utc_ns));
+  if (has_zeros) ClearForces(frame);
+  if (form.detail != Detail::kFull)
+    Strip(form.detail, frame);
+  else
+    frame.set_replayed(true);
   return std::optional(Wrap(field, frame.SerializeAsString(), "", log_utc_ns));
 }
 

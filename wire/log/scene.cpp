@@ -53,8 +53,8 @@ void FillSkin(const MarkerGrid& grid, const LinkState& state, foxglove::Triangle
     point.set_y(p.y());
     point.set_z(p.z());
     const double force = i < state.forces.forces_n.size() ? state.forces.forces_n[i].norm() : 0;
-    const double red = std::min(force / kRedAtNewton, 1.0);
-    FillColor(0.75 + 0.25 * red, 0.75 * (1 - red), 0.75 * (1 - red), 1, *out.add_colors());
+    const double red = std::min(force / kRedAtNewton, 1.0), gray = state.has_forces() ? 0.75 : 0.35;
+    FillColor(gray + (1 - gray) * red, gray * (1 - red), gray * (1 - red), 1, *out.add_colors());
   }
   const auto index = [&grid](int ring, int path) {
     return static_cast<uint32_t>(ring * grid.paths + path % grid.paths);

@@ -32,7 +32,7 @@ Result<void> MemorySource::Read(uint64_t offset, std::span<std::byte> out) const
 }
 
 Result<std::unique_ptr<FileSource>> FileSource::Open(const std::string& path) {
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe does not keep it waiting
   if (file < 0) return FileError(errno, "can't open", path);
   struct stat status{};
   const int number = fstat(file, &status) != 0 ? errno : S_ISREG(status.st_mode) ? 0 : EINVAL;

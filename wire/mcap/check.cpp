@@ -3,37 +3,11 @@
 #include <algorithm>
 #include <array>
 
+#include "sensing/core/printable.h"
 #include "wire/mcap/checker.h"
 #include "wire/mcap/crc32.h"
 
 namespace taclink::mcap {
-namespace {
-
-/// Whether `text` is UTF-8, as RFC 3629 has it.
-bool IsUtf8(std::string_view text) {
-  size_t i = 0;
-  while (i < text.size()) {
-    const auto lead = static_cast<uint8_t>(text[i]);
-    const size_t more = lead < 0x80         ? 0
-                        : lead >> 5 == 0x6  ? 1
-                        : lead >> 4 == 0xE  ? 2
-                        : lead >> 3 == 0x1E ? 3
-                                            : 4;
-    if (more == 4 || more >= text.size() - i) return false;
-    uint32_t code = more == 0 ? lead : lead & (0x3FU >> more);
-    for (size_t k = 1; k <= more; ++k) {
-      const auto next = static_cast<uint8_t>(text[i + k]);
-      if (next >> 6 != 0x2) return false;
-      code = code << 6 | (next & 0x3FU);
-    }
-    constexpr std::array<uint32_t, 4> kLeast = {0, 0x80, 0x800, 0x10000};
-    if (code < kLeast[more] || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return false;
-    i += more + 1;
-  }
-  return true;
-}
-
-}  // namespace
 
 Result<CheckReport> Check(const ByteSource& source, const Limits& limits) {
   return Checker(source, limits).Run();

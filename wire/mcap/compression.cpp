@@ -2,6 +2,7 @@
 
 #include <lz4frame.h>
 #include <zstd.h>
+#include <zstd_errors.h>
 
 #include <string>
 
@@ -35,7 +36,8 @@ Result<void> DecompressZstd(Bytes in, Buffer& out) {
   return {};
 }
 
-Result<void> DecompressLz4(Bytes in, Buffer& out) {
+/// Returns how much of `in` the frame takes.
+Result<size_t> DecompressLz4Frame(Bytes in, Buffer& out) {
   struct Free {
     void operator()(LZ4F_dctx* context) const { LZ4F_freeDecompressionContext(context); }
   };
@@ -53,14 +55,35 @@ Result<void> DecompressLz4(Bytes in, Buffer& out) {
     size_t target = out.size() - made;
     hint = LZ4F_decompress(context.get(), out.data() + made, &target, in.data() + taken, &source, nullptr);
     if (LZ4F_isError(hint) != 0) return Damaged(std::string("lz4: ") + LZ4F_getErrorName(hint));
-    if (hint != 0 && source == 0 && target == 0) return Damaged("lz4 is cut off or holds more than its size");
+    if (hint != 0 && source == 0 && target == 0) {
+      const bool is_cut = taken == in.size();
+      return Error{is_cut ? ErrorCode::kUnavailable : ErrorCode::kInvalidArgument,
+                   "lz4 is cut off or holds more than its size"};
+    }
     taken += source;
     made += target;
   }
-  if (made != out.size() || taken != in.size()) {
+  if (made != out.size())
     return Damaged("lz4 holds " + std::to_string(made) + " bytes, not " + std::to_string(out.size()));
-  }
+  return taken;
+}
+
+Result<void> DecompressLz4(Bytes in, Buffer& out) {
+  const auto taken = DecompressLz4Frame(in, out);
+  if (!taken) return Damaged(taken.error().message);
+  if (*taken != in.size()) return Damaged("lz4 ends " + std::to_string(in.size() - *taken) + " bytes early");
   return {};
+}
+
+/// Of the uncompressed content, as a frame's head says; 0: it does not.
+uint64_t Lz4ContentSize(Bytes in) {
+  LZ4F_dctx* context = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return 0;
+  LZ4F_frameInfo_t info{};
+  size_t size = in.size();
+  const bool good = LZ4F_isError(LZ4F_getFrameInfo(context, &info, in.data(), &size)) == 0;
+  LZ4F_freeDecompressionContext(context);
+  return good ? info.contentSize : 0;
 }
 
 }  // namespace
@@ -132,6 +155,23 @@ Result<void> Decompress(Compression compression, Bytes in, uint64_t size, Buffer
   out.resize(static_cast<size_t>(size));
   if (in.empty()) return size == 0 ? Result<void>() : Damaged("a compressed chunk is empty");
   return compression == Compression::kZstd ? DecompressZstd(in, out) : DecompressLz4(in, out);
+}
+
+Result<size_t> DecompressFrame(Compression compression, Bytes in, uint64_t most, Buffer& out) {
+  const bool is_zstd = compression == Compression::kZstd;
+  const uint64_t size = is_zstd ? ZSTD_getFrameContentSize(in.data(), in.size()) : Lz4ContentSize(in);
+  if (size == 0 || size > most) return Damaged("a frame without a size, or too large");  // also zstd's errors
+  const size_t frame = is_zstd ? ZSTD_findFrameCompressedSize(in.data(), in.size()) : in.size();
+  if (is_zstd && ZSTD_isError(frame) != 0) {
+    const bool is_cut = ZSTD_getErrorCode(frame) == ZSTD_error_srcSize_wrong;
+    return Error{is_cut ? ErrorCode::kUnavailable : ErrorCode::kInvalidArgument,
+                 std::string("zstd: ") + ZSTD_getErrorName(frame)};
+  }
+  if (is_zstd && !CanHold(compression, frame, size)) return Damaged("a frame that can't hold its size");
+  out.resize(static_cast<size_t>(size));
+  if (!is_zstd) return DecompressLz4Frame(in, out);
+  if (const auto done = DecompressZstd(in.first(frame), out); !done) return done.error();
+  return frame;
 }
 
 }  // namespace taclink::mcap

@@ -40,4 +40,9 @@ class Compressor {
 /// must be one that `in` can hold at all. Errors: kInvalidArgument (damaged, or of another size).
 Result<void> Decompress(Compression compression, Bytes in, uint64_t size, Buffer& out);
 
+/// Replaces what is in `out` by what the frame at the beginning of `in` holds, at most `most` bytes, and
+/// returns the frame's own length. Errors: kInvalidArgument (no frame, or none that says its size, or a
+/// larger one), kUnavailable (it goes on behind `in`).
+Result<size_t> DecompressFrame(Compression compression, Bytes in, uint64_t most, Buffer& out);
+
 }  // namespace taclink::mcap

@@ -30,9 +30,16 @@ Error FileError(int number, const std::string& doing, const std::string& path) {
     case EDQUOT:
     case EFBIG:
       return {ErrorCode::kResourceExhausted, what + "; free space or log to another disk"};
+    case EMFILE:
+    case ENFILE:
+      return {ErrorCode::kUnavailable, what + "; raise LimitNOFILE, or end some clients"};
     default:
       return {ErrorCode::kUnavailable, what + "; check the disk"};
   }
+}
+
+Error CutError(const std::string& path) {
+  return {ErrorCode::kUnavailable, "can't write to '" + path + "': another program has cut it"};
 }
 
 /// Takes `written` bytes off the front of `pieces`; those that are done are left out.
@@ -49,9 +56,9 @@ std::span<iovec> Advance(std::span<iovec> pieces, size_t written) {
 }
 
 /// Returns the system's error number, 0: all is written.
-int WriteAll(int file, std::span<iovec> pieces) {
+int WriteAll(FileCalls& calls, int file, std::span<iovec> pieces) {
   for (pieces = Advance(pieces, 0); !pieces.empty();) {
-    const ssize_t written = writev(file, pieces.data(), static_cast<int>(pieces.size()));
+    const ssize_t written = calls.Write(file, pieces.data(), static_cast<int>(pieces.size()));
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) return errno;
     if (written == 0) return ENOSPC;
@@ -62,17 +69,19 @@ int WriteAll(int file, std::span<iovec> pieces) {
 
 }  // namespace
 
-Result<std::unique_ptr<FileSink>> FileSink::Create(const std::string& path) {
-  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+Result<std::unique_ptr<FileSink>> FileSink::Create(const std::string& path, FileCalls& calls) {
+  const int file = calls.Open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
   if (file < 0) return FileError(errno, "can't create", path);
-  return std::unique_ptr<FileSink>(new FileSink(path, file));
+  return std::unique_ptr<FileSink>(new FileSink(path, file, calls));
 }
 
 FileSink::~FileSink() {
-  close(file_);
+  calls_.Close(file_);
 }
 
 Result<void> FileSink::Append(std::span<const Bytes> pieces) {
+  // Else what follows would lie behind a hole.
+  if (IsCut()) return CutError(path_);
   uint64_t total = 0;
   std::array<iovec, kPiecesAtOnce> vectors{};
   while (!pieces.empty()) {
@@ -81,7 +90,7 @@ Result<void> FileSink::Append(std::span<const Bytes> pieces) {
       vectors[i] = {.iov_base = const_cast<std::byte*>(pieces[i].data()), .iov_len = pieces[i].size()};
       total += pieces[i].size();
     }
-    if (const int number = WriteAll(file_, std::span(vectors).first(count)); number != 0) {
+    if (const int number = WriteAll(calls_, file_, std::span(vectors).first(count)); number != 0) {
       return FileError(number, "can't write to", path_);
     }
     pieces = pieces.subspan(count);
@@ -91,20 +100,37 @@ Result<void> FileSink::Append(std::span<const Bytes> pieces) {
 }
 
 Result<void> FileSink::Sync() {
-  while (fdatasync(file_) != 0) {
+  while (calls_.Sync(file_) != 0) {
     if (errno != EINTR) return FileError(errno, "can't sync", path_);
   }
   return {};
 }
 
 Result<void> FileSink::Truncate(uint64_t position) {
+  if (IsCut()) return CutError(path_);
   const auto offset = static_cast<off_t>(position);
-  while (ftruncate(file_, offset) != 0) {
+  while (calls_.Truncate(file_, offset) != 0) {
     if (errno != EINTR) return FileError(errno, "can't cut the torn end off", path_);
   }
-  if (lseek(file_, offset, SEEK_SET) < 0) return FileError(errno, "can't go back in", path_);
+  if (calls_.Seek(file_, offset) < 0) return FileError(errno, "can't go back in", path_);
   position_ = position;
   return {};
+}
+
+bool FileSink::IsCut() const {
+  struct stat mine{};
+  return calls_.Status(file_, mine) == 0 && static_cast<uint64_t>(mine.st_size) < position_;
+}
+
+// What the system does not tell is taken for there: reading and writing say what is wrong with it.
+FileSink::Place FileSink::WhereItIs() const {
+  struct stat mine{}, there{};
+  if (calls_.Status(file_, mine) != 0) return Place::kThere;
+  if (mine.st_nlink == 0) return Place::kNowhere;
+  if (static_cast<uint64_t>(mine.st_size) < position_) return Place::kCut;
+  if (calls_.Status(path_, there) != 0)
+    return errno == ENOENT || errno == ENOTDIR ? Place::kElsewhere : Place::kThere;
+  return mine.st_dev == there.st_dev && mine.st_ino == there.st_ino ? Place::kThere : Place::kElsewhere;
 }
 
 }  // namespace taclink::mcap

@@ -20,6 +20,7 @@ std::string ScanReport::Text() const {
   if (lost_bytes != 0)
     text += count(lost_bytes, "bytes lost") + " in" + count(lost.size(), "places").substr(1);
   if (damaged_chunks != 0) text += count(damaged_chunks, "damaged chunks");
+  if (salvaged_chunks != 0) text += count(salvaged_chunks, "chunks saved from damage");
   if (damaged_attachments != 0) text += count(damaged_attachments, "damaged attachments");
   if (dropped != 0) text += count(dropped, "messages dropped that can't be verified");
   if (orphans != 0) text += count(orphans, "messages dropped whose channel is lost");
@@ -30,12 +31,14 @@ std::string ScanReport::Text() const {
 }
 
 Scanner::Scanner(const ByteSource& source, ScanVisitor& visitor, const ScanOptions& options)
-    : source_(source), visitor_(visitor), options_(options), resync_(source) {}
+    : source_(source), visitor_(visitor), options_(options), resync_(source), look_(source) {}
 
 Result<ScanReport> Scanner::Run() {
   const auto footer = ReadFooter(source_);
   if (footer.ok() && footer->footer.summary_crc != 0) {
-    if (auto summary = ReadSummary(source_, options_.limits); summary.ok()) summary_ = std::move(*summary);
+    auto summary = ReadSummarySection(source_, options_.limits);
+    if (!summary) summary = FindMovedSummary(source_);
+    if (summary.ok()) summary_ = std::move(*summary);
   }
   if (summary_ && summary_->statistics) report_.recorded_messages = summary_->statistics->message_count;
   has_chunks_ = summary_ && !summary_->chunk_indexes.empty();
@@ -79,11 +82,12 @@ void Scanner::EnterRun(uint64_t offset) {
 Result<void> Scanner::Step() {
   const RecordHeader header = resync_.HeaderAt(offset_);
   if (header.length == kNoRecord) {
-    const uint64_t next = resync_.Find(offset_ + 1);
-    SkipDamage(offset_, next, "no record begins here");
+    if (const auto spared = TakeSparedChunk(); !spared || *spared)
+      return spared ? Result<void>() : spared.error();
+    const uint64_t begin = offset_, next = resync_.Find(begin + 1);
     EnterRun(next);
     offset_ = next;
-    return {};
+    return TakeDamage(begin, "no record begins here");
   }
   const uint64_t end = offset_ + kRecordHeaderBytes + header.length;
   const uint64_t next = resync_.CanGoOn(end) ? end : resync_.Find(offset_ + 1);
@@ -94,18 +98,25 @@ Result<void> Scanner::Step() {
     return {};
   }
   if (told_wrong_) return *told_wrong_;
-  if (taken.error().code == ErrorCode::kUnavailable) return taken;
+  if (taken.error().code == ErrorCode::kUnavailable) return taken.error();
+  if (const auto spared = TakeSparedChunk(); !spared || *spared)
+    return spared ? Result<void>() : spared.error();
   // Where the length is right, what follows is searched from there, if need be, by the next step.
   offset_ = std::min({place.next, place.end, resume_.value_or(place.end)});
   resume_.reset();
-  SkipDamage(place.offset, offset_, taken.error().message);
   if (offset_ < end) EnterRun(offset_);
-  return {};
+  // An attachment may be a log itself, whose messages are none of this one.
+  if (header.opcode == Opcode::kAttachment && place.length_is_right()) {
+    SkipDamage(place.offset, offset_, taken.error().message);
+    return {};
+  }
+  return TakeDamage(place.offset, taken.error().message);
 }
 
 Result<void> Scanner::TakeRecordAt(const Place& place, Opcode opcode) {
   if (!IsKnown(opcode)) {
     if (!place.length_is_right()) return At(place.offset, "no record begins here");
+    if (const auto hides = HidesChunk(place); !hides) return hides;
     ++report_.unknown_records;
     return {};
   }
@@ -131,6 +142,7 @@ Result<void> Scanner::Take(const Place& place, const RawRecord& record) {
       break;
   }
   if (!place.length_is_right()) return At(place.offset, "a damaged " + NameOf(record.opcode));
+  if (const auto hides = HidesChunk(place); !hides) return hides;
   if (record.opcode == Opcode::kDataEnd)
     data_ended_ = record.content.size() == sizeof(DataEnd::data_section_crc);
   if (record.opcode != Opcode::kHeader) return {};
@@ -182,9 +194,10 @@ Result<void> Scanner::TakeTopMessage(const Place& place, Bytes content) {
   if (!place.length_is_right()) return At(place.offset, "a damaged Message");
   if (data_ended_) return At(place.offset, "a message in the summary");
   if (has_chunks_ && IsMessageIndex(content)) return At(place.offset, "a damaged MessageIndex");
-  if (place.doubtful && !options_.keep_unverified) {
+  // In a log with chunks hardly a message lies outside, but one wrong bit makes one of other records.
+  if ((place.doubtful || has_chunks_) && !options_.keep_unverified) {
     ++report_.dropped;
-    return At(place.offset, "what is left of a damaged chunk");
+    return At(place.offset, "a message outside of chunks: what is left of one, or no message");
   }
   const auto message = Decode<Message>(content);
   if (!message) return At(place.offset, message.error());

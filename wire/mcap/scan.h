@@ -40,8 +40,8 @@ class ScanVisitor {
 
 struct ScanOptions {
   Limits limits = {};
-  /// Also what lies in a damaged, uncompressed chunk and still parses. Off: it is dropped and counted, for
-  /// its bytes may be wrong.
+  /// Also what lies in a damaged chunk and still parses. Off: it is dropped and counted, for its bytes may be
+  /// wrong.
   bool keep_unverified = false;
 };
 
@@ -66,6 +66,7 @@ struct ScanReport {
   uint64_t orphans = 0;        ///< dropped, for their channel is lost
   uint64_t chunks = 0;         ///< intact
   uint64_t damaged_chunks = 0;
+  uint64_t salvaged_chunks = 0;  ///< whose records are intact, though what says where they are is damaged
   uint64_t attachments = 0;
   uint64_t damaged_attachments = 0;
   uint64_t metadata = 0;
@@ -89,9 +90,11 @@ struct ScanReport {
 
 /// Passes over all bytes once and hands over every record that is intact, whatever is damaged around it:
 /// - A chunk counts as intact when its CRC is right; without CRC, as far as its records parse.
+/// - A chunk whose own fields or length are damaged is found by its compression's frame, or by a length under
+///   which its CRC is right, and counts if it is.
 /// - After damage the pass goes on where a chain of records begins again. Messages there that may be the rest
 ///   of a chunk are dropped and counted (`keep_unverified`); those of a log without chunks are kept, for they
-///   never have a CRC.
+///   never have a CRC; in one with chunks, one outside of them is dropped, too.
 /// - Channels and schemas whose record is lost come from the summary, if that is intact.
 /// Memory is bounded by the limits. Errors: the source's and the visitor's.
 Result<ScanReport> Scan(const ByteSource& source, ScanVisitor& visitor, const ScanOptions& options = {});

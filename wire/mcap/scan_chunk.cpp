@@ -37,7 +37,9 @@ Result<void> Scanner::TakeChunk(const Place& place, Bytes content) {
 
 Result<void> Scanner::TakeDamagedChunk(const Place& place, const Chunk& chunk, const Error& error) {
   ++report_.damaged_chunks;
-  const bool plain = chunk.compression.empty() && place.length_is_right();
+  const auto spared = FindSparedChunk();
+  if (!spared) return spared.error();
+  const bool plain = chunk.compression.empty() && place.length_is_right() && !*spared;
   if (plain && options_.keep_unverified) {
     ChunkIndex index;
     const MessagePlace in{.offset = place.offset, .length = place.end - place.offset, .in_chunk = true};

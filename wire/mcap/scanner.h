@@ -6,6 +6,7 @@
 #include "wire/mcap/resync.h"
 #include "wire/mcap/scan.h"
 #include "wire/mcap/summary.h"
+#include "wire/mcap/window.h"
 
 namespace taclink::mcap {
 
@@ -29,6 +30,24 @@ class Scanner {
   /// Notes an error of the visitor's, which ends the scan; others are damage.
   Result<void> Told(Result<void> result);
   void SkipDamage(uint64_t from, uint64_t to, const std::string& why);
+  /// The same from `from` to offset_, but for chunks in there whose records are intact; offset_ is behind
+  /// them.
+  Result<void> TakeDamage(uint64_t from, const std::string& why);
+  /// What is compressed between two places; `begin` at the second one: nothing that is to be kept.
+  struct Frame {
+    uint64_t begin = 0, end = 0;
+    bool verified = false;
+    uint64_t dropped = 0;  ///< messages of frames before it that can't be verified
+  };
+  Result<Frame> FindFrame(uint64_t from, uint64_t to);
+  Result<uint64_t> LoadFrame(uint64_t begin, bool& verified);
+  /// Errors: what claims to be another record, or an unknown one, is a chunk.
+  Result<void> HidesChunk(const Place& place);
+  Result<std::optional<uint64_t>> FindSparedChunk();
+  Result<bool> TakeSparedChunk();
+  Result<void> TakeSalvaged(const MessagePlace& place);
+  template <typename T>
+  std::optional<T> NumberAt(uint64_t offset);
   void EnterRun(uint64_t offset);
   Result<void> TakeRecordAt(const Place& place, Opcode opcode);
   Result<void> Take(const Place& place, const RawRecord& record);
@@ -55,12 +74,14 @@ class Scanner {
   ScanVisitor& visitor_;
   const ScanOptions options_;
   Resync resync_;
+  Window look_;
   std::optional<Summary> summary_;  // only when its CRC is right
   std::map<uint16_t, Schema> schemas_;
   std::map<uint16_t, Channel> channels_;
   std::map<uint16_t, uint32_t> sequences_;  // newest of each channel
   Buffer record_;
   Buffer chunk_;
+  Buffer salvaged_;
   uint64_t offset_ = 0;
   uint64_t doubtful_until_ = 0;
   std::optional<uint64_t> resume_;  // where a damaged record ends, if not at its end

@@ -74,6 +74,33 @@ Result<PlacedFooter> ReadFooter(const ByteSource& source) {
 }
 
 Result<Summary> ReadSummary(const ByteSource& source, const Limits& limits) {
+  auto summary = ReadSummarySection(source, limits);
+  if (!summary) return summary;
+  Buffer buffer;
+  auto header = ReadRecordAs<Header>(source, Opcode::kHeader, kMagic.size(), limits, buffer);
+  if (!header) return header.error();
+  summary->header = std::move(*header);
+  return summary;
+}
+
+namespace {
+
+Result<Summary> ReadSummaryFrom(const ByteSource& source, uint64_t start, const PlacedFooter& end) {
+  // The footer's fields before its CRC belong to what the CRC covers.
+  Buffer bytes(static_cast<size_t>(end.offset - start + kRecordHeaderBytes + 16));
+  if (const auto read = source.Read(start, bytes); !read) return read.error();
+  if (end.footer.summary_crc != 0 && Crc32(bytes) != end.footer.summary_crc) {
+    return At(start, "the summary's CRC is wrong: it is damaged");
+  }
+  Summary summary;
+  const auto taken = TakeAll(Bytes(bytes).first(static_cast<size_t>(end.offset - start)), start, summary);
+  if (!taken) return taken.error();
+  return summary;
+}
+
+}  // namespace
+
+Result<Summary> ReadSummarySection(const ByteSource& source, const Limits& limits) {
   const auto end = ReadFooter(source);
   if (!end) return end.error();
   const uint64_t start = end->footer.summary_start;
@@ -87,20 +114,26 @@ Result<Summary> ReadSummary(const ByteSource& source, const Limits& limits) {
               Error{ErrorCode::kResourceExhausted,
                     "the summary is above the limit of " + std::to_string(limits.record_bytes) + " bytes"});
   }
-  // The footer's fields before its CRC belong to what the CRC covers.
-  Buffer bytes(static_cast<size_t>(end->offset - start + kRecordHeaderBytes + 16));
-  if (const auto read = source.Read(start, bytes); !read) return read.error();
-  if (end->footer.summary_crc != 0 && Crc32(bytes) != end->footer.summary_crc) {
-    return At(start, "the summary's CRC is wrong: it is damaged");
+  return ReadSummaryFrom(source, start, *end);
+}
+
+Result<Summary> FindMovedSummary(const ByteSource& source) {
+  constexpr uint64_t kMostBytes = uint64_t{16} << 20;
+  constexpr std::array<std::byte, kRecordHeaderBytes> kDataEnd = {std::byte{0x0f}, std::byte{4}};
+  const auto end = ReadFooter(source);
+  if (!end) return end.error();
+  const uint64_t begin = end->offset - std::min(end->offset, kMostBytes);
+  Buffer tail(static_cast<size_t>(end->offset - begin));
+  if (const auto read = source.Read(begin, tail); !read) return read.error();
+  for (auto from = tail.begin(); end->footer.summary_crc != 0;) {
+    from = std::search(from, tail.end(), kDataEnd.begin(), kDataEnd.end());
+    if (from == tail.end()) break;
+    const uint64_t start = begin + static_cast<uint64_t>(from - tail.begin()) + kDataEnd.size() + 4;
+    auto summary = start <= end->offset ? ReadSummaryFrom(source, start, *end) : At(start, "none");
+    if (summary.ok()) return summary;
+    ++from;
   }
-  Summary summary;
-  Buffer buffer;
-  auto header = ReadRecordAs<Header>(source, Opcode::kHeader, kMagic.size(), limits, buffer);
-  if (!header) return header.error();
-  summary.header = std::move(*header);
-  const auto taken = TakeAll(Bytes(bytes).first(static_cast<size_t>(end->offset - start)), start, summary);
-  if (!taken) return taken.error();
-  return summary;
+  return Error{ErrorCode::kNotFound, "no summary is where the log's end has its checksum of"};
 }
 
 std::string Incomplete(const Summary& summary) {

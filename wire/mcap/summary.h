@@ -34,6 +34,11 @@ Result<PlacedFooter> ReadFooter(const ByteSource& source);
 /// Checked by its CRC if it has one. Errors: kNotFound (there is no summary), kInvalidArgument (damaged),
 /// kResourceExhausted (above the limit), or the source's.
 Result<Summary> ReadSummary(const ByteSource& source, const Limits& limits);
+/// All of it but the header, which stands at the log's other end.
+Result<Summary> ReadSummarySection(const ByteSource& source, const Limits& limits);
+/// The same of a log that lacks bytes before it, so that its end says a wrong place: behind the end of the
+/// data, where its CRC is right.
+Result<Summary> FindMovedSummary(const ByteSource& source);
 
 /// Whether all that the log holds can be found by `summary`: empty, or why not.
 std::string Incomplete(const Summary& summary);

@@ -25,7 +25,7 @@ test("contacts.mjs prints links, forces in N and places in m", limit, async () =
     const { status, stdout, stderr } = await example("contacts.mjs", "--count", "2");
     assert.equal(status, 0, stderr);
     assert.match(stdout, /^arm test, server \d.*\n {2}sleeve: [a-z]+, /);
-    assert.equal(stdout.match(/ contacts, total \(.*\) N$/gm).length, 2, stdout);
+    assert.equal(stdout.match(/ contacts, total (\(.*\) N|not known)$/gm).length, 2, stdout);
     const found = /^ {2}sleeve #\d+: (\S+) N, force \(.*\) N at \(.*\) m$/m.exec(stdout);
     return found && Number(found[1]) > 0.9 * TOUCH.force_n && found;
   });

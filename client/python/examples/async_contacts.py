@@ -29,11 +29,15 @@ async def print_events(client: taclink.aio.Client) -> None:
 
 async def print_both(arguments: argparse.Namespace) -> None:
     async with taclink.aio.Client(arguments.server, token=arguments.token, ca_file=arguments.tls_ca) as client:
-        both = asyncio.gather(print_frames(client), print_events(client))
+        both = [asyncio.create_task(print_frames(client)), asyncio.create_task(print_events(client))]
         try:
-            await asyncio.wait_for(both, arguments.seconds or None)
+            await asyncio.wait_for(asyncio.gather(*both), arguments.seconds or None)
         except asyncio.TimeoutError:
             pass
+        finally:
+            for task in both:  # gather leaves the other one running when one fails
+                task.cancel()
+            await asyncio.gather(*both, return_exceptions=True)
 
 
 def main() -> None:

@@ -37,7 +37,10 @@ def main() -> None:
         print_links(client.arm())
         for contacts in client.contacts(max_rate_hz=arguments.rate):
             total_n = np.linalg.norm(contacts.total_force_n)
-            print(f"-- {len(contacts.contacts)} contacts, {total_n:.2f} N together", flush=True)
+            total = "sum not known" if np.isnan(total_n) else f"{total_n:.2f} N together"
+            unknown = [link.link for link in contacts.links if link.forces_unknown]
+            beside = f", without {', '.join(unknown)}: not known" if unknown else ""
+            print(f"-- {len(contacts.contacts)} contacts, {total}{beside}", flush=True)
             print_contacts(contacts)
             if contacts.sequence == arguments.count:
                 break

@@ -224,7 +224,8 @@ class Client:
     def set_force_model(self, link: str, model: str, *, timeout: float = SLOW_S) -> None:
         """Computes the link's forces by "linear", "pressurised", "nonlinear" or "literal" until the server ends.
 
-        Errors: NotFound (no such link), InvalidArgument, Refused (a log is played).
+        Errors: NotFound (no such link), InvalidArgument, Refused (a log is played; "linear" on a skin that may be
+        inflated).
         """
         self._connection.ask(_calls.set_force_model(link, model, timeout))
 

@@ -62,6 +62,35 @@ class LinkStatus(Name):
     LOST = "lost"  # the source or the markers are gone; nothing is measured now
 
 
+class Reason(Name):
+    """What makes a frame worse than it could be; docs/troubleshooting.md says what to do about each."""
+
+    UNKNOWN = "unknown"
+    FEW_MARKERS = "few_markers"  # too few are seen
+    CAMERA = "camera"  # a camera gives no picture, or none that can be read
+    FROZEN = "frozen"  # a camera gives the same picture again and again
+    LATE = "late"  # a camera shows the skin's motion later than the other
+    CAMERAS_DISAGREE = "cameras_disagree"  # the two pictures are not of one skin at one moment
+    NOT_CONVERGED = "not_converged"  # no loads were found that explain the markers: no forces
+    IMPOSSIBLE = "impossible"  # what was found is not physically possible: no forces
+    NO_EQUILIBRIUM = "no_equilibrium"  # no skin of this model is stable under the pressure: no forces
+    PRESSURE_UNKNOWN = "pressure_unknown"  # nobody tells it now
+    PRESSURE_MISMATCH = "pressure_mismatch"  # what is told does not fit the skin's shape
+    RESIDUAL = "residual"  # markers are off the estimated shape
+    LABELS = "labels"  # labels were left out as contradicting the others
+    TOO_DEEP = "too_deep"  # deeper than forces were compared with the truth
+    BEYOND_MARKERS = "beyond_markers"  # a contact may lie where it hardly shows
+    ENCIRCLED = "encircled"  # bodies all around bend the skin in waves
+    SPARSE_MARKERS = "sparse_markers"  # no marker is in sight where a load may hide
+    UNSETTLED = "unsettled"  # the shape did not settle where no camera sees it
+    FORCE_MODEL = "force_model"  # the one that was asked for does not hold here
+    CAMERAS_MOVED = "cameras_moved"  # further than is only taken off
+    DRIFT = "drift"  # the baseline has drifted
+    NO_FRAMES = "no_frames"  # none come from the cameras, files or log
+    WORKER = "worker"  # what reads or computes the frames is late, has failed or is being started again
+    FORCED_BASELINE = "forced_baseline"  # beside another one: a baseline taken by force may explain it
+
+
 class ForceModel(Name):
     """How forces are computed from the shape."""
 
@@ -103,7 +132,7 @@ class AcquireReason(Name):
 
 class PressureOrigin(Name):
     UNKNOWN = "unknown"
-    NONE = "none"  # taken as 0
+    NONE = "none"  # 0 for the baseline; what came since, the shape tells
     CONSTANT = "constant"
     SIMULATED = "simulated"
     FILE = "file"

@@ -21,8 +21,7 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 PATIENCE_S = 120.0
 RATE_HZ = 15
 
-# Linear skins need no equilibria to be solved before they start.
-SCENE = f"taclink_scene: 1\nname: test\nmodel: cylinder\nskin: linear\nframe_rate_hz: {RATE_HZ}\nduration_s: 7200\n"
+SCENE = f"taclink_scene: 1\nname: test\nmodel: cylinder\nframe_rate_hz: {RATE_HZ}\nduration_s: 7200\n"
 PRESS = "contacts:\n  - {{at: {{path: 7, ring: 5}}, force_n: 0.2, begin_s: {}, end_s: 7000, ramp_s: 0.2}}\n"
 HEAD = "taclink_config: 1\nrecording: {folder: logs}\n"
 
@@ -116,7 +115,7 @@ def links(*lines: str) -> str:
 
 
 def link(name: str, scene: str, more: str = "") -> str:
-    return f"name: {name}, model: cylinder, source: simulated, scene: {scene}.yaml, force_model: linear{more}"
+    return f"name: {name}, model: cylinder, source: simulated, scene: {scene}.yaml{more}"
 
 
 def environment_of(library: Path, folder: Path) -> dict[str, str]:

@@ -7,12 +7,14 @@ from collections.abc import Awaitable, Callable
 from functools import wraps
 from pathlib import Path
 
+import grpc
 import numpy as np
 import pytest
 import server as servers
 
 import taclink
 import taclink.aio
+from taclink.aio import _waiting
 
 Test = Callable[[servers.Server, taclink.aio.Client], Awaitable[None]]
 
@@ -192,3 +194,40 @@ async def test_closing_ends_what_waits(server: servers.Server, client: taclink.a
         assert await waiting[1] == []
     with pytest.raises(taclink.Cancelled, match="closed"):
         await client.arm()
+
+
+class CallThatFailsAsItIsCancelled:
+    """The server goes away in the moment in which nobody waits any more."""
+
+    def __init__(self) -> None:
+        self._over = asyncio.Event()
+
+    async def read(self) -> object:
+        try:
+            await self._over.wait()
+        except asyncio.CancelledError:
+            pass
+        nothing = grpc.aio.Metadata()
+        raise grpc.aio.AioRpcError(grpc.StatusCode.UNAVAILABLE, nothing, nothing, "gone")
+
+    def cancel(self) -> None:
+        self._over.set()
+
+
+@pytest.mark.parametrize("ended_by", ["the loop", "the task"])
+def test_a_read_that_nobody_waits_for_fails_in_silence(ended_by: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_waiting.Channel, "start", lambda *_: CallThatFailsAsItIsCancelled())
+    told: list[dict[str, object]] = []
+
+    async def main() -> "asyncio.Task[object]":
+        asyncio.get_running_loop().set_exception_handler(lambda _, what: told.append(what))
+        client = taclink.aio.Client("unix:none")
+        waiting = asyncio.ensure_future(anext(client.frames()))
+        await asyncio.sleep(0.01)
+        if ended_by == "the task":
+            waiting.cancel()
+            await asyncio.wait((waiting,))
+        return waiting
+
+    assert asyncio.run(main()).cancelled()
+    assert told == []

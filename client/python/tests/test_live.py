@@ -72,7 +72,7 @@ def test_markers_lie_ring_by_ring_on_the_model(client: taclink.Client) -> None:
 def test_forces_of_a_full_frame_add_up(client: taclink.Client, touched: None) -> None:
     model = client.arm().links[0].model
     frame = next(client.frames("pressed", "full"))
-    assert frame.detail == "full" and frame.force_model == "linear" and frame.force_converged
+    assert frame.detail == "full" and frame.force_model == "nonlinear" and frame.force_converged
     for rows in (frame.positions_m, frame.displacements_m, frame.nodal_forces_n):
         assert rows.shape == (240, 3) and rows.dtype == np.float64 and not rows.flags.writeable
     assert frame.displacement_covariances_m2.shape == (240, 3, 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Iterator
 
@@ -14,7 +15,7 @@ import taclink
 def test_a_tare_is_accepted_or_refused_for_each_link(client: taclink.Client, touched: None) -> None:
     pressed, idle = client.tare(frames=3)
     assert (pressed.link, idle.link) == ("pressed", "idle")
-    assert not pressed.accepted and "touched" in pressed.reason and "0.20 N" in pressed.reason
+    assert not pressed.accepted and "touched" in pressed.reason and re.search(r"0\.(19|20|21) N", pressed.reason)
     assert idle.accepted and idle.reason == "" and idle.frames == 3 and not idle.forced
     assert 0 <= idle.shift_m < 1e-3 and idle.previous_age_s > 0
     servers.until(lambda: client.arm().link("idle").baseline.origin == "tare", "the baseline is new")

@@ -51,8 +51,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def make_token(folder: Path, name: str, role: str) -> str:
     made = subprocess.run(
-        [str(servers.TACLINK), "token", name, "--role", role], check=True, capture_output=True, text=True
+        [str(servers.TACLINK), "token", "new", name, "--role", role], check=True, capture_output=True, text=True
     )
+    (folder / "tokens").touch(mode=0o600)
     with open(folder / "tokens", "a") as tokens:
         tokens.write(made.stdout)
     return made.stderr.strip().rpartition(" ")[2]

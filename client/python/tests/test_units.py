@@ -17,8 +17,8 @@ import taclink
 import taclink.aio
 from taclink import _channel, _reconnect, errors, names
 from taclink._streams import FrameState
-from taclink.messages import arrays, frame
-from taclink.v1 import frame_pb2, tactile_pb2
+from taclink.messages import arrays, contacts, frame
+from taclink.v1 import contacts_pb2, frame_pb2, tactile_pb2
 
 # Members that say what the first number means.
 FIRST = {"NONE", "OFF", "CONFIGURED", "UNSPECIFIED", "UNKNOWN"}
@@ -78,6 +78,18 @@ def test_frames_are_frozen_and_keep_shapes_without_content() -> None:
         empty.link = "other"  # type: ignore[misc]
     with pytest.raises(ValueError, match="read-only"):
         empty.total_force_n[0] = 1
+
+
+def test_what_is_not_known_is_no_zero() -> None:
+    assert np.isnan(frame.frame_from(frame_pb2.LinkFrame()).total_force_n).all()
+    arm = contacts.arm_contacts_from(contacts_pb2.StreamContactsResponse(joint_names=["elbow"]))
+    assert np.isnan(arm.total_force_n).all() and np.isnan(arm.total_moment_nm).all() and arm.joints == ()
+    numbers = ("detection_limit_n", "detection_limit_around_n", "force_residual", "camera_shift_m")
+    for place, name in enumerate(numbers, 1):
+        assert getattr(frame.frame_from(frame_pb2.LinkFrame()), name) is None
+        message = frame_pb2.LinkFrame()
+        setattr(message, name, place)
+        assert getattr(frame.frame_from(message), name) == place
 
 
 def test_latency_is_known_only_of_live_pictures() -> None:

@@ -58,7 +58,7 @@ BuiltLink Build(const LinkModel& model, const BuildTolerance& tolerance, LensKin
   return link;
 }
 
-class BundleTest : public testing::TestWithParam<LensKind> {};
+class BundleTest : public ::testing::TestWithParam<LensKind> {};
 
 // The errors' squares over the stated covariance: 1 per parameter if that is right.
 TEST_P(BundleTest, CovarianceIsThatOfTheErrors) {
@@ -105,7 +105,7 @@ TEST_P(BundleTest, OutliersHardlyPull) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, BundleTest, testing::Values(LensKind::kDivision, LensKind::kKannalaBrandt),
+INSTANTIATE_TEST_SUITE_P(Kinds, BundleTest, ::testing::Values(LensKind::kDivision, LensKind::kKannalaBrandt),
                          [](const auto& one) { return std::string(Name(one.param)); });
 
 TEST(Bundle, CameraThatCannotSeeItsSamplesDoesNotConverge) {

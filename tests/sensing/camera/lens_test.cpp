@@ -39,7 +39,7 @@ std::vector<Vec3> Points(const CameraModel& camera) {
   return points;
 }
 
-class LensTest : public testing::TestWithParam<LensKind> {
+class LensTest : public ::testing::TestWithParam<LensKind> {
  protected:
   const CameraModel camera_ = Camera(GetParam());
 };
@@ -120,7 +120,7 @@ TEST_P(LensTest, OtherKindsCanStandInForIt) {
     EXPECT_NEAR(a.AtAngle(theta)->px, b.AtAngle(theta)->px, 0.5);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, LensTest, testing::Values(LensKind::kDivision, LensKind::kKannalaBrandt),
+INSTANTIATE_TEST_SUITE_P(Kinds, LensTest, ::testing::Values(LensKind::kDivision, LensKind::kKannalaBrandt),
                          [](const auto& one) { return std::string(Name(one.param)); });
 
 TEST(Lens, DivisionIsTheEquationOfTheThesis) {

@@ -12,12 +12,12 @@ namespace taclink {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// A tree as the kernel makes it.
-class CameraFinderTest : public testing::Test {
+class CameraFinderTest : public ::testing::Test {
  protected:
   CameraFinderTest() { fs::create_directories(Root() / "class/video4linux"); }
 

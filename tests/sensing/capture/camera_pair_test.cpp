@@ -6,18 +6,18 @@
 #include <optional>
 
 #include "tests/sensing/capture/fake_cameras.h"
+#include "tests/support/times.h"
 
 namespace taclink {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
-constexpr int64_t kMs = 1'000'000;
 constexpr size_t kTop = Index(CameraId::kTop), kBottom = Index(CameraId::kBottom);
 
-class CameraPairTest : public testing::Test {
+class CameraPairTest : public ::testing::Test {
  protected:
   CameraPairTest() { cameras_[kBottom].offset_ns = 2 * kMs; }
 

@@ -12,7 +12,7 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr int kWidth = 64, kHeight = 48;
 

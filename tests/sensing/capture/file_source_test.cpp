@@ -8,15 +8,14 @@
 #include "sensing/capture/decode.h"
 #include "sensing/capture/image_io.h"
 #include "tests/sensing/capture/pictures.h"
+#include "tests/support/times.h"
 
 namespace taclink {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::AllOf;
-using testing::HasSubstr;
-
-constexpr int64_t kMs = 1'000'000;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 class FakeClock final : public Clock {
  public:
@@ -31,7 +30,7 @@ class FakeClock final : public Clock {
   int64_t now_ns_ = 5'000 * kMs;
 };
 
-class FileSourceTest : public testing::Test {
+class FileSourceTest : public ::testing::Test {
  protected:
   void Write(const std::string& name, int seed, int width_px = 32) {
     ASSERT_TRUE(WritePng(folder_ / name, SlopePicture(width_px, 24, seed)));
@@ -143,6 +142,42 @@ TEST_F(FileSourceTest, AMissingPictureIsNotValid) {
   EXPECT_EQ(source->Counters().unpaired[Index(CameraId::kTop)], 1u);
 }
 
+TEST_F(FileSourceTest, ADamagedPictureIsSkippedAndTold) {
+  for (const bool in_memory : {false, true}) {
+    WritePairs(3);
+    const auto source = MakeFileSource(
+        {.folder = folder_.path(), .loop = false, .paced = false, .in_memory = in_memory}, clock_);
+    WriteBytes(folder_ / "top_000001.png", {'x'});
+    if (in_memory) WriteBytes(folder_ / "bottom_000003.png", {'x'});
+    ASSERT_TRUE(source->Start());
+    if (!in_memory) WriteBytes(folder_ / "bottom_000003.png", {'x'});  // while it plays
+    for (const int pair : {1, 2, 3}) {
+      ASSERT_TRUE(source->Next(frame_, milliseconds(0)));
+      const RawImage &top = frame_.images[Index(CameraId::kTop)],
+                     &bottom = frame_.images[Index(CameraId::kBottom)];
+      EXPECT_EQ(top.valid, pair != 1);
+      EXPECT_EQ(bottom.valid, pair != 3);
+      EXPECT_EQ(top.why_missing.empty(), top.valid);
+      EXPECT_THAT(bottom.why_missing,
+                  HasSubstr(bottom.valid ? "" : "bottom_000003.png: is not a PNG or JPEG"));
+      EXPECT_EQ(bottom.valid ? Seed(CameraId::kBottom) : 100 + pair, 100 + pair);
+    }
+    EXPECT_EQ(NextError(*source), ErrorCode::kEndOfData);
+    EXPECT_EQ(source->Counters().damaged[Index(CameraId::kTop)], 1u);
+    EXPECT_EQ(source->Counters().damaged[Index(CameraId::kBottom)], 1u);
+  }
+}
+
+TEST_F(FileSourceTest, AFolderThatIsGoneIsToBeStartedAgain) {
+  WritePairs(2);
+  const auto source = Source(true, false);
+  ASSERT_TRUE(source->Start());
+  std::filesystem::rename(folder_.path(), folder_.path() + ".away");
+  EXPECT_EQ(NextError(*source), ErrorCode::kUnavailable);
+  std::filesystem::rename(folder_.path() + ".away", folder_.path());
+  EXPECT_TRUE(source->Next(frame_, milliseconds(0)));
+}
+
 TEST_F(FileSourceTest, BeginsAgainWhenAsked) {
   WritePairs(2);
   const auto source = Source(true, false);
@@ -242,9 +277,10 @@ TEST_F(FileSourceTest, BadPicturesAreNamed) {
   WritePairs(2);
   Write("top_3.png", 0, 48);
   EXPECT_THAT(StartError().message, AllOf(HasSubstr("top_3.png: is 48x24"), HasSubstr("32x24")));
-  WriteBytes(folder_ / "top_3.png", {'x'});
-  EXPECT_THAT(StartError().message, AllOf(HasSubstr("top_3.png"), HasSubstr("not a PNG or JPEG")));
   std::filesystem::remove(folder_ / "top_3.png");
+  for (const char* name : {"top_000001.png", "bottom_000001.png", "top_000002.png", "bottom_000002.png"})
+    WriteBytes(folder_ / name, {'x'});
+  EXPECT_THAT(StartError().message, AllOf(HasSubstr("top_000001.png"), HasSubstr("not a PNG or JPEG")));
   Write("top_01.png", 0);
   EXPECT_THAT(StartError().message, HasSubstr("two pictures with number 1 for the top camera"));
 }

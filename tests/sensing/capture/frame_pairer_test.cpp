@@ -7,12 +7,13 @@
 #include <random>
 #include <vector>
 
+#include "tests/support/times.h"
+
 namespace taclink {
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
 constexpr double kRateHz = 100;  // a frame is 10 ms
-constexpr CameraId kTop = CameraId::kTop, kBottom = CameraId::kBottom;
+constexpr CameraId kTopCamera = CameraId::kTop, kBottomCamera = CameraId::kBottom;
 
 /// A picture as it arrives from a camera.
 struct Arrival {
@@ -34,7 +35,7 @@ std::vector<Arrival> Simulate(const SimulatedCamera& top, const SimulatedCamera&
   std::mt19937 random(7);
   std::vector<Arrival> arrivals;
   for (const CameraId id : kBothCameras) {
-    const SimulatedCamera& camera = id == kTop ? top : bottom;
+    const SimulatedCamera& camera = id == kTopCamera ? top : bottom;
     std::normal_distribution<double> jitter(0, 1);
     std::uniform_real_distribution<double> chance;
     for (int i = 0; i < count; ++i) {
@@ -60,7 +61,7 @@ std::vector<FramePair> Pairs(FramePairer& pairer, const std::vector<Arrival>& ar
 }
 
 double OffsetMs(const FramePair& pair) {
-  return 1e-6 * static_cast<double>(pair[kBottom].timestamp_ns - pair[kTop].timestamp_ns);
+  return 1e-6 * static_cast<double>(pair[kBottomCamera].timestamp_ns - pair[kTopCamera].timestamp_ns);
 }
 
 void ExpectRising(const std::vector<FramePair>& pairs) {
@@ -74,24 +75,24 @@ void ExpectRising(const std::vector<FramePair>& pairs) {
 
 TEST(FramePairer, PairsTheNearest) {
   FramePairer pairer(kRateHz);
-  EXPECT_FALSE(pairer.Add(kTop, {7, 100 * kMs, 1}));
-  const auto pair = pairer.Add(kBottom, {3, 104 * kMs, 2});
+  EXPECT_FALSE(pairer.Add(kTopCamera, {7, 100 * kMs, 1}));
+  const auto pair = pairer.Add(kBottomCamera, {3, 104 * kMs, 2});
   ASSERT_TRUE(pair);
-  EXPECT_EQ((*pair)[kTop].handle, 1);
-  EXPECT_EQ((*pair)[kBottom].handle, 2);
+  EXPECT_EQ((*pair)[kTopCamera].handle, 1);
+  EXPECT_EQ((*pair)[kBottomCamera].handle, 2);
   EXPECT_EQ(pair->exposure_ns(), 100 * kMs);
   EXPECT_TRUE(pairer.dropped().empty());
 }
 
 TEST(FramePairer, DropsTheOlderOfTwoThatDoNotMatch) {
   FramePairer pairer(kRateHz);
-  EXPECT_FALSE(pairer.Add(kTop, {0, 100 * kMs, 1}));
-  EXPECT_FALSE(pairer.Add(kBottom, {0, 106 * kMs, 2}));
+  EXPECT_FALSE(pairer.Add(kTopCamera, {0, 100 * kMs, 1}));
+  EXPECT_FALSE(pairer.Add(kBottomCamera, {0, 106 * kMs, 2}));
   ASSERT_EQ(pairer.dropped().size(), 1u);
-  EXPECT_EQ(pairer.dropped()[0].camera, kTop);
+  EXPECT_EQ(pairer.dropped()[0].camera, kTopCamera);
   EXPECT_EQ(pairer.dropped()[0].picture.handle, 1);
-  EXPECT_EQ(pairer.dropped_total(kTop), 1u);
-  const auto pair = pairer.Add(kTop, {1, 110 * kMs, 3});
+  EXPECT_EQ(pairer.dropped_total(kTopCamera), 1u);
+  const auto pair = pairer.Add(kTopCamera, {1, 110 * kMs, 3});
   ASSERT_TRUE(pair);
   EXPECT_NEAR(OffsetMs(*pair), -4, 1e-9);
   EXPECT_TRUE(pairer.dropped().empty());
@@ -99,11 +100,11 @@ TEST(FramePairer, DropsTheOlderOfTwoThatDoNotMatch) {
 
 TEST(FramePairer, HalfAFrameIsStillAPair) {
   FramePairer pairer(kRateHz);
-  EXPECT_FALSE(pairer.Add(kTop, {0, 100 * kMs, 0}));
-  EXPECT_TRUE(pairer.Add(kBottom, {0, 105 * kMs, 0}));
+  EXPECT_FALSE(pairer.Add(kTopCamera, {0, 100 * kMs, 0}));
+  EXPECT_TRUE(pairer.Add(kBottomCamera, {0, 105 * kMs, 0}));
   FramePairer other(kRateHz);
-  EXPECT_FALSE(other.Add(kTop, {0, 100 * kMs, 0}));
-  EXPECT_FALSE(other.Add(kBottom, {0, 105 * kMs + 1, 0}));
+  EXPECT_FALSE(other.Add(kTopCamera, {0, 100 * kMs, 0}));
+  EXPECT_FALSE(other.Add(kBottomCamera, {0, 105 * kMs + 1, 0}));
 }
 
 TEST(FramePairer, AnyConstantOffsetGivesEveryPair) {
@@ -178,25 +179,25 @@ TEST(FramePairer, LossesAreGapsAndEveryPictureIsAccountedFor) {
   EXPECT_NEAR(static_cast<double>(pairs.size()), 2000 * 0.8 * 0.9, 60);
   for (size_t i = 1; i < pairs.size(); ++i) {
     EXPECT_EQ(pairs[i].sequence - pairs[i - 1].sequence,
-              pairs[i][kTop].sequence - pairs[i - 1][kTop].sequence);
+              pairs[i][kTopCamera].sequence - pairs[i - 1][kTopCamera].sequence);
     EXPECT_NEAR(OffsetMs(pairs[i]), 2, 1e-3);
   }
-  EXPECT_EQ(dropped, pairer.dropped_total(kTop) + pairer.dropped_total(kBottom));
+  EXPECT_EQ(dropped, pairer.dropped_total(kTopCamera) + pairer.dropped_total(kBottomCamera));
   EXPECT_LE(arrivals.size() - 2 * pairs.size() - dropped, FramePairer::kDepth);  // these still wait
 }
 
 TEST(FramePairer, ASilentCameraFillsNothing) {
   FramePairer pairer(kRateHz);
   for (int i = 0; i < 100; ++i) {
-    EXPECT_FALSE(pairer.Add(kTop, {static_cast<uint32_t>(i), i * 10 * kMs, i}));
+    EXPECT_FALSE(pairer.Add(kTopCamera, {static_cast<uint32_t>(i), i * 10 * kMs, i}));
     ASSERT_EQ(pairer.dropped().size(), i < 2 ? 0u : 1u);
     if (i >= 2) {
       EXPECT_EQ(pairer.dropped()[0].picture.handle, i - 2);
     }
   }
-  const auto pair = pairer.Add(kBottom, {0, 991 * kMs, 0});
+  const auto pair = pairer.Add(kBottomCamera, {0, 991 * kMs, 0});
   ASSERT_TRUE(pair);
-  EXPECT_EQ((*pair)[kTop].handle, 99);
+  EXPECT_EQ((*pair)[kTopCamera].handle, 99);
 }
 
 TEST(FramePairer, SequenceRisesAcrossTheDriversWrap) {
@@ -211,8 +212,8 @@ TEST(FramePairer, ADriverWithoutSequenceIsCountedByTime) {
   FramePairer pairer(kRateHz);
   std::vector<FramePair> pairs;
   for (const int frame : {0, 1, 2, 5, 6}) {
-    EXPECT_FALSE(pairer.Add(kTop, {0, frame * 10 * kMs, 0}));
-    pairs.push_back(pairer.Add(kBottom, {0, frame * 10 * kMs + kMs, 0}).value());
+    EXPECT_FALSE(pairer.Add(kTopCamera, {0, frame * 10 * kMs, 0}));
+    pairs.push_back(pairer.Add(kBottomCamera, {0, frame * 10 * kMs + kMs, 0}).value());
   }
   EXPECT_EQ(pairs[3].sequence - pairs[2].sequence, 3u);
   EXPECT_EQ(pairs[4].sequence - pairs[0].sequence, 6u);
@@ -222,11 +223,11 @@ TEST(FramePairer, ANewStartGoesOnWithAGapOfTheTimeBetween) {
   FramePairer pairer(kRateHz);
   auto pairs = Pairs(pairer, Simulate({}, {}, 10));
   const uint64_t before = pairs.back().sequence;
-  EXPECT_FALSE(pairer.Add(kTop, {10, 1100 * kMs, 0}));
+  EXPECT_FALSE(pairer.Add(kTopCamera, {10, 1100 * kMs, 0}));
   pairer.Restart();
   EXPECT_TRUE(pairer.dropped().empty());
-  EXPECT_FALSE(pairer.Add(kBottom, {0, 3090 * kMs, 0}));
-  const auto pair = pairer.Add(kTop, {0, 3090 * kMs, 0});
+  EXPECT_FALSE(pairer.Add(kBottomCamera, {0, 3090 * kMs, 0}));
+  const auto pair = pairer.Add(kTopCamera, {0, 3090 * kMs, 0});
   ASSERT_TRUE(pair);
   EXPECT_EQ(pair->sequence - before, 200u);
 }
@@ -234,11 +235,11 @@ TEST(FramePairer, ANewStartGoesOnWithAGapOfTheTimeBetween) {
 TEST(FramePairer, TimeThatGoesBackStartsAnew) {
   FramePairer pairer(kRateHz);
   const uint64_t before = Pairs(pairer, Simulate({}, {}, 10)).back().sequence;
-  EXPECT_FALSE(pairer.Add(kTop, {10, 1100 * kMs, 5}));
-  EXPECT_FALSE(pairer.Add(kTop, {11, 50 * kMs, 6}));
+  EXPECT_FALSE(pairer.Add(kTopCamera, {10, 1100 * kMs, 5}));
+  EXPECT_FALSE(pairer.Add(kTopCamera, {11, 50 * kMs, 6}));
   ASSERT_EQ(pairer.dropped().size(), 1u);
   EXPECT_EQ(pairer.dropped()[0].picture.handle, 5);
-  const auto pair = pairer.Add(kBottom, {11, 51 * kMs, 0});
+  const auto pair = pairer.Add(kBottomCamera, {11, 51 * kMs, 0});
   ASSERT_TRUE(pair);
   EXPECT_GT(pair->sequence, before);
 }
@@ -246,20 +247,20 @@ TEST(FramePairer, TimeThatGoesBackStartsAnew) {
 TEST(FramePairer, WithoutALostCameraEveryPictureIsAFrame) {
   FramePairer pairer(kRateHz);
   const uint64_t before = Pairs(pairer, Simulate({}, {}, 10)).back().sequence;
-  EXPECT_FALSE(pairer.Add(kBottom, {10, 1100 * kMs, 3}));
-  pairer.Lose(kBottom);
+  EXPECT_FALSE(pairer.Add(kBottomCamera, {10, 1100 * kMs, 3}));
+  pairer.Lose(kBottomCamera);
   ASSERT_EQ(pairer.dropped().size(), 1u);
   EXPECT_EQ(pairer.dropped()[0].picture.handle, 3);
   for (uint32_t i = 0; i < 5; ++i) {
-    const auto alone = pairer.Add(kTop, {10 + i, (1100 + 10 * i) * kMs, 0});
+    const auto alone = pairer.Add(kTopCamera, {10 + i, (1100 + 10 * i) * kMs, 0});
     ASSERT_TRUE(alone);
-    EXPECT_TRUE(alone->has(kTop));
-    EXPECT_FALSE(alone->has(kBottom));
+    EXPECT_TRUE(alone->has(kTopCamera));
+    EXPECT_FALSE(alone->has(kBottomCamera));
     EXPECT_EQ(alone->exposure_ns(), (1100 + 10 * i) * kMs);
     EXPECT_EQ(alone->sequence, before + 1 + i);
   }
-  EXPECT_FALSE(pairer.Add(kBottom, {0, 1150 * kMs, 0})) << "it is back, and waits for its partner";
-  const auto pair = pairer.Add(kTop, {15, 1150 * kMs, 0});
+  EXPECT_FALSE(pairer.Add(kBottomCamera, {0, 1150 * kMs, 0})) << "it is back, and waits for its partner";
+  const auto pair = pairer.Add(kTopCamera, {15, 1150 * kMs, 0});
   ASSERT_TRUE(pair);
   EXPECT_TRUE(pair->is_whole());
   EXPECT_EQ(pair->sequence, before + 6);
@@ -268,10 +269,10 @@ TEST(FramePairer, WithoutALostCameraEveryPictureIsAFrame) {
 TEST(FramePairer, TheBottomCameraAloneCountsToo) {
   FramePairer pairer(kRateHz);
   const uint64_t before = Pairs(pairer, Simulate({}, {.first_sequence = 500}, 10)).back().sequence;
-  pairer.Lose(kTop);
-  EXPECT_EQ(pairer.Add(kBottom, {510, 1100 * kMs, 0})->sequence, before + 1);
-  EXPECT_EQ(pairer.Add(kBottom, {513, 1130 * kMs, 0})->sequence, before + 4);
-  EXPECT_EQ(pairer.Add(kBottom, {0, 1200 * kMs, 0})->sequence, before + 11) << "counted by time";
+  pairer.Lose(kTopCamera);
+  EXPECT_EQ(pairer.Add(kBottomCamera, {510, 1100 * kMs, 0})->sequence, before + 1);
+  EXPECT_EQ(pairer.Add(kBottomCamera, {513, 1130 * kMs, 0})->sequence, before + 4);
+  EXPECT_EQ(pairer.Add(kBottomCamera, {0, 1200 * kMs, 0})->sequence, before + 11) << "counted by time";
 }
 
 }  // namespace

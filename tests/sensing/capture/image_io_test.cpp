@@ -14,8 +14,8 @@
 namespace taclink {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 /// Any of libpng's simple formats, `pixels` in that format.
 void WriteAnyPng(const std::string& path, png_uint_32 format, png_uint_32 width_px, png_uint_32 height_px,
@@ -37,7 +37,7 @@ std::string ReadError(const std::string& path, ErrorCode code = ErrorCode::kInva
   return picture.error().message;
 }
 
-class ImageIo : public testing::Test {
+class ImageIo : public ::testing::Test {
  protected:
   TemporaryFolder folder_;
   const std::string path_ = folder_ / "picture";  // what it is does not depend on the name
@@ -115,7 +115,7 @@ TEST_F(ImageIo, InfoFindsASizeBehindLongMetadata) {
 
 TEST_F(ImageIo, WhatIsNoPictureIsNamed) {
   EXPECT_THAT(ReadError(folder_ / "missing.png", ErrorCode::kNotFound), HasSubstr("No such file"));
-  EXPECT_THAT(ReadError(folder_.path(), ErrorCode::kNotFound), HasSubstr("directory"));
+  EXPECT_THAT(ReadError(folder_.path(), ErrorCode::kInvalidArgument), HasSubstr("is a folder"));
   WriteBytes(path_, {});
   EXPECT_THAT(ReadError(path_), HasSubstr("is empty"));
   WriteBytes(path_, {'G', 'I', 'F', '8', '9', 'a', 0, 0, 0, 0, 0, 0});

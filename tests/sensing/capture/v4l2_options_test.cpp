@@ -8,8 +8,8 @@
 namespace taclink {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 Error StartError(const V4l2Options& options) {
   const auto started = MakeV4l2Source(options, SystemClock())->Start();

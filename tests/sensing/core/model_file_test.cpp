@@ -8,7 +8,7 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::string Replaced(std::string text, const std::string& from, const std::string& to) {
   const auto at = text.find(from);
@@ -27,7 +27,7 @@ std::string Cylinder() {
 
 TEST(ModelFile, ShippedModelsLoad) {
   EXPECT_THAT(ShippedModelNames(),
-              testing::UnorderedElementsAre("cylinder", "barrel", "third", "triple", "cone", "bottle"));
+              ::testing::UnorderedElementsAre("cylinder", "barrel", "third", "triple", "cone", "bottle"));
   for (const std::string_view name : ShippedModelNames()) {
     const auto model = LoadLinkModel(std::string(name));
     EXPECT_TRUE(model.ok()) << model.error().message;

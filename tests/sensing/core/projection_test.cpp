@@ -7,7 +7,7 @@
 namespace taclink {
 namespace {
 
-class ProjectionTest : public testing::TestWithParam<std::string> {
+class ProjectionTest : public ::testing::TestWithParam<std::string> {
  protected:
   LinkModel model_ = LoadLinkModel(GetParam()).value();
 };
@@ -55,7 +55,7 @@ TEST_P(ProjectionTest, BothPicturesTurnAsSeenByTheCameras) {
   EXPECT_GT(bottom.Project({0, 30, z})->y(), c_bottom.y());
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, ProjectionTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, ProjectionTest, ::testing::Values("cylinder", "barrel"));
 
 TEST(Projection, BehindTheCameraIsRefused) {
   const Projector camera(LoadLinkModel("cylinder")->nominal_rig[CameraId::kTop]);

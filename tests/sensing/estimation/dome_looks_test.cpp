@@ -13,7 +13,7 @@ namespace {
 
 // A bulge that is a sine along the axis, whose tilt is known in closed form. The renderer's silhouettes are
 // the truth.
-class DomeLooksTest : public testing::TestWithParam<std::string> {
+class DomeLooksTest : public ::testing::TestWithParam<std::string> {
  protected:
   static constexpr double kBulgeMm = 12;
 
@@ -72,7 +72,7 @@ TEST_P(DomeLooksTest, FollowsTheTiltOfTheWall) {
   EXPECT_NEAR(WorstPx(looks_), at_rest, 1e-6) << "no memory";
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, DomeLooksTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, DomeLooksTest, ::testing::Values("cylinder", "barrel"));
 
 }  // namespace
 }  // namespace taclink

@@ -3,82 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <optional>
 #include <random>
 #include <thread>
 
 #include "sensing/contact/contact_finder.h"
-#include "sensing/mechanics/element_load.h"
-#include "sensing/mechanics/equilibrium.h"
 #include "sensing/model/model_file.h"
+#include "tests/sensing/estimation/pushed_skin.h"
+#include "tests/support/moved_cameras.h"
 
 namespace taclink {
 namespace {
-
-// A dead load on the outer wall's nodes around a place, or all around if no angle is given, on a finer mesh
-// than the estimator's.
-struct Pushed {
-  Eigen::VectorXd markers_mm;
-  bool ok = false;
-};
-Pushed Push(const LinkModel& model, double kpa, std::optional<double> angle, double z, double force_n,
-            double width_mm) {
-  const ShellMesh mesh = MakeShellMesh(model, 2);
-  const NonlinearShell shell(SkinSurface(mesh), model.material);
-  EquilibriumSolver solver(shell, {.tolerance_n = 1e-7});
-  ShellState state = shell.Rest();
-  Pushed pushed;
-  for (int step = 1; step <= 8; ++step) {
-    const FollowerPressure pressure(kpa * 1e-3 * step / 8);
-    const ElementLoad* loads[] = {&pressure};
-    if (!solver.Solve(loads, {}, state).ok()) return pushed;
-  }
-  const FollowerPressure pressure(kpa * 1e-3);
-  const ElementLoad* loads[] = {&pressure};
-  const Vec3 center = model.PointAtDepth(angle.value_or(0), z, model.thickness_mm / 2);
-  const Vec3 inward = -model.OutwardNormal(angle.value_or(0), z);
-  Eigen::VectorXd share = Eigen::VectorXd::Zero(mesh.node_count());
-  for (int node = mesh.columns; node < mesh.node_count() - mesh.columns; ++node) {
-    const auto i = static_cast<size_t>(node);
-    const double off2 = angle ? (mesh.mid_mm[i] - center).squaredNorm() : std::pow(mesh.mid_mm[i].z() - z, 2);
-    share[node] = mesh.areas_mm2[i] * std::exp(-off2 / (2 * width_mm * width_mm));
-  }
-  share /= share.sum();
-  for (int step = 1; step <= 8; ++step) {
-    Eigen::VectorXd dead = Eigen::VectorXd::Zero(shell.dof_count());
-    for (int node = 0; node < mesh.node_count(); ++node) {
-      if (const int dof = shell.Dof(node, 0); dof >= 0)
-        dead.segment<3>(dof) =
-            force_n * step / 8 * share[node] * (angle ? inward : -mesh.normals[static_cast<size_t>(node)]);
-    }
-    if (!solver.Solve(loads, dead, state).ok()) return pushed;
-  }
-  MarkerMap(model, mesh).Displacements(state, pushed.markers_mm);
-  pushed.ok = true;
-  return pushed;
-}
-
-SkinObservation Observe(const Eigen::VectorXd& markers_mm, double kpa, double sigma_mm) {
-  SkinObservation observation;
-  for (Eigen::Index m = 0; m < markers_mm.size() / 3; ++m) {
-    observation.markers.displacement_mm.push_back(markers_mm.segment<3>(3 * m));
-    observation.markers.information.push_back(Mat3::Identity() / (sigma_mm * sigma_mm));
-  }
-  observation.pressure = {kpa * 1e-3, 3e-5};
-  return observation;
-}
-
-class SkinEstimatorTest : public ::testing::Test {
- protected:
-  static LinkModel Rubber() {
-    LinkModel model = LoadLinkModel("cylinder").value();
-    model.material = {.youngs_modulus_mpa = 0.1, .poisson_ratio = 0.5, .law = MaterialLaw::kNeoHookean};
-    return model;
-  }
-  const LinkModel model_ = Rubber();
-  SkinEstimator estimator_{model_};
-  SkinEstimate estimate_;
-};
 
 TEST_F(SkinEstimatorTest, FindsAForceItsPlaceAndTheShape) {
   for (const double kpa : {0.0, 1.0}) {
@@ -134,6 +68,33 @@ TEST_F(SkinEstimatorTest, CamerasThatMovedAreNoForce) {
     }
     estimator_.Estimate(Observe(pushed.markers_mm, 1.0, 0.05), estimate_);
     EXPECT_LT(estimate_.loads.camera_shift_mm, 0.1);
+  }
+}
+
+// One of the two, sideways, along or turned: what lines of sight that are taken for the old camera's make of
+// it.
+TEST_F(SkinEstimatorTest, OneCameraThatMovedIsNoForce) {
+  for (const double force_n : {0.0, 0.4}) {
+    const Pushed pushed = Push(model_, 1.0, 1.3, 95, force_n, 4);
+    ASSERT_TRUE(pushed.ok);
+    for (const CameraId id : kBothCameras) {
+      for (const int parameter : {0, 3, 5}) {
+        CameraStep step = CameraStep::Zero();
+        step[parameter] = parameter < 3 ? RadFromDeg(0.15) : 0.3;
+        StereoRig moved = model_.nominal_rig;
+        moved[id] = Moved(moved[id], step);
+        estimator_.Estimate(Observe(SeenByMoved(model_, moved, pushed.markers_mm), 1.0, 0.05), estimate_);
+        ASSERT_EQ(estimate_.failure, EstimateFailure::kNone) << Name(id) << " " << parameter;
+        EXPECT_GT(estimate_.loads.camera_shift_mm, 0.2) << Name(id) << " " << parameter;
+        EXPECT_LT((estimate_.displacements_mm - pushed.markers_mm).norm() / std::sqrt(240), 0.08)
+            << Name(id) << " " << parameter;
+        ASSERT_EQ(estimate_.loads.loads.size(), force_n > 0 ? 1u : 0u) << Name(id) << " " << parameter;
+        if (force_n == 0) continue;
+        const Vec3 truth = -force_n * model_.OutwardNormal(1.3, 95);
+        EXPECT_LT((estimate_.loads.loads[0].force_n - truth).norm(), 0.1 * force_n)
+            << Name(id) << " " << parameter;
+      }
+    }
   }
 }
 

@@ -54,7 +54,7 @@ TEST(AccuracyScenes, BodiesStartWhereTheyTouchTheUndeformedSkin) {
 }
 
 // A truth of two contacts on opposite sides and what an estimator makes of it.
-class AccuracyScoreTest : public testing::Test {
+class AccuracyScoreTest : public ::testing::Test {
  protected:
   AccuracyScoreTest() {
     truth_.displacements_mm.assign(static_cast<size_t>(model_.markers.count()), Vec3::Zero());
@@ -173,7 +173,7 @@ TEST(AccuracyTruth, IsKeptAsItWas) {
 
 TEST(AccuracyTruth, TheFolderIsUsed) {
   const LinkModel model = Cylinder();
-  const auto folder = std::filesystem::path(testing::TempDir()) / "accuracy_truth_test";
+  const auto folder = std::filesystem::path(::testing::TempDir()) / "accuracy_truth_test";
   std::filesystem::remove_all(folder);
   const PressPath path = MakePressPath(model, PressKind::kRest, 0.0005);
   const auto first = CachedPath(model, path, 1, folder.string());
@@ -244,11 +244,11 @@ TEST(AccuracyReport, TellsWhoAnswered) {
   other.answered = {{"nonlinear", 2}, {"pressurised", 1}};
   const auto tables = AccuracyTables({outcome, other}, 0.05);
   const std::string first = Markdown(tables.front()), costs = Markdown(tables.at(1));
-  EXPECT_THAT(first, testing::HasSubstr("| linear | can | 2 | 0.250 | 25.0 | 25.0 | 50.0 |"));
-  EXPECT_THAT(costs, testing::HasSubstr("nonlinear 2, pressurised 1 |"));
+  EXPECT_THAT(first, ::testing::HasSubstr("| linear | can | 2 | 0.250 | 25.0 | 25.0 | 50.0 |"));
+  EXPECT_THAT(costs, ::testing::HasSubstr("nonlinear 2, pressurised 1 |"));
   const std::string svg = AccuracyPlot({outcome, other}, 0.05);
-  EXPECT_THAT(svg, testing::HasSubstr(">linear 2<"));
-  EXPECT_THAT(svg, testing::HasSubstr(">nonlinear 2<"));
+  EXPECT_THAT(svg, ::testing::HasSubstr(">linear 2<"));
+  EXPECT_THAT(svg, ::testing::HasSubstr(">nonlinear 2<"));
 }
 
 TEST(AccuracyReport, FailedScenesAreListed) {

@@ -6,7 +6,7 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::vector<SceneOutcome> TwoScenes() {
   std::vector<SceneOutcome> outcomes;
@@ -48,11 +48,11 @@ TEST(VisionReport, TablesHoldTheNumbersAsTextAndMarkdown) {
 
 TEST(VisionReport, PlotNamesAxesAndMethods) {
   const std::string svg = ErrorTimePlot(TwoScenes(), kMethods);
-  EXPECT_THAT(svg, testing::StartsWith("<svg"));
+  EXPECT_THAT(svg, ::testing::StartsWith("<svg"));
   EXPECT_THAT(svg, HasSubstr("ours, can"));
   EXPECT_THAT(svg, HasSubstr("ms<"));
   EXPECT_THAT(svg, HasSubstr("mm<"));
-  EXPECT_THAT(svg, testing::EndsWith("</svg>\n"));
+  EXPECT_THAT(svg, ::testing::EndsWith("</svg>\n"));
   EXPECT_THAT(ErrorTimePlot({}, kMethods), HasSubstr("nothing was measured"));
 }
 

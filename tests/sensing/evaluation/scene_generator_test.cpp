@@ -12,7 +12,7 @@
 namespace taclink {
 namespace {
 
-class SceneGeneratorTest : public testing::Test {
+class SceneGeneratorTest : public ::testing::Test {
  protected:
   std::vector<LinkModel> models_ = {LoadLinkModel("cylinder").value(), LoadLinkModel("barrel").value()};
 };

@@ -11,7 +11,7 @@
 namespace taclink {
 namespace {
 
-LinkModel Cylinder() {
+LinkModel ShippedCylinder() {
   return LoadLinkModel("cylinder").value();
 }
 
@@ -22,7 +22,7 @@ TEST(Simpson, IsExactForCubics) {
 }
 
 TEST(StabilityMeasure, KnowsAGoodTangentAndABadOne) {
-  const LinkModel model = Cylinder();
+  const LinkModel model = ShippedCylinder();
   const NonlinearShell shell(SkinSurface(MakeShellMesh(model, 1)), model.material);
   const TangentNumbers numbers = MeasureTangent(shell, {}, shell.Rest());
   ASSERT_TRUE(numbers.definite);
@@ -39,7 +39,7 @@ TEST(StabilityMeasure, KnowsAGoodTangentAndABadOne) {
 }
 
 TEST(StabilityCases, KeepTheMidSurfaceAndTheStrain) {
-  const LinkModel base = Cylinder();
+  const LinkModel base = ShippedCylinder();
   const LinkModel thin = VariedModel(base, 10, 0.01, 0.3, MaterialLaw::kSaintVenantKirchhoff);
   EXPECT_NEAR(thin.PointAtDepth(0, 100, thin.thickness_mm / 2).x(), 38.25, 1e-9);
   EXPECT_NEAR(thin.thickness_mm, 0.3825, 1e-12);
@@ -52,7 +52,7 @@ TEST(StabilityCases, KeepTheMidSurfaceAndTheStrain) {
 }
 
 TEST(StabilityCases, AStiffSkinEndsRightAndAnImpossibleLoadIsRefused) {
-  const LinkModel base = Cylinder();
+  const LinkModel base = ShippedCylinder();
   SkinCase stiff{.name = "stiff",
                  .model = VariedModel(base, 1e3, 0.0915, 0.49, MaterialLaw::kSaintVenantKirchhoff),
                  .pressure_mpa = 0,

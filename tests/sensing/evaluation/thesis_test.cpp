@@ -10,7 +10,7 @@
 namespace taclink {
 namespace {
 
-class ThesisTest : public testing::TestWithParam<std::string> {
+class ThesisTest : public ::testing::TestWithParam<std::string> {
  protected:
   const LinkModel model_ = LoadLinkModel(GetParam()).value();
 };
@@ -101,7 +101,7 @@ TEST_P(ThesisTest, WorksOnIdealPictures) {
               score.position[2].Worst(ErrorAxis::k3d));
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, ThesisTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, ThesisTest, ::testing::Values("cylinder", "barrel"));
 
 }  // namespace
 }  // namespace taclink

@@ -14,7 +14,7 @@ const VisionMethodKind kTracked = {
     "tracked", "", [](const LinkModel& model) { return MakePipelineMethod(model, PipelineVariant::kWhole); }};
 const VisionMethodKind kThesis = {"thesis", "", MakeThesisMethod};
 
-class VisionBenchTest : public testing::Test {
+class VisionBenchTest : public ::testing::Test {
  protected:
   std::vector<SceneOutcome> Run(const std::vector<std::string>& names,
                                 const std::vector<VisionMethodKind>& methods, int jobs) {

@@ -11,7 +11,7 @@ namespace taclink {
 namespace {
 
 // A truth without pictures: markers far apart in both pictures, all seen.
-class VisionScoreTest : public testing::Test {
+class VisionScoreTest : public ::testing::Test {
  protected:
   VisionScoreTest() {
     truth_.positions_mm = model_.RestMarkers();

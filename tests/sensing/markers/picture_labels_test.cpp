@@ -69,7 +69,7 @@ Verdict Judge(const std::vector<TrueMarker>& truth, const PictureLabels& labels,
   return verdict;
 }
 
-class RealPictureLabels : public testing::Test {
+class RealPictureLabels : public ::testing::Test {
  protected:
   Result<PictureLabels> Label(const cv::Mat& gray) {
     Detections found;

@@ -35,7 +35,7 @@ SkinTruth RestTruth(const LinkModel& model) {
   return truth;
 }
 
-class RestLabelsTest : public testing::TestWithParam<std::string> {
+class RestLabelsTest : public ::testing::TestWithParam<std::string> {
  protected:
   LinkModel model_ = LoadLinkModel(GetParam()).value();
 };
@@ -121,7 +121,7 @@ TEST_P(RestLabelsTest, WrongModelsAreRefused) {
   refused(wrong, "spots found");
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, RestLabelsTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, RestLabelsTest, ::testing::Values("cylinder", "barrel"));
 
 // From the narrow end of a cone its far rings are 3 px apart and run into one another: they cost nothing but
 // their own markers.

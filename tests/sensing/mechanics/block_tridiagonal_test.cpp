@@ -35,7 +35,7 @@ struct Shape {
   Eigen::Index blocks;
   double shift;
 };
-class BlockTridiagonalTest : public testing::TestWithParam<Shape> {
+class BlockTridiagonalTest : public ::testing::TestWithParam<Shape> {
  protected:
   const Eigen::Index blocks_ = GetParam().blocks, size_ = kBlock * blocks_;
   const Eigen::MatrixXd matrix_ = Tridiagonal(blocks_, GetParam().shift);
@@ -74,8 +74,8 @@ TEST_P(BlockTridiagonalTest, RowsAreSolvedTogether) {
 }
 
 INSTANTIATE_TEST_SUITE_P(DefiniteOrNot, BlockTridiagonalTest,
-                         testing::Values(Shape{1, 20}, Shape{1, 0.3}, Shape{2, 20}, Shape{2, 0.3},
-                                         Shape{4, 20}, Shape{4, 0.3}, Shape{5, 20}, Shape{5, 0.3}));
+                         ::testing::Values(Shape{1, 20}, Shape{1, 0.3}, Shape{2, 20}, Shape{2, 0.3},
+                                           Shape{4, 20}, Shape{4, 0.3}, Shape{5, 20}, Shape{5, 0.3}));
 
 // In a block at an end, between, and in the middle.
 TEST(BlockTridiagonalTest, WhatHasNoSolutionIsSaid) {

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Eigen::Index kRows = 60;
 
-class Dense : public testing::Test {
+class Dense : public ::testing::Test {
  protected:
   static Eigen::MatrixXd PositiveDefinite() {
     const Eigen::MatrixXd a = Eigen::MatrixXd::Random(kRows, 2 * kRows);

@@ -31,7 +31,7 @@ double Displacement(const NonlinearShell& shell, const NodalLoads& loads, int no
 }
 
 // The five distorted quadrilaterals of MacNeal and Harder (1985).
-class Patch : public testing::Test {
+class Patch : public ::testing::Test {
  protected:
   static constexpr double kA = 0.24, kB = 0.12, kThickness = 0.01;
   static ShellSurface Surface() {

@@ -27,7 +27,7 @@ LinkModel Cylinder() {
   return model;
 }
 
-class CylinderShell : public testing::Test {
+class CylinderShell : public ::testing::Test {
  protected:
   const LinkModel model_ = Cylinder();
   const LinearShell shell_{model_, 1};

@@ -11,7 +11,7 @@
 namespace taclink {
 namespace {
 
-class MarkerMapTest : public testing::Test {
+class MarkerMapTest : public ::testing::Test {
  protected:
   // Every free degree of freedom drawn at random; rotations as if the wall's surfaces moved as far.
   ShellState Disturbed(double size_mm) const {

@@ -18,7 +18,7 @@ constexpr Material kMaterial{
 constexpr double kThickness = 2;
 
 // A flat quarter of a sheet, 40 x 30, its inner nodes moved about at random but the same in every run.
-class NeoHookeanSheet : public testing::Test {
+class NeoHookeanSheet : public ::testing::Test {
  protected:
   static constexpr double kLength = 40, kWidth = 30;
   static constexpr int kColumns = 5, kRows = 4;

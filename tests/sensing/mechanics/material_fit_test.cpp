@@ -14,11 +14,11 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr auto kSvk = MaterialLaw::kSaintVenantKirchhoff, kRubber = MaterialLaw::kNeoHookean;
 
-class MaterialFitTest : public testing::Test {
+class MaterialFitTest : public ::testing::Test {
  protected:
   // An SVK skin that is three times as stiff as the model says.
   static constexpr double kModulus = 0.3;
@@ -134,7 +134,7 @@ TEST_F(MaterialFitTest, TouchWhileInflatingIsRefusedAndNamed) {
     }
   }
   EXPECT_THAT(Refusal(records),
-              testing::AllOf(HasSubstr("touched near path 7, ring 4"), HasSubstr("6 markers")));
+              ::testing::AllOf(HasSubstr("touched near path 7, ring 4"), HasSubstr("6 markers")));
 }
 
 TEST_F(MaterialFitTest, WhatIsNoInflationIsRefused) {
@@ -161,7 +161,8 @@ TEST_F(MaterialFitTest, WhatTellsNothingIsRefused) {
     for (size_t m = 0; m < records[r].markers.size(); ++m)
       records[r].markers[m].displacement_mm -= 0.999 * Inflated()[r][m];
   }
-  EXPECT_THAT(Refusal(records), testing::AnyOf(HasSubstr("tell nothing"), HasSubstr("don't move outwards")));
+  EXPECT_THAT(Refusal(records),
+              ::testing::AnyOf(HasSubstr("tell nothing"), HasSubstr("don't move outwards")));
 }
 
 TEST_F(MaterialFitTest, ModulusOutsideTheRangeIsRefused) {

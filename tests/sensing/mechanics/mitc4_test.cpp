@@ -57,7 +57,7 @@ TEST(Mitc4, HasSixZeroEnergyModesAndNoMore) {
 
 // Five distorted quadrilaterals that fill a rectangle (MacNeal and Harder 1985): with the exact linear field
 // on the outer nodes, the inner nodes must be in equilibrium at the exact linear field.
-class PatchTest : public testing::Test {
+class PatchTest : public ::testing::Test {
  protected:
   static constexpr double kA = 0.24, kB = 0.12, kPatchThickness = 0.01;
   const std::array<Vec3, 8> points_ = {Vec3(0, 0, 0),       Vec3(kA, 0, 0),      Vec3(kA, kB, 0),

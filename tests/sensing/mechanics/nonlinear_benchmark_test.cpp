@@ -11,8 +11,8 @@
 namespace taclink::benchmark {
 namespace {
 
-constexpr double kShare = 0.02;  // of the published value
-constexpr double kPointShare =
+constexpr double kNonlinearShare = 0.02;  // of the published value
+constexpr double kNonlinearPointShare =
     0.03;  // likewise under a point load on a thin shell (linear_benchmark_test.cpp)
 
 // Published displacements by the share of the whole load, percent.
@@ -25,7 +25,7 @@ double Moved(const NonlinearShell& shell, const ShellState& state, int node, int
 
 // Where something is published for this share; only at the last mesh it is expected.
 void RecordAt(bool last, const Published& published, double share, const std::string& name,
-              const std::string& mesh, double computed, double allowed = kShare) {
+              const std::string& mesh, double computed, double allowed = kNonlinearShare) {
   const int percent = static_cast<int>(std::lround(100 * share));
   if (std::abs(percent - 100 * share) > 1e-9 || !published.contains(percent)) return;
   const std::string part = name + ", " + std::to_string(percent) + " %";
@@ -95,8 +95,8 @@ EndMoment RollUp(int elements) {
 
 TEST(NonlinearBenchmark, CantileverUnderEndMoment) {
   const EndMoment coarse = RollUp(16), fine = RollUp(32);
-  EXPECT_LT(fine.drawn_worst, kShare);
-  EXPECT_LT(fine.lifted_worst, kShare);
+  EXPECT_LT(fine.drawn_worst, kNonlinearShare);
+  EXPECT_LT(fine.lifted_worst, kNonlinearShare);
   // Second order in the elements' size.
   EXPECT_NEAR(coarse.lifted_worst / fine.lifted_worst, 4, 0.5);
 }
@@ -200,7 +200,7 @@ TEST(NonlinearBenchmark, PinchedCylinder) {
   FollowLoad(shell, loads.values(), path, [&](double share, const ShellState& state) {
     const std::string size = MeshName(kSide, kSide);
     RecordAt(true, w_a, share, "pinched cylinder, diaphragms: -W_A", size, -Moved(shell, state, a, 0),
-             kPointShare);
+             kNonlinearPointShare);
     RecordAt(false, u_b, share, "pinched cylinder, diaphragms: U_B", size, Moved(shell, state, b, 1));
   });
 }
@@ -253,7 +253,7 @@ TEST(NonlinearBenchmark, HingedRoof) {
                        char name[64];
                        std::snprintf(name, sizeof name, "hinged roof: P at -W = %.3f", -value);
                        Compare(name, MeshName(kSide, kSide), 3000 * published[next++].second, -4 * force,
-                               kShare);
+                               kNonlinearShare);
                      });
   EXPECT_EQ(next, published.size());
 }

@@ -10,12 +10,12 @@
 namespace taclink {
 namespace {
 
-constexpr double kThickness = 3.5;
+constexpr double kShellThickness = 3.5;
 
 // Four warped elements of a barrel-like surface; no support.
 ShellSurface SmallSurface() {
   ShellSurface surface;
-  surface.thickness_mm = kThickness;
+  surface.thickness_mm = kShellThickness;
   for (int j = 0; j < 3; ++j) {
     for (int i = 0; i < 3; ++i) {
       const double angle = 0.2 * i + 0.03 * j, z = 10.0 * j + 1.5 * i;
@@ -41,7 +41,7 @@ ShellState Disturbed(const NonlinearShell& shell, double size_mm, unsigned seed)
   for (int node = 0; node < shell.node_count(); ++node) {
     for (int c = 0; c < 5; ++c) {
       if (shell.Dof(node, c) >= 0)
-        step[shell.Dof(node, c)] = size_mm * normal(random) / (c < 3 ? 1 : kThickness);
+        step[shell.Dof(node, c)] = size_mm * normal(random) / (c < 3 ? 1 : kShellThickness);
     }
   }
   ShellState state = shell.Rest();
@@ -54,7 +54,7 @@ Material MaterialOf(MaterialLaw law) {
       .youngs_modulus_mpa = 0.1, .poisson_ratio = law == MaterialLaw::kNeoHookean ? 0.5 : 0.4, .law = law};
 }
 
-class Derivatives : public testing::TestWithParam<MaterialLaw> {
+class Derivatives : public ::testing::TestWithParam<MaterialLaw> {
  protected:
   // Gradient against the energy, Hessian against the gradient, along every degree of freedom.
   static void Check(const NonlinearShell& shell, NonlinearShell::Loads loads, const ShellState& state) {
@@ -115,7 +115,7 @@ TEST_P(Derivatives, RigidMotionStoresNothing) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, Derivatives,
-                         testing::Values(MaterialLaw::kSaintVenantKirchhoff, MaterialLaw::kNeoHookean),
+                         ::testing::Values(MaterialLaw::kSaintVenantKirchhoff, MaterialLaw::kNeoHookean),
                          [](const auto& law) {
                            return law.param == MaterialLaw::kNeoHookean ? "NeoHookean"
                                                                         : "SaintVenantKirchhoff";

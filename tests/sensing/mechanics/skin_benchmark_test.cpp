@@ -18,7 +18,7 @@ struct Case {
   MaterialLaw law;
 };
 
-class Skin : public testing::TestWithParam<Case> {
+class Skin : public ::testing::TestWithParam<Case> {
  protected:
   static LinkModel Model() {
     LinkModel model = LoadLinkModel(GetParam().model).value();
@@ -206,9 +206,9 @@ TEST(SkinContact, LargeStepsEndWhereSmallOnesDo) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Benchmark, Skin,
-                         testing::Values(Case{"cylinder", MaterialLaw::kSaintVenantKirchhoff},
-                                         Case{"cylinder", MaterialLaw::kNeoHookean},
-                                         Case{"barrel", MaterialLaw::kNeoHookean}),
+                         ::testing::Values(Case{"cylinder", MaterialLaw::kSaintVenantKirchhoff},
+                                           Case{"cylinder", MaterialLaw::kNeoHookean},
+                                           Case{"barrel", MaterialLaw::kNeoHookean}),
                          [](const auto& skin) {
                            return std::string(skin.param.model) + (skin.param.law == MaterialLaw::kNeoHookean
                                                                        ? "NeoHookean"

@@ -9,7 +9,7 @@
 namespace taclink {
 namespace {
 
-class SkinPushTest : public testing::Test {
+class SkinPushTest : public ::testing::Test {
  protected:
   double ForceN(double pressure_kpa, double depth_mm, int refinement = 1) const {
     const auto result = PushSkin(model_, {.marker = model_.MarkerIndex(6, 4),
@@ -63,9 +63,9 @@ TEST_F(SkinPushTest, ASkinThatBucklesUnderSuctionSaysSo) {
   ASSERT_TRUE(buckled.ok() && grown.ok());
   EXPECT_GE(buckled.snaps, 1);
   EXPECT_GT(buckled.snapped_mm, 5);
-  EXPECT_THAT(buckled.Text(), testing::HasSubstr("snapped"));
+  EXPECT_THAT(buckled.Text(), ::testing::HasSubstr("snapped"));
   EXPECT_EQ(grown.snaps, 0);
-  EXPECT_THAT(grown.Text(), testing::Not(testing::HasSubstr("snapped")));
+  EXPECT_THAT(grown.Text(), ::testing::Not(::testing::HasSubstr("snapped")));
 }
 
 TEST_F(SkinPushTest, DiscThatDoesNotTouchFeelsNothing) {
@@ -78,9 +78,9 @@ TEST_F(SkinPushTest, RefusesWhatCannotBe) {
     const auto result = PushSkin(model_, push);
     return result.ok() ? std::string("accepted") : result.error().message;
   };
-  EXPECT_THAT(message({.marker = 240, .depth_mm = 1}), testing::HasSubstr("24 paths and 10 rings"));
-  EXPECT_THAT(message({.marker = 0, .depth_mm = 22}), testing::HasSubstr("at most 21.5 mm"));
-  EXPECT_THAT(message({.marker = 0, .depth_mm = std::nan("")}), testing::HasSubstr("finite"));
+  EXPECT_THAT(message({.marker = 240, .depth_mm = 1}), ::testing::HasSubstr("24 paths and 10 rings"));
+  EXPECT_THAT(message({.marker = 0, .depth_mm = 22}), ::testing::HasSubstr("at most 21.5 mm"));
+  EXPECT_THAT(message({.marker = 0, .depth_mm = std::nan("")}), ::testing::HasSubstr("finite"));
 }
 
 }  // namespace

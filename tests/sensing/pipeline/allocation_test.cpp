@@ -14,7 +14,7 @@ long CountOf(LinkPipeline& pipeline, const StereoFrame& frame, LinkState& state)
   return allocations - before;
 }
 
-class AllocationTest : public testing::TestWithParam<std::string> {};
+class AllocationTest : public ::testing::TestWithParam<std::string> {};
 
 // While nothing touches. Solving loads still allocates: its bound is here so that it can't grow unseen.
 TEST_P(AllocationTest, TrackedFramesAllocateNothingAtRest) {
@@ -52,7 +52,7 @@ TEST_P(AllocationTest, TrackedFramesAllocateNothingAtRest) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, AllocationTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, AllocationTest, ::testing::Values("cylinder", "barrel"));
 
 }  // namespace
 }  // namespace taclink

@@ -13,7 +13,7 @@ namespace {
 constexpr double kFrameS = 1 / 30.0;
 constexpr int kMarkers = 6;
 
-class DriftFollowerTest : public testing::Test {
+class DriftFollowerTest : public ::testing::Test {
  protected:
   // One frame; `off(t)` is what marker 2 is off, mm.
   void Frame(std::optional<double> load_n, double off_mm) {

@@ -31,52 +31,129 @@ class JudgeTest : public ::testing::Test {
   }
   std::vector<ReasonId> Reasons() {
     Judge({.model = model_,
-           .camera_trouble = "",
-           .drift_advice = "",
+           .camera_trouble = camera_trouble_,
+           .agreement = agreement_,
+           .motion = motion_,
+           .sees_alone = sees_alone_,
+           .drift = {},
+           .is_baseline_forced = is_baseline_forced_,
            .told = told_,
+           .is_told = is_told_,
            .baseline = baseline_,
            .estimate = estimate_},
           state_);
     std::vector<ReasonId> ids;
-    for (const Reason& reason : state_.reasons) ids.push_back(reason.id);
+    for (const Reason& reason : state_.reasons) {
+      ids.push_back(reason.id);
+      const size_t what_to_do = reason.text.find("; ");
+      EXPECT_NE(what_to_do, std::string::npos) << "does not say what to do: " << reason.text;
+    }
     return ids;
   }
 
   const LinkModel model_ = LoadLinkModel("cylinder").value();
   LinkState state_;
   SkinEstimate estimate_;
+  std::optional<Reason> camera_trouble_;
+  CameraAgreement agreement_;
+  std::optional<MotionDisagreement> motion_;
+  std::optional<CameraId> sees_alone_;
+  bool is_told_ = true, is_baseline_forced_ = false;
   PressureReading told_{.mpa = 1e-3, .sigma_mpa = 5e-5}, baseline_{.mpa = 5e-4, .sigma_mpa = 5e-5};
 };
 
 TEST_F(JudgeTest, WhatIsWellIsOk) {
   Touch(20, 90);
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   EXPECT_EQ(state_.status, LinkStatus::kOk);
+}
+
+TEST_F(JudgeTest, AForcedBaselineIsNamedWhereItMayExplainWhatIsWrong) {
+  is_baseline_forced_ = true;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  is_told_ = false;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureUnknown)) << "does not come of it";
+  estimate_.failure = EstimateFailure::kNotConverged;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kNotConverged, ReasonId::kPressureUnknown,
+                                                ReasonId::kForcedBaseline));
+}
+
+TEST_F(JudgeTest, CamerasThatDisagreeAreTold) {
+  agreement_ = {.pairs = 200, .apart = 7};
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty()) << "wrong labels";
+  agreement_ = {.pairs = 200, .apart = 9};
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kCamerasDisagree));
+  EXPECT_EQ(state_.reasons[0].value, 9);
+  EXPECT_EQ(state_.reasons[0].limit, 8);
+  agreement_ = {.pairs = 20, .apart = 3};
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  motion_ = MotionDisagreement{CameraId::kBottom};
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kCamerasDisagree));
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("bottom"));
+  motion_.reset();
+  sees_alone_ = CameraId::kTop;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kCamerasDisagree));
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("the top camera shows the skin pressed"));
+  motion_ = MotionDisagreement{CameraId::kTop, 0.23};
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kLate));
+  EXPECT_EQ(state_.reasons[0].value, 0.23);
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("top camera shows the skin's motion 0.23 s later"));
+}
+
+TEST_F(JudgeTest, PicturesOfTwoSkinsMeasureNothing) {
+  agreement_ = {.pairs = 200, .apart = 21};
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kCamerasDisagree));
+  EXPECT_EQ(state_.status, LinkStatus::kLost);
+  EXPECT_EQ(state_.reasons[0].limit, 20) << "from which nothing is measured";
+  EXPECT_FALSE(state_.measured());
+}
+
+TEST_F(JudgeTest, ALagIsToldBesidePicturesOfTwoSkins) {
+  agreement_ = {.pairs = 200, .apart = 21};
+  motion_ = MotionDisagreement{CameraId::kTop, 0.5};
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kCamerasDisagree, ReasonId::kLate));
+}
+
+TEST_F(JudgeTest, APressureThatNobodyTellsIsTold) {
+  is_told_ = false;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureUnknown));
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("pressure_kpa"));
+}
+
+TEST_F(JudgeTest, AHugIsToldWhereItIsHardlySeen) {
+  Touch(0, 95);
+  state_.contacts[0].is_hug = true;
+  state_.contacts[0].normal_force_n = 1;
+  state_.forces.limit_around_n = 0.24;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  state_.forces.limit_around_n = 0.26;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kEncircled));
 }
 
 TEST_F(JudgeTest, BodiesAllAroundAreTold) {
   for (int body = 0; body < 6; ++body) Touch(60 * body - 170, body % 2 == 0 ? 85 : 105);
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kEncircled));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kEncircled));
   EXPECT_EQ(state_.status, LinkStatus::kDegraded);
   // A gap.
   state_.contacts.pop_back();
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
 }
 
 TEST_F(JudgeTest, BodiesAlongTheLinkAreNotAround) {
   for (int body = 0; body < 6; ++body) Touch(60 * body, 30 * (body + 1) - 5);
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
 }
 
 // What is known of its center does not tell on which side of the first ring it is.
 TEST_F(JudgeTest, AContactThatMayBeBesideTheMarkersIsTold) {
   const double first_mm = model_.markers.rings_z_mm.front();
   Touch(20, first_mm + 4);
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   state_.contacts[0].center_covariance_mm2 = Mat3(2.5 * 2.5 * Mat3::Identity());
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kBeyondMarkers));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kBeyondMarkers));
   state_.contacts[0].center_mm.z() = first_mm + 6;
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
 }
 
 // The last ring is not seen around it: what is told of it is told by the one before.
@@ -84,78 +161,86 @@ TEST_F(JudgeTest, AContactBesideMarkersThatAreLostIsTold) {
   const auto& rings_mm = model_.markers.rings_z_mm;
   const auto last = static_cast<size_t>(model_.markers.rings() - 1);
   Touch(0, rings_mm[last - 1] + 5);
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   const auto at = static_cast<int>(
       std::lround((0 - model_.markers.first_path_angle_rad) / model_.markers.path_pitch_rad()));
   for (int path = at - 1; path <= at + 1; ++path) Lose(path, static_cast<int>(last));
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kBeyondMarkers));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kBeyondMarkers));
 }
 
 // A body may press where nothing is seen, without any contact told.
 TEST_F(JudgeTest, SkinOutOfSightIsTold) {
   const int rings = model_.markers.rings(), paths = model_.markers.paths;
   for (int path = 0; path < paths; ++path) Lose(path, rings - 1);
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   for (int path = 0; path < paths; ++path) Lose(path, rings - 2);
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kSparseMarkers));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kSparseMarkers));
   state_.shape.sources.assign(static_cast<size_t>(model_.markers.count()), MarkerSource::kBoth);
   // What a body hides, which its surroundings tell.
   for (int path = 3; path < 6; ++path) {
     for (int ring = 4; ring < 7; ++ring) Lose(path, ring);
   }
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   for (int path = 0; path < 10; ++path) {
     for (int ring = 4; ring < 7; ++ring) Lose(path, ring);
   }
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kSparseMarkers));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kSparseMarkers));
 }
 
 TEST_F(JudgeTest, APressureThatDoesNotFitIsTold) {
   state_.pressure_estimate = {.mpa = 1.14e-3, .sigma_mpa = 1e-6};
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   state_.pressure_estimate->mpa = 1.16e-3;
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kPressureMismatch));
-  EXPECT_THAT(state_.status_reason, testing::HasSubstr("1.160 kPa, the sensor 1.000 kPa"));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureMismatch));
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("1.160 kPa, the sensor 1.000 kPa"));
 }
 
 TEST_F(JudgeTest, ABaselinesPressureThatDoesNotFitIsTold) {
   state_.pressure_estimate = {.mpa = 1e-3, .sigma_mpa = 1e-6};
   estimate_.loads.baseline_error_mpa = -1.4e-4;
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   estimate_.loads.baseline_error_mpa = -1.6e-4;
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kPressureMismatch));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureMismatch));
   EXPECT_THAT(state_.status_reason,
-              testing::HasSubstr("0.340 kPa when the baseline was taken; told were 1.000 and 0.500 kPa"));
+              ::testing::HasSubstr("0.340 kPa when the baseline was taken; told were 1.000 and 0.500 kPa"));
 }
 
 TEST_F(JudgeTest, MarkersThatContradictAreTold) {
   state_.forces.region_residual = 5.1;
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kResidual));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kResidual));
   state_.forces.region_residual = 1;
   state_.forces.residual = 1.3;
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kResidual));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kResidual));
 }
 
 TEST_F(JudgeTest, CamerasThatMovedAreTold) {
-  estimate_.loads.camera_shift_mm = 0.29;
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
-  estimate_.loads.camera_shift_mm = 0.31;
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kCamerasMoved));
-  EXPECT_THAT(state_.status_reason, testing::HasSubstr("0.31 mm"));
+  estimate_.loads.camera_shift_mm = 0.49;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  estimate_.loads.camera_shift_mm = 0.51;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kCamerasMoved));
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("0.51 mm"));
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+}
+
+TEST_F(JudgeTest, ATangentThatIsFarFromTheSkinIsTold) {
+  estimate_.first_order_mm = 0.59;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  estimate_.first_order_mm = 0.61;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kForceModel));
   EXPECT_EQ(state_.status, LinkStatus::kDegraded);
 }
 
 TEST_F(JudgeTest, ASkinThatBucklesUnseenIsTold) {
   estimate_.unsettled_mm = 1.2;
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kUnsettled));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kUnsettled));
 }
 
 // Far from each other, so that no neighbors are left out together.
 TEST_F(JudgeTest, ManyMarkersThatWereLeftOutAreTold) {
   for (int k = 0; k < 20; ++k) state_.shape.rejected.push_back({CameraId::kTop, 11 * k});
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kLabels));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kLabels));
   state_.shape.rejected.resize(19);
-  EXPECT_THAT(Reasons(), testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
 }
 
 TEST_F(JudgeTest, WhatHasNoAnswerHasNoForces) {
@@ -164,15 +249,15 @@ TEST_F(JudgeTest, WhatHasNoAnswerHasNoForces) {
   Touch(20, 90);
   state_.forces.forces_n.assign(state_.shape.sources.size(), Vec3(0, 0, 1));
   state_.forces.loaded = {20};
-  EXPECT_THAT(Reasons(), testing::ElementsAre(ReasonId::kNotConverged));
-  EXPECT_THAT(state_.contacts, testing::IsEmpty());
-  EXPECT_THAT(state_.forces.forces_n, testing::Each(Vec3(0, 0, 0)));
-  EXPECT_THAT(state_.forces.loaded, testing::IsEmpty());
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kNotConverged));
+  EXPECT_THAT(state_.contacts, ::testing::IsEmpty());
+  EXPECT_THAT(state_.forces.forces_n, ::testing::Each(Vec3(0, 0, 0)));
+  EXPECT_THAT(state_.forces.loaded, ::testing::IsEmpty());
 }
 
 TEST_F(JudgeTest, FewMarkersAreALostLink) {
   for (size_t m = 0; m < 150; ++m) state_.shape.sources[m] = MarkerSource::kInferred;
-  EXPECT_THAT(Reasons(), testing::Contains(ReasonId::kFewMarkers));
+  EXPECT_THAT(Reasons(), ::testing::Contains(ReasonId::kFewMarkers));
   EXPECT_EQ(state_.status, LinkStatus::kLost);
 }
 

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <opencv2/core.hpp>
+#include <utility>
 
+#include "sensing/core/similar_skin.h"
 #include "sensing/model/model_file.h"
 #include "sensing/simulation/renderer.h"
 #include "sensing/simulation/simulated_skin.h"
@@ -14,22 +16,26 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 constexpr double kTouchedS = 3;  // in the scene `press`
 
-class LinkPipelineTest : public testing::Test {
+class LinkPipelineTest : public ::testing::Test {
  protected:
-  LinkPipelineTest() { options_.rest_frames = 4; }
+  LinkPipelineTest() {
+    options_.pressure_mpa = 0;
+    options_.rest_frames = 4;
+  }
 
   StereoFrame Frame(double time_s) {
     StereoFrame frame;
     skin_->Evaluate(time_s, truth_);
+    const uint64_t frame_of_scene = std::exchange(truth_.frame, frames_made_++);  // a noise of its own
     for (const CameraId id : kBothCameras) {
       renderer_.Render(truth_, id, gray_);
       PackYuyv(gray_, renderer_.chroma(id), frame.images[Index(id)]);
     }
-    frame.sequence = truth_.frame;
+    frame.sequence = frame_of_scene;
     return frame;
   }
 
@@ -43,6 +49,7 @@ class LinkPipelineTest : public testing::Test {
   std::unique_ptr<SimulatedSkin> skin_ = SimulatedSkin::Make(model_, scene_).value();
   Renderer renderer_{model_, model_.nominal_rig, scene_.camera, 1};
   SkinTruth truth_;
+  uint64_t frames_made_ = 0;
   cv::Mat gray_;
   PipelineOptions options_;
   LinkState state_;
@@ -81,7 +88,7 @@ TEST_F(LinkPipelineTest, AStalePressureIsStated) {
   const double fresh_n = state_.contacts[0].normal_force_n;
   pipeline.Process(with(kTouchedS + 1.0 / 30, true), state_);
   EXPECT_EQ(state_.status, LinkStatus::kDegraded);
-  EXPECT_EQ(state_.status_reason, "the pressure is not known: no reading for 9 s");
+  EXPECT_EQ(state_.status_reason, "the pressure is not known: no reading for 9 s; check the sensor");
   EXPECT_TRUE(state_.pressure.stale);
   ASSERT_EQ(state_.contacts.size(), 1u);
   EXPECT_NEAR(state_.contacts[0].normal_force_n, fresh_n, 0.3 * fresh_n);
@@ -114,6 +121,19 @@ TEST_F(LinkPipelineTest, ABaselineIsOfOnePressure) {
   // With the last picture's pressure it would be 0.03 kPa less.
   ASSERT_TRUE(state_.pressure_estimate.has_value());
   EXPECT_NEAR(state_.pressure_estimate->mpa, 0.7e-3, 1e-5);
+}
+
+TEST_F(LinkPipelineTest, APressureThatNobodyTellsIsNeverOk) {
+  options_.pressure_mpa.reset();
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  for (const double time_s : {0.0, kTouchedS}) {
+    pipeline.Process(Frame(time_s), state_);
+    ASSERT_EQ(state_.reasons.size(), 1U);
+    EXPECT_EQ(state_.reasons[0].id, ReasonId::kPressureUnknown);
+    EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  }
+  EXPECT_FALSE(state_.contacts.empty());
 }
 
 TEST_F(LinkPipelineTest, RestIsTakenAgainOnDemand) {
@@ -203,6 +223,33 @@ TEST_F(LinkPipelineTest, ADeepDentIsDegraded) {
   EXPECT_TRUE(state_.measured());
 }
 
+// A sensor's noise never repeats: what it saw before says nothing of now.
+TEST_F(LinkPipelineTest, APictureThatRepeatsIsToldAndNotUsed) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  const StereoFrame before = Frame(0.5);
+  pipeline.Process(before, state_);
+  ASSERT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  StereoFrame frame = Frame(kTouchedS);
+  frame.images[Index(CameraId::kTop)] = before.images[Index(CameraId::kTop)];
+  pipeline.Process(frame, state_);
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  ASSERT_FALSE(state_.reasons.empty());
+  EXPECT_EQ(state_.reasons.front().id, ReasonId::kFrozen);
+  EXPECT_THAT(state_.status_reason, HasSubstr("top camera"));
+  EXPECT_NEAR(state_.total_force_n.norm(), 0.2, 0.04) << "what the other camera sees";
+  EXPECT_EQ(state_.shape.CountOf(MarkerSource::kTop) + state_.shape.CountOf(MarkerSource::kBoth), 0);
+  EXPECT_FALSE(state_.cameras[Index(CameraId::kTop)].bad_picture) << "it could be read";
+  const StereoFrame again = frame;
+  pipeline.Process(again, state_);
+  EXPECT_EQ(state_.status, LinkStatus::kLost) << "now both repeat";
+  EXPECT_FALSE(state_.measured());
+  EXPECT_TRUE(std::any_of(state_.reasons.begin(), state_.reasons.end(),
+                          [](const Reason& reason) { return reason.id == ReasonId::kFrozen; }));
+  pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+}
+
 TEST_F(LinkPipelineTest, DarkPicturesAreLostNotZero) {
   LinkPipeline pipeline(model_, options_);
   TakeRest(pipeline);
@@ -231,10 +278,62 @@ TEST_F(LinkPipelineTest, ShortFrameIsNamed) {
 TEST_F(LinkPipelineTest, TouchedSkinIsNoBaseline) {
   LinkPipeline pipeline(model_, options_);
   pipeline.Process(Frame(0), state_);
+  pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_THAT(state_.status_reason, HasSubstr("moved"));
   for (int k = 1; k < options_.rest_frames; ++k) pipeline.Process(Frame(kTouchedS), state_);
   EXPECT_FALSE(pipeline.calibration().has_value());
   EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_THAT(state_.status_reason, HasSubstr("touch"));
+}
+
+// Of every marker, the outer rings among them.
+TEST_F(LinkPipelineTest, EveryMarkerHasALimitOfDetection) {
+  for (const std::string& name : ShippedModelNames()) {
+    const LinkModel model = LoadLinkModel(name).value();
+    for (const int refinement : {0, 1}) {
+      ForceOptions options;
+      options.refinement = refinement;
+      StateEstimator estimator(model, options);
+      SkinShape shape;
+      shape.sources.assign(static_cast<size_t>(model.markers.count()), MarkerSource::kBoth);
+      shape.measured.assign(shape.sources.size(), {Vec3::Zero(), Mat3::Identity() / (0.05 * 0.05)});
+      NodalForces forces;
+      estimator.Estimate({.now = {0, 5e-5}, .baseline = {}}, shape, forces);
+      ASSERT_TRUE(forces.converged);
+      ASSERT_EQ(forces.limits_n.size(), shape.sources.size());
+      const double unit = ForceUnit(model);
+      for (const double limit_n : forces.limits_n) {
+        ASSERT_GT(limit_n, 0.001 * unit) << name << ", refinement " << refinement;
+        ASSERT_LT(limit_n, 1 * unit) << name << ", refinement " << refinement;
+      }
+    }
+  }
+}
+
+// Whoever looks between two tries must see what is missing.
+TEST_F(LinkPipelineTest, ARefusalStaysToBeReadWhileMorePairsAreTaken) {
+  LinkPipeline pipeline(model_, options_);
+  StereoFrame frame = Frame(kTouchedS);
+  frame.pressure_mpa = 1e-3;
+  for (int k = 0; k < options_.rest_frames; ++k) pipeline.Process(frame, state_);
+  const std::string refusal = state_.status_reason;
+  EXPECT_THAT(refusal, HasSubstr("refused"));
+  EXPECT_THAT(refusal, HasSubstr("under 1.000 kPa: cameras are calibrated without"));
+  for (int k = 0; k < 3; ++k) pipeline.Process(frame, state_);
+  EXPECT_EQ(state_.status_reason, "taking the rest shape again. Before: " + refusal);
+  for (int k = 0; k < 2 * options_.rest_frames && !pipeline.calibration(); ++k)
+    pipeline.Process(Frame(k / 30.0), state_);
+  EXPECT_TRUE(pipeline.calibration().has_value()) << state_.status_reason;
+}
+
+// On a busy machine, what takes long must wait until the skin is known to rest, or it is never seen at rest.
+TEST_F(LinkPipelineTest, AMovingSkinIsToldAtOnceAndBeginsWhereItComesToRest) {
+  LinkPipeline pipeline(model_, options_);
+  for (int k = 0; k < 6; ++k) pipeline.Process(Frame(k % 2 == 0 ? kTouchedS : 0), state_);
   EXPECT_THAT(state_.status_reason, HasSubstr("moved"));
+  EXPECT_EQ(pipeline.rest_progress().taken, 1) << "this pair is the first of the next";
+  for (int k = 1; k < options_.rest_frames; ++k) pipeline.Process(Frame(0), state_);
+  EXPECT_TRUE(pipeline.calibration().has_value()) << state_.status_reason;
 }
 
 // Also where the cameras are known: what touches at the start would be missing while it stays, and a ghost

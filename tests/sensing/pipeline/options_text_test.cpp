@@ -8,12 +8,13 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 void ExpectSame(const PipelineOptions& a, const PipelineOptions& b) {
   EXPECT_EQ(a.force.model, b.force.model);
   EXPECT_EQ(a.force.refinement, b.force.refinement);
   EXPECT_EQ(a.pressure_mpa, b.pressure_mpa);
+  EXPECT_EQ(a.pictures_may_repeat, b.pictures_may_repeat);
   ASSERT_EQ(a.drift.has_value(), b.drift.has_value());
   if (!a.drift) return;
   EXPECT_EQ(a.drift->time_constant_s, b.drift->time_constant_s);
@@ -29,6 +30,7 @@ TEST(OptionsTextTest, ReadsBackToTheSameNumbers) {
   options.force.model.reset();
   options.force.refinement = 3;
   options.pressure_mpa = 0.1 + 0.2;  // all bits are in use
+  options.pictures_may_repeat = true;
   options.drift = DriftOptions{.time_constant_s = 1.0 / 3,
                                .rate_limit_mm_s = std::nextafter(0.001, 1),
                                .limit_mm = 1e-300,
@@ -72,6 +74,7 @@ TEST(OptionsTextTest, WhatIsNotUnderstoodIsRefusedByName) {
   refused("force.model", "magic");
   refused("force.refinement", "4");
   refused("force.refinement", "1.5");
+  refused("pictures_may_repeat", "maybe");
   refused("pressure_mpa", "");
   refused("pressure_mpa", "0.01 MPa");
   refused("pressure_mpa", "nan");

@@ -10,7 +10,7 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::string Message(const Result<CalibrationSummary>& result) {
   return result.ok() ? "accepted" : result.error().message;
@@ -40,7 +40,7 @@ struct Misaligned {
   Vec3 turn_deg, move_mm;  ///< of the top camera; the bottom one's are others, as large
 };
 
-class MisalignedTest : public testing::TestWithParam<Misaligned> {};
+class MisalignedTest : public ::testing::TestWithParam<Misaligned> {};
 
 TEST_P(MisalignedTest, PairIsRecoveredFromItsPictures) {
   const auto& [name, turn_deg, move_mm] = GetParam();
@@ -72,13 +72,13 @@ TEST_P(MisalignedTest, PairIsRecoveredFromItsPictures) {
 }
 
 INSTANTIATE_TEST_SUITE_P(TwoMillimetresAndDegrees, MisalignedTest,
-                         testing::Values(Misaligned{"cylinder", {2, 0, 0}, {2, 0, 0}},
-                                         Misaligned{"cylinder", {0, 2, 0}, {2, 0, 0}},
-                                         Misaligned{"cylinder", {0, 0, 2}, {0, 2, 0}},
-                                         Misaligned{"cylinder", {0, 2, 0}, {0, 0, -2}},
-                                         Misaligned{"cylinder", {-1.2, 1.2, 1.2}, {1.2, -1.2, 1.2}},
-                                         Misaligned{"barrel", {2, 0, 0}, {0, 0, 2}},
-                                         Misaligned{"barrel", {0, -2, 0}, {0, -2, 0}}));
+                         ::testing::Values(Misaligned{"cylinder", {2, 0, 0}, {2, 0, 0}},
+                                           Misaligned{"cylinder", {0, 2, 0}, {2, 0, 0}},
+                                           Misaligned{"cylinder", {0, 0, 2}, {0, 2, 0}},
+                                           Misaligned{"cylinder", {0, 2, 0}, {0, 0, -2}},
+                                           Misaligned{"cylinder", {-1.2, 1.2, 1.2}, {1.2, -1.2, 1.2}},
+                                           Misaligned{"barrel", {2, 0, 0}, {0, 0, 2}},
+                                           Misaligned{"barrel", {0, -2, 0}, {0, -2, 0}}));
 
 TEST(PictureCalibration, OtherLensFitsAsWell) {
   const LinkModel model = LoadLinkModel("cylinder").value();
@@ -96,7 +96,7 @@ TEST(PictureCalibration, ManyPairsAreAveraged) {
   const Studio studio(model);
   const SkinTruth rest = studio.Truth();
   std::vector<RestPictures> pairs;
-  for (const uint64_t seed : {1, 2, 3, 4}) pairs.push_back(studio.Take(model.nominal_rig, rest, seed));
+  for (const uint64_t seed : {1u, 2u, 3u, 4u}) pairs.push_back(studio.Take(model.nominal_rig, rest, seed));
   double before = -1;
   CalibrationOptions options;
   options.progress = [&](const CalibrationProgress& progress) {
@@ -115,7 +115,7 @@ TEST(PictureCalibration, ManyPairsAreAveraged) {
   EXPECT_THAT(Message(CalibrateFromPictures(model, pairs)), HasSubstr("the skin moved"));
 }
 
-class RefusalTest : public testing::Test {
+class RefusalTest : public ::testing::Test {
  protected:
   LinkModel With(void (*change)(LinkModel&)) const {
     LinkModel other = model_;
@@ -172,8 +172,8 @@ TEST_F(RefusalTest, TouchedSkinIsRefused) {
                                      std::to_string(depth_mm) + ", begin_s: 0, end_s: 2}\n");
     return Message(Calibrate(model_, studio_.Take(model_.nominal_rig, truth)));
   };
-  EXPECT_THAT(refused(1), testing::ContainsRegex("touched near path [678], ring [456]"));
-  EXPECT_THAT(refused(3), testing::ContainsRegex("touched near path [678], ring [456]"));
+  EXPECT_THAT(refused(1), ::testing::ContainsRegex("touched near path [678], ring [456]"));
+  EXPECT_THAT(refused(3), ::testing::ContainsRegex("touched near path [678], ring [456]"));
   EXPECT_THAT(refused(10), HasSubstr("touche"));
 }
 

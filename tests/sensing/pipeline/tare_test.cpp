@@ -12,10 +12,10 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-constexpr double kFrameS = 1 / 30.0;
-constexpr double kFreeS = 0.5, kTouchedS = 3;  // of the scene
+constexpr double kTareFrameS = 1 / 30.0;
+constexpr double kFreeS = 0.5, kTareTouchedS = 3;  // of the scene
 
 class FrameClock final : public Clock {
  public:
@@ -25,7 +25,7 @@ class FrameClock final : public Clock {
   int64_t now_ns = 1'000'000'000;
 };
 
-class TareTest : public testing::Test {
+class TareTest : public ::testing::Test {
  protected:
   static Scene TouchScene() {
     Scene scene;
@@ -54,17 +54,18 @@ class TareTest : public testing::Test {
     ASSERT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
   }
   void Process(double time_s) {
-    clock_.now_ns += static_cast<int64_t>(kFrameS * 1e9);
+    clock_.now_ns += static_cast<int64_t>(kTareFrameS * 1e9);
     skin_->Take(time_s, sequence_++);
     skin_->frame.times.exposure_monotonic_ns = clock_.now_ns;
     skin_->frame.pressure_mpa.reset();
+    skin_->frame.pressure.origin = PressureOrigin::kConstant;
     pipeline_->Process(skin_->frame, state_);
   }
-  Result<TareSummary> Tare(const TareOptions& options, double time_s) {
+  Result<TareSummary> Tare(const TareOptions& options, double time_s, int most_waited = 0) {
     const auto begun = pipeline_->BeginTare(options);
     if (!begun) return begun.error();
-    for (int k = 0; k < options.frames; ++k) {
-      Process(time_s + k * kFrameS);
+    for (int k = 0; k < options.frames + most_waited; ++k) {
+      Process(time_s + k * kTareFrameS);
       if (auto end = pipeline_->TakeTareEnd()) return *std::move(end);
     }
     return Error{ErrorCode::kInternal, "no end"};
@@ -93,10 +94,10 @@ TEST_F(TareTest, AFreeSkinIsTared) {
   Process(kFreeS);
   EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kTare);
   EXPECT_GT(state_.baseline.taken_utc_ns, first_ns);
-  EXPECT_NEAR(state_.baseline_age_s, kFrameS, 1e-6);
+  EXPECT_NEAR(state_.baseline_age_s, kTareFrameS, 1e-6);
   EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
   EXPECT_TRUE(state_.contacts.empty());
-  for (double t = 1.4; t < kTouchedS; t += kFrameS) Process(t);
+  for (double t = 1.4; t < kTareTouchedS; t += kTareFrameS) Process(t);
   ASSERT_EQ(state_.contacts.size(), 1u);
   EXPECT_NEAR(TotalForce(), 0.2, 0.04);
 }
@@ -111,6 +112,7 @@ TEST_F(TareTest, TheBaselineHasTheTimesOfItsFrames) {
     skin_->frame.times.exposure_monotonic_ns = 1'000'000 * (k + 1);
     skin_->frame.times.exposure_utc_ns = rest_utc_ns + k;
     skin_->frame.pressure_mpa.reset();
+    skin_->frame.pressure.origin = PressureOrigin::kConstant;
     pipeline_->Process(skin_->frame, state_);
   }
   EXPECT_EQ(state_.baseline.taken_utc_ns, rest_utc_ns + 3);
@@ -120,7 +122,7 @@ TEST_F(TareTest, TheBaselineHasTheTimesOfItsFrames) {
 // Nor does it matter what the state's buffers were used for before.
 TEST_F(TareTest, WhileRestIsTakenAnewTheStateHoldsNothingOld) {
   Start(TouchScene());
-  for (double t = 1.4; t < kTouchedS; t += kFrameS) Process(t);
+  for (double t = 1.4; t < kTareTouchedS; t += kTareFrameS) Process(t);
   ASSERT_TRUE(state_.measured());
   pipeline_->BeginRest(4);
   Process(0);
@@ -134,25 +136,57 @@ TEST_F(TareTest, WhileRestIsTakenAnewTheStateHoldsNothingOld) {
 
 TEST_F(TareTest, ATouchedSkinIsRefusedUnlessForced) {
   Start(TouchScene());
-  for (double t = 1.4; t < kTouchedS; t += kFrameS) Process(t);
+  for (double t = 1.4; t < kTareTouchedS; t += kTareFrameS) Process(t);
   ASSERT_NEAR(TotalForce(), 0.2, 0.04);
-  const auto refused = Tare({.frames = 6}, kTouchedS);
+  const auto refused = Tare({.frames = 6}, kTareTouchedS);
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, ErrorCode::kFailedPrecondition);
   EXPECT_THAT(refused.error().message, HasSubstr("touched: a contact of 0."));
-  Process(kTouchedS);
+  Process(kTareTouchedS);
   EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kStart);
   EXPECT_NEAR(TotalForce(), 0.2, 0.04) << "all is as it was";
 
-  const auto forced = Tare({.frames = 6, .force = true}, kTouchedS);
+  const auto forced = Tare({.frames = 6, .force = true}, kTareTouchedS);
   ASSERT_TRUE(forced.ok()) << forced.error().message;
   EXPECT_TRUE(forced->forced);
   EXPECT_GT(forced->shift_mm, 0.5);
-  for (int k = 0; k < 10; ++k) Process(kTouchedS + k * kFrameS);
+  for (int k = 0; k < 10; ++k) Process(kTareTouchedS + k * kTareFrameS);
   EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
   EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kForcedTare);
   EXPECT_LT(TotalForce(), 0.03) << "the touch is the baseline now";
   EXPECT_GT(state_.shape.seen(), 200);
+  for (double t = 29.5; t < 32; t += kTareFrameS) Process(t);
+  ASSERT_NE(state_.status, LinkStatus::kOk) << "the touch has gone, and what it did to the baseline shows";
+  EXPECT_EQ(state_.reasons.back().id, ReasonId::kForcedBaseline) << state_.status_reason;
+}
+
+TEST_F(TareTest, AForcedBaselineStaysSoWhereATareSeesNothing) {
+  Start(TouchScene());
+  for (double t = 1.4; t < kTareTouchedS; t += kTareFrameS) Process(t);
+  ASSERT_TRUE(Tare({.frames = 6, .force = true}, kTareTouchedS).ok());
+  const auto again = Tare({.frames = 6}, kTareTouchedS);
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_FALSE(again->forced);
+  Process(kTareTouchedS);
+  EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kForcedTare) << "what touched is still there";
+  pipeline_->Restart();
+  for (int k = 0; k <= Options().rest_frames; ++k) Process(0);
+  EXPECT_EQ(state_.baseline.origin, BaselineOrigin::kStart);
+}
+
+// Two bodies whose mark is left in the baseline: no load explains the skin once they have gone.
+TEST_F(TareTest, ATareEndsWhereNoLoadExplainsTheMarkers) {
+  Scene scene = TouchScene();
+  scene.contacts[0].force_n = 0.6;
+  Start(scene);
+  for (double t = 1.4; t < kTareTouchedS; t += kTareFrameS) Process(t);
+  ASSERT_TRUE(Tare({.frames = 6, .force = true}, kTareTouchedS).ok());
+  for (double t = 29.5; t < 32; t += kTareFrameS) Process(t);
+  ASSERT_EQ(state_.reasons.front().id, ReasonId::kNotConverged) << state_.status_reason;
+  const auto refused = Tare({.frames = 6}, 32, 100);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::kFailedPrecondition);
+  EXPECT_THAT(refused.error().message, HasSubstr("no answer to tare by"));
 }
 
 TEST_F(TareTest, AHiddenCameraKeepsItsBaseline) {
@@ -168,7 +202,7 @@ TEST_F(TareTest, AHiddenCameraKeepsItsBaseline) {
   skin_->frame.images[Index(CameraId::kBottom)].valid = true;
   ASSERT_TRUE(end && *end) << (end ? end->error().message : "no end");
   EXPECT_TRUE((*end)->forced);
-  for (double t = 1.4; t < kTouchedS; t += kFrameS) Process(t);
+  for (double t = 1.4; t < kTareTouchedS; t += kTareFrameS) Process(t);
   EXPECT_NEAR(TotalForce(), 0.2, 0.04);
 }
 
@@ -193,7 +227,7 @@ TEST_F(TareTest, CreepIsFollowedReportedAndTared) {
   scene.pressure = {{0.5, 0}, {8, 0.5}};
   PipelineOptions options = Options();
   Start(scene, options);
-  for (double t = 0; t < 10; t += kFrameS) Process(t);
+  for (double t = 0; t < 10; t += kTareFrameS) Process(t);
   const auto largest = [&] {
     double most = 0;
     for (const Vec3& u : state_.shape.displacements_mm) most = std::max(most, u.norm());
@@ -205,13 +239,17 @@ TEST_F(TareTest, CreepIsFollowedReportedAndTared) {
 
   options.drift = {.time_constant_s = 0.3, .rate_limit_mm_s = 1, .limit_mm = 0.5 * creep_mm, .quiet_s = 0.3};
   Start(scene, options);
-  for (double t = 0; t < 10; t += kFrameS) Process(t);
+  for (double t = 0; t < 10; t += kTareFrameS) Process(t);
   EXPECT_LT(largest(), 0.3 * creep_mm);
   EXPECT_TRUE(state_.contacts.empty());
   EXPECT_NEAR(state_.baseline.drift_mm, creep_mm, 0.3 * creep_mm);
   EXPECT_EQ(state_.baseline.drift_state, DriftState::kFollowing);
   EXPECT_EQ(state_.status, LinkStatus::kDegraded);
   EXPECT_THAT(state_.status_reason, HasSubstr("tare the link"));
+  ASSERT_EQ(state_.reasons.size(), 1u);
+  EXPECT_EQ(state_.reasons[0].id, ReasonId::kDrift);
+  EXPECT_NEAR(state_.reasons[0].value.value_or(0), creep_mm, 0.3 * creep_mm);
+  EXPECT_EQ(state_.reasons[0].limit, 0.5 * creep_mm);
 
   const auto tare = Tare({.frames = 6}, 10);
   ASSERT_TRUE(tare.ok()) << tare.error().message;
@@ -222,7 +260,7 @@ TEST_F(TareTest, CreepIsFollowedReportedAndTared) {
   EXPECT_LT(largest(), 0.1);
 }
 
-class TareCollectorTest : public testing::Test {
+class TareCollectorTest : public ::testing::Test {
  protected:
   TareCollectorTest() {
     const auto count = static_cast<size_t>(model_.markers.count());

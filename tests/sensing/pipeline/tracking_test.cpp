@@ -34,7 +34,7 @@ SceneContact Dent(double angle_rad, double z_mm, double depth_mm, double begin_s
   return contact;
 }
 
-class TrackingTest : public testing::TestWithParam<std::string> {
+class TrackingTest : public ::testing::TestWithParam<std::string> {
  protected:
   void Start(const Scene& scene) {
     skin_.emplace(GetParam(), scene);
@@ -208,7 +208,7 @@ TEST_P(TrackingTest, GapAndReturnOfACameraAreAcquired) {
   EXPECT_EQ(state_.tracking.mode, TrackingMode::kTracked);
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, TrackingTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, TrackingTest, ::testing::Values("cylinder", "barrel"));
 
 }  // namespace
 }  // namespace taclink

@@ -12,7 +12,7 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 // A short scene of a coarse nonlinear skin.
 Scene NonlinearScene(const std::string& more) {
@@ -52,7 +52,7 @@ void PrintTo(const Played& played, std::ostream* out) {
 constexpr double kWeakN = 0.03;  // a tenth of these scenes' greatest forces or less
 
 // Scenes of all kinds: what is played at any time is what is solved there.
-class PlayedTest : public testing::TestWithParam<Played> {};
+class PlayedTest : public ::testing::TestWithParam<Played> {};
 
 TEST_P(PlayedTest, IsTheEquilibriumAtAnyTime) {
   const LinkModel model = Model("cylinder");
@@ -101,7 +101,7 @@ TEST_P(PlayedTest, IsTheEquilibriumAtAnyTime) {
 
 INSTANTIATE_TEST_SUITE_P(
     Scenes, PlayedTest,
-    testing::Values(
+    ::testing::Values(
         Played{"press", "contacts:\n  - {at: {path: 7, ring: 5}, force_n: 0.2, begin_s: 1, end_s: 3}\n"},
         Played{"depth under changing pressure",
                "pressure_keyframes: [{time_s: 0.5, kpa: 0}, {time_s: 2, kpa: 1.5}, {time_s: 3.5, kpa: 0}]\n"
@@ -114,7 +114,7 @@ INSTANTIATE_TEST_SUITE_P(
                "  - {at: {angle_deg: 90, z_mm: 75}, depth_mm: 2, patch_diameter_mm: 12, begin_s: 1, end_s: 3,"
                " ramp_s: 0.5}\n"}));
 
-class NonlinearSkinTest : public testing::TestWithParam<std::string> {
+class NonlinearSkinTest : public ::testing::TestWithParam<std::string> {
  protected:
   SkinTruth Under(const std::string& more) const {
     SkinTruth truth;
@@ -204,7 +204,7 @@ TEST_P(NonlinearSkinTest, ASlidingTouchKeepsItsForceAndMovesSmoothly) {
   EXPECT_LT(largest_step, 0.3);  // mm in 20 ms
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, NonlinearSkinTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, NonlinearSkinTest, ::testing::Values("cylinder", "barrel"));
 
 TEST(NonlinearSkin, ASceneWithoutEquilibriumIsRefusedWithItsPlaceAndTime) {
   const auto near_end = SimulatedSkin::Make(

@@ -47,7 +47,7 @@ Blob Difference(const cv::Mat& with, const cv::Mat& without) {
   return blob;
 }
 
-class RendererTest : public testing::TestWithParam<std::string> {
+class RendererTest : public ::testing::TestWithParam<std::string> {
  protected:
   cv::Mat Picture(const Renderer& renderer, const SkinTruth& truth, CameraId id) const {
     cv::Mat gray;
@@ -220,7 +220,7 @@ TEST(Occlusion, ARidgeHidesWhatLiesBehindIt) {
   EXPECT_FALSE(IsHidden(wall, {29, 0, 40}, {0, 0, -10}, 0.1));  // before the ridge
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, RendererTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, RendererTest, ::testing::Values("cylinder", "barrel"));
 
 }  // namespace
 }  // namespace taclink

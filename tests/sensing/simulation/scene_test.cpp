@@ -8,7 +8,7 @@
 namespace taclink {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::string Message(const std::string& more) {
   const auto scene = ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\n" + more);
@@ -17,7 +17,7 @@ std::string Message(const std::string& more) {
 
 TEST(Scene, ShippedOnesBeginUntouchedAndFitBothEnds) {
   EXPECT_THAT(ShippedSceneNames(),
-              testing::UnorderedElementsAre("rest", "press", "two_touches", "stroke", "inflate"));
+              ::testing::UnorderedElementsAre("rest", "press", "two_touches", "stroke", "inflate"));
   for (const std::string& name : ShippedSceneNames()) {
     SCOPED_TRACE(name);
     const auto scene = LoadScene(name);
@@ -45,7 +45,7 @@ TEST(Scene, SaysHowTheSkinAnswers) {
   EXPECT_EQ(scene("skin: linear\n").skin, SkinKind::kLinear);
   const auto bad = ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\nskin: stiff\n");
   ASSERT_FALSE(bad.ok());
-  EXPECT_THAT(bad.error().message, testing::HasSubstr("s.yaml:4"));
+  EXPECT_THAT(bad.error().message, ::testing::HasSubstr("s.yaml:4"));
 }
 
 TEST(Scene, ReadsEveryField) {

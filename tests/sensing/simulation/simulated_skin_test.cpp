@@ -9,9 +9,9 @@
 namespace taclink {
 namespace {
 
-constexpr char kAlways[] = ", begin_s: 0, end_s: 4, ramp_s: 0}\n";
+constexpr char kAllTheTime[] = ", begin_s: 0, end_s: 4, ramp_s: 0}\n";
 
-class SimulatedSkinTest : public testing::TestWithParam<std::string> {
+class SimulatedSkinTest : public ::testing::TestWithParam<std::string> {
  protected:
   SkinTruth Under(const std::string& more) const { return TruthAt(model_, SceneWith(more), 2); }
   LinkModel model_ = Model(GetParam());
@@ -32,7 +32,7 @@ TEST_P(SimulatedSkinTest, WithoutLoadNothingMoves) {
 TEST_P(SimulatedSkinTest, ContactForceIsAsAsked) {
   const SkinTruth truth =
       Under(std::string("contacts:\n") + "  - {at: {path: 3, ring: 4}, force_n: 0.2, patch_diameter_mm: 20" +
-            kAlways + "  - {at: {angle_deg: 200, z_mm: 61}, force_n: 0.1" + kAlways);
+            kAllTheTime + "  - {at: {angle_deg: 200, z_mm: 61}, force_n: 0.1" + kAllTheTime);
   ASSERT_EQ(truth.contacts.size(), 2U);
   EXPECT_NEAR(truth.contacts[0].force_n.norm(), 0.2, 1e-9);
   EXPECT_NEAR(truth.contacts[1].force_n.norm(), 0.1, 1e-9);
@@ -49,14 +49,15 @@ TEST_P(SimulatedSkinTest, ContactForceIsAsAsked) {
 TEST_P(SimulatedSkinTest, DepthIsAsAskedAlsoUnderPressure) {
   const SkinTruth truth =
       Under(std::string("pressure_kpa: 1\ncontacts:\n") + "  - {at: {path: 2, ring: 5}, depth_mm: 5" +
-            kAlways + "  - {at: {path: 4, ring: 5}, depth_mm: 4" + kAlways);
+            kAllTheTime + "  - {at: {path: 4, ring: 5}, depth_mm: 4" + kAllTheTime);
   ASSERT_EQ(truth.contacts.size(), 2U);
   EXPECT_NEAR(truth.contacts[0].depth_mm, 5, 0.1);
   EXPECT_NEAR(truth.contacts[1].depth_mm, 4, 0.1);
 }
 
 TEST_P(SimulatedSkinTest, StaysOutsideTheTube) {
-  const SkinTruth truth = Under(std::string("contacts:\n  - {at: {path: 2, ring: 5}, force_n: 20") + kAlways);
+  const SkinTruth truth =
+      Under(std::string("contacts:\n  - {at: {path: 2, ring: 5}, force_n: 20") + kAllTheTime);
   ASSERT_EQ(truth.contacts.size(), 1U);
   EXPECT_TRUE(truth.contacts[0].limited);
   EXPECT_LT(truth.contacts[0].force_n.norm(), 20);
@@ -111,7 +112,7 @@ TEST_P(SimulatedSkinTest, LoopsAndCountsOn) {
   EXPECT_NEAR((first.marker_mm[50] - later.marker_mm[50]).norm(), 0, 1e-9);
 }
 
-INSTANTIATE_TEST_SUITE_P(ShippedModels, SimulatedSkinTest, testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(ShippedModels, SimulatedSkinTest, ::testing::Values("cylinder", "barrel"));
 
 }  // namespace
 }  // namespace taclink

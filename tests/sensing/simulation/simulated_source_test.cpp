@@ -6,13 +6,12 @@
 
 #include "sensing/capture/decode.h"
 #include "tests/sensing/simulation/scene_text.h"
+#include "tests/support/times.h"
 
 namespace taclink {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr int64_t kMs = 1'000'000;
 
 class FakeClock final : public Clock {
  public:
@@ -23,7 +22,7 @@ class FakeClock final : public Clock {
   int64_t now_ns = 5000 * kMs;
 };
 
-class SimulatedSourceTest : public testing::Test {
+class SimulatedSourceTest : public ::testing::Test {
  protected:
   std::unique_ptr<SimulatedSource> Source(const std::string& more) {
     auto source = SimulatedSource::Make(Model("cylinder"), SceneWith("frame_rate_hz: 100\n" + more), clock_);

@@ -14,13 +14,13 @@
 #include "server/pressure/pressure_readers.h"
 #include "server/pressure/pressure_sensor.h"
 #include "tests/server/support.h"
+#include "tests/support/times.h"
 
 namespace taclink::server {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::HasSubstr;
-constexpr int64_t kMs = 1'000'000;
+using ::testing::HasSubstr;
 constexpr milliseconds kMoment{5};
 
 StereoFrame FrameAt(int64_t exposure_ns) {
@@ -130,7 +130,7 @@ TEST_F(PressureSensorTest, ALostSensorIsTriedAgainWithGrowingPauses) {
     if (script_->opened > opened) tries_ms.push_back((Now() - start) / kMs);
     opened = script_->opened;
   }
-  EXPECT_THAT(tries_ms, testing::ElementsAre(0, 100, 300, 700, 1500, 3100, 5100, 7100));
+  EXPECT_THAT(tries_ms, ::testing::ElementsAre(0, 100, 300, 700, 1500, 3100, 5100, 7100));
   EXPECT_EQ(Applied(sensor_, Now()).pressure.trouble, "sensor: unplugged; trying again");
   script_->there = true;
   for (int steps = 0; steps < 30; ++steps) sensor_.Step(milliseconds(100));
@@ -189,7 +189,7 @@ class ReaderTest : public ::testing::Test {
   ReaderTest() {
     folder_ = std::filesystem::temp_directory_path() /
               ("pressure." + std::to_string(getpid()) + "." +
-               testing::UnitTest::GetInstance()->current_test_info()->name());
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(folder_);
   }
   ~ReaderTest() override { std::filesystem::remove_all(folder_); }

@@ -76,6 +76,9 @@ std::vector<Stored> ReadStream(const std::string& url, const std::string& stream
          std::string(natsMsg_GetData(message), static_cast<size_t>(natsMsg_GetDataLength(message)))});
     natsMsg_Destroy(message);
   }
+  // First what reads: the library looks at a subscription while it hands messages to it, with no reference of
+  // its own (nats.c before 3.6, its issue 637), and a publisher may be sending still.
+  natsConnection_Close(connection);
   natsSubscription_Destroy(subscription);
   jsCtx_Destroy(js);
   natsConnection_Destroy(connection);

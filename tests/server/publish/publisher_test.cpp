@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <fstream>
@@ -18,6 +19,7 @@ namespace taclink::server {
 namespace {
 
 using std::chrono::milliseconds;
+using ::testing::AllOf;
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 using testing::NatsServer;
@@ -191,8 +193,13 @@ TEST_F(PublisherTest, SaysWhatIsWrong) {
   config.token_file = guarded.folder() + "/token";
   const auto missing = Publisher::Start(server_.arm(), config);
   ASSERT_FALSE(missing.ok());
-  EXPECT_THAT(missing.error().message, HasSubstr("holds no token"));
+  EXPECT_THAT(missing.error().message, HasSubstr("token cannot be read"));
   std::ofstream(config.token_file) << "wrong\n";
+  chmod(config.token_file.c_str(), 0644);
+  const auto open = Publisher::Start(server_.arm(), config);
+  ASSERT_FALSE(open.ok());
+  EXPECT_THAT(open.error().message, AllOf(HasSubstr("publish.token_file"), HasSubstr("chmod 640")));
+  chmod(config.token_file.c_str(), 0600);
   publisher_ = std::move(*Publisher::Start(server_.arm(), config));
   ASSERT_TRUE(Wait([](const PublishStatus& status) {
     return status.trouble.find("refuses this user") != std::string::npos;

@@ -8,6 +8,7 @@
 
 #include "taclink/v1/events.pb.h"
 #include "taclink/v1/frame.pb.h"
+#include "tests/support/times.h"
 #include "wire/log/log_writer.h"
 #include "wire/mcap/byte_sink.h"
 #include "wire/mcap/reader.h"
@@ -15,7 +16,6 @@
 namespace taclink::server {
 
 inline constexpr int64_t kT0 = 1'800'000'000'000'000'000;  // of each log's first message
-inline constexpr int64_t kMs = 1'000'000;
 
 /// Counts what is read of it.
 class CountingSource final : public mcap::ByteSource {

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <map>
 #include <random>
 #include <set>
 
@@ -175,6 +178,101 @@ TEST(McapScan, FindsTheNextChunkWhenALengthIsDamaged) {
   }
 }
 
+// One field of a chunk's head each, but for its CRC: the records are there, and the CRC says that they are
+// right.
+TEST(McapScan, SavesRecordsWhoseChunkHasADamagedHead) {
+  constexpr uint64_t kContent = kRecordHeaderBytes;
+  for (const auto compression : kCompressions) {
+    const uint64_t name = NameOf(compression).size();
+    const std::map<std::string, std::pair<uint64_t, size_t>> fields = {
+        {"length", {1, 8}},
+        {"times", {kContent, 16}},
+        {"size", {kContent + 16, 8}},
+        {"name's length", {kContent + 28, 4}},
+        {"records' length", {kContent + 32 + name, 8}},
+        {"type", {0, 1}},
+    };
+    for (const auto& [field, place] : fields) {
+      // An uncompressed chunk is found by its name's length.
+      if (compression == Compression::kNone && field == "name's length") continue;
+      for (const uint64_t value : {uint64_t{0}, uint64_t{200}, uint64_t{1} << 31, ~uint64_t{0}}) {
+        Chunked log = ManyChunks(compression);
+        for (const size_t chunk : {2, 4}) {
+          for (size_t i = 0; i < place.second; ++i)
+            log.bytes[log.chunks[chunk].chunk_start + place.first + i] =
+                static_cast<std::byte>(value >> (8 * (i % 8)));
+        }
+        const Scanned scanned = ScanOf(log.bytes);
+        EXPECT_TRUE(scanned.content.messages == log.content.messages)
+            << NameOf(compression) << " " << field << " " << value << ": " << scanned.report.Text();
+        EXPECT_TRUE(Recovered(log.bytes).messages == log.content.messages);
+      }
+    }
+  }
+}
+
+TEST(McapScan, ADamagedStartCostsNoMore) {
+  for (const auto compression : {Compression::kZstd, Compression::kLz4}) {
+    Chunked log = ManyChunks(compression);
+    std::mt19937 random(3);
+    const uint64_t lost = MessagesIn(log, 0);
+    const auto& first = log.chunks[0];
+    for (size_t i = 0; i < first.chunk_start + first.chunk_length / 2; ++i)
+      log.bytes[i] = static_cast<std::byte>(random());
+    const Scanned scanned = ScanOf(log.bytes);
+    EXPECT_EQ(scanned.report.messages + lost, log.content.messages.size()) << scanned.report.Text();
+    EXPECT_EQ(scanned.report.orphans, 0u) << "channels come from the summary";
+    EXPECT_TRUE(IsPartOf(scanned.content.messages, log.content.messages));
+  }
+}
+
+// But for an attachment, whose content may be a log itself.
+TEST(McapScan, AChunkIsNoOtherRecord) {
+  for (const auto compression : kCompressions) {
+    for (const int type : {0, 1, 2, 3, 4, 5, 7, 8, 10, 11, 12, 13, 14, 15, 16, 0x80, 0xff}) {
+      Chunked log = ManyChunks(compression);
+      log.bytes[log.chunks[2].chunk_start] = static_cast<std::byte>(type);
+      const Scanned scanned = ScanOf(log.bytes);
+      EXPECT_TRUE(scanned.content.messages == log.content.messages)
+          << NameOf(compression) << " " << type << " " << scanned.report.Text();
+    }
+  }
+}
+
+TEST(McapScan, ChannelsComeFromASummaryThatIsNotWhereItShouldBe) {
+  for (const auto compression : kCompressions) {
+    const Chunked log = ManyChunks(compression);
+    const uint64_t end = log.chunks[0].chunk_start + log.chunks[0].chunk_length, lost = MessagesIn(log, 0);
+    Buffer cut(log.bytes.begin() + static_cast<ptrdiff_t>(log.chunks[0].chunk_start + 700), log.bytes.end());
+    Buffer without(log.bytes.begin(), log.bytes.begin() + static_cast<ptrdiff_t>(log.chunks[0].chunk_start));
+    AppendBytes(Bytes(log.bytes).subspan(end), without);
+    for (const Buffer& bytes : {cut, without}) {
+      const Scanned scanned = ScanOf(bytes);
+      EXPECT_EQ(scanned.report.messages + lost, log.content.messages.size()) << scanned.report.Text();
+      EXPECT_TRUE(IsPartOf(scanned.content.messages, log.content.messages));
+      EXPECT_EQ(scanned.report.orphans, 0u);
+    }
+  }
+}
+
+// Each beginning of a frame once cost a read of all that follows.
+TEST(McapScan, DamageFullOfFramesBeginningsIsReadOnce) {
+  Buffer bytes = SmallLog();
+  const std::string magic = "zstd12345678\x28\xb5\x2f\xfd\xa0\xff\xff\xff\x03";
+  for (int i = 0; i < 20'000; ++i) AppendBytes(AsBytes(magic), bytes);
+  EXPECT_EQ(ScanOf(bytes).report.messages, ScanOf(SmallLog()).report.messages);
+}
+
+TEST(McapScan, SparedRecordsAreTakenOnce) {
+  Chunked log = ManyChunks();
+  log.bytes[log.chunks[3].chunk_start + kRecordHeaderBytes + 16] ^= std::byte{1};  // its size
+  for (const bool keep_unverified : {false, true}) {
+    const Scanned scanned = ScanOf(log.bytes, {.keep_unverified = keep_unverified});
+    EXPECT_EQ(scanned.report.messages, log.content.messages.size());
+    EXPECT_EQ(scanned.report.dropped, 0u);
+  }
+}
+
 TEST(McapScan, KeepsWhatItCantVerifyOnlyWhenAsked) {
   Chunked log = ManyChunks();
   const ChunkIndex& chunk = log.chunks[3];
@@ -249,6 +347,41 @@ TEST(McapDamage, RandomDamageNeverGivesWrongMessages) {
     const LogContent content = Recovered(bytes);
     EXPECT_TRUE(IsPartOf(content.messages, log.content.messages)) << round;
     EXPECT_GT(content.messages.size() * 2, log.content.messages.size()) << round;
+  }
+}
+
+// Lengths, types and CRCs are what leads through a log. TACLINK_MUTATIONS: how many logs.
+TEST(McapDamage, AtBoundariesOfRecordsNeverGivesWrongMessages) {
+  const char* const wanted = std::getenv("TACLINK_MUTATIONS");
+  const int rounds = wanted != nullptr ? std::atoi(wanted) : 600;
+  std::mt19937_64 random(17);
+  for (const auto compression : kCompressions) {
+    LogContent whole;
+    const Buffer bytes = RandomLogBytes(
+        {.seed = 6, .messages = 40, .options = {.compression = compression, .chunk_bytes = 2000}}, &whole);
+    std::vector<uint64_t> starts;
+    for (uint64_t at = kMagic.size(); at + kMagic.size() < bytes.size();) {
+      starts.push_back(at);
+      at += kRecordHeaderBytes + DecodeRecordHeader(Bytes(bytes).subspan(at)).length;
+    }
+    for (int round = 0; round < rounds / 3; ++round) {
+      Buffer damaged = bytes;
+      for (uint64_t mutations = 1 + random() % 3; mutations > 0; --mutations) {
+        const uint64_t at = starts[random() % starts.size()];
+        // The type; the length; the first fields, of a chunk up to its CRC and compression; the end.
+        constexpr std::array<uint64_t, 5> kPlaces = {0, 1, 9, 9 + 24, 9 + 28};
+        const uint64_t place = at + kPlaces[random() % kPlaces.size()];
+        const uint64_t value = random() % 4 == 0 ? random() % 300 : random() >> (random() % 64);
+        for (uint64_t i = 0; i < 8 && place + i < damaged.size(); ++i) {
+          if (i > 0 && place == at) break;
+          damaged[place + i] = static_cast<std::byte>(value >> (8 * i));
+        }
+      }
+      const Scanned scanned = ScanOf(damaged);
+      ASSERT_TRUE(IsPartOf(scanned.content.messages, whole.messages)) << NameOf(compression) << " " << round;
+      ASSERT_TRUE(Recovered(damaged).messages == scanned.content.messages)
+          << NameOf(compression) << " " << round;
+    }
   }
 }
 

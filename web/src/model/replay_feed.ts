@@ -37,6 +37,7 @@ export class ReplayFeed implements Feed {
 
   private life: AbortController | undefined;
   private pausedByHiding = false;
+  private seeks = 0; // that are on their way
   private placedAtMs = 0;
   private toldAtMs = 0;
   private looping = false;
@@ -105,7 +106,8 @@ export class ReplayFeed implements Feed {
       return;
     }
     this.store.clear();
-    await this.control({ case: "seekUtcNs", value: toNs(timeS) });
+    ++this.seeks;
+    await this.control({ case: "seekUtcNs", value: toNs(timeS) }).finally(() => --this.seeks);
   }
 
   /** What the link's cameras saw then; undefined: nothing is played now. */
@@ -126,7 +128,7 @@ export class ReplayFeed implements Feed {
     const player = this.status.value?.player;
     if (!player) return;
     try {
-      await this.session.recording.controlReplay({ player, action });
+      await this.session.recording.controlReplay({ player, action }, { timeoutMs: 5000 });
       this.trouble.value = "";
     } catch (error) {
       this.trouble.value = messageOf(error);
@@ -201,9 +203,11 @@ export class ReplayFeed implements Feed {
   }
 
   private takePosition(timeS: number): void {
-    if (!(timeS > 0)) return;
+    // What is on its way from before a seek is not where the log is.
+    if (!(timeS > 0) || this.seeks > 0) return;
     const now = performance.now();
-    if (now - this.placedAtMs < 100) return;
+    // While it is paused the next to come may be the last one.
+    if (!this.status.value?.paused && now - this.placedAtMs < 100) return;
     this.positionS.value = timeS;
     this.placedAtMs = now;
     // Browsers allow few changes of the address.

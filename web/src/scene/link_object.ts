@@ -3,7 +3,7 @@ import type { LinkModel } from "../api/gen/taclink/v1/arm_pb";
 import type { LinkFrame } from "../api/gen/taclink/v1/frame_pb";
 import type { Pose } from "../api/gen/taclink/v1/geometry_pb";
 import { colourIndex } from "../skin/colour_map";
-import { MarkerFields, type Quantity } from "../skin/fields";
+import { isKnown, MarkerFields, type Quantity } from "../skin/fields";
 import { SkinSurface } from "../skin/surface";
 
 const CAP_LENGTH_M = 0.012;
@@ -93,15 +93,16 @@ export class LinkObject {
     this.caps.color.set(selected ? CAP_SELECTED : CAP_COLOUR);
   }
 
-  /** Without a frame: nothing is measured, and it shows. */
+  /** Without a frame nothing is measured, and it shows; so does a skin whose pressures are not known. */
   update(frame: LinkFrame | undefined, colouring: Colouring): void {
     const { surface } = this;
     if (frame)
       surface.update(this.fields.displacements(frame), this.fields.values(frame, colouring.quantity));
     else surface.update(undefined, undefined);
-    this.skin.material.vertexColors = frame !== undefined;
+    const known = frame !== undefined && isKnown(frame, colouring.quantity);
+    this.skin.material.vertexColors = known;
     this.skin.material.wireframe = frame === undefined;
-    this.skin.material.color.set(frame ? 0xffffff : UNMEASURED);
+    this.skin.material.color.set(known ? 0xffffff : UNMEASURED);
     this.skin.material.needsUpdate = true;
     this.paint(colouring);
     this.skin.geometry.attributes.position.needsUpdate = true;

@@ -20,6 +20,11 @@ export const QUANTITIES: Record<Quantity, QuantityInfo> = {
   displacement: { name: "Displacement", unit: "mm", scale: 1e-3, range: 5 },
 };
 
+/** Whether a measured frame has what is shown: forces that can't be trusted are not in it, nor is pressure. */
+export function isKnown(frame: LinkFrame, quantity: Quantity): boolean {
+  return quantity !== "pressure" || frame.totalForceN !== undefined;
+}
+
 /** What is computed once for a model: areas that belong to markers, their places at rest. */
 export class MarkerFields {
   private readonly areas: Float64Array;

@@ -1,7 +1,7 @@
 import type { Contact } from "../api/gen/taclink/v1/frame_pb";
 import { useApp } from "../app_state";
 import { lengthOf } from "../model/vectors";
-import { fixed } from "../ui/format";
+import { fixed, newtons } from "../ui/format";
 
 const MOST_ROWS = 6;
 
@@ -9,8 +9,18 @@ const MOST_ROWS = 6;
 export function ContactList({ link }: { link: string }) {
   const store = useApp().store.value;
   store.beat.value;
-  const contacts = [...(store.link(link).newest?.contacts ?? [])];
-  if (contacts.length === 0) return null;
+  const newest = store.link(link).newest;
+  const contacts = [...(newest?.contacts ?? [])];
+  const limit = newest?.detectionLimitN;
+  const around = newest?.detectionLimitAroundN;
+  const hidden =
+    limit === undefined ? null : (
+      <p class="empty">
+        What presses less than {newtons(limit)} may not be found
+        {around === undefined ? "" : `, nor less than ${newtons(around)} all around`}.
+      </p>
+    );
+  if (contacts.length === 0) return hidden;
   contacts.sort((a, b) => b.normalForceN - a.normalForceN);
   const more = contacts.length - MOST_ROWS;
   return (

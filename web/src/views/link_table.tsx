@@ -1,6 +1,7 @@
 import { PressureOrigin } from "../api/gen/taclink/v1/pressure_pb";
 import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
 import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
+import type { Baseline } from "../api/gen/taclink/v1/tare_pb";
 import { selectedLink, useApp } from "../app_state";
 import { lengthOf } from "../model/vectors";
 import { duration, fixed, milliseconds, newtons } from "../ui/format";
@@ -63,6 +64,7 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
   const { link, status, reason, level } = props;
   const record = app.store.value.link(link.name);
   const frame = record.newest;
+  const others = (frame?.statusReasons ?? []).map((each) => each.text).filter((text) => text !== reason);
   const statistics = link.statistics;
   const grid = link.model?.markers;
   const level_word = LEVEL_WORDS[level as keyof typeof LEVEL_WORDS];
@@ -88,8 +90,9 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
         </span>
         {link.supervision > Supervision.RUNNING && <span class="status s5">worker</span>}
         {reason && (
-          <div class="reason" title={reason}>
+          <div class="reason" title={[reason, ...others].join("\n")}>
             {reason}
+            {others.length > 0 && ` (and ${others.length} more)`}
           </div>
         )}
       </td>
@@ -109,7 +112,7 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
       </td>
       <td
         class="numbers"
-        title={frame?.baseline ? `Drift ${fixed(frame.baseline.driftM * 1e3, 2)} mm` : undefined}
+        title={frame?.baseline ? sinceBaseline(frame.baseline, frame.cameraShiftM) : undefined}
       >
         {frame && frame.markersSeen > 0 ? duration(frame.baselineAgeS) : "–"}
       </td>
@@ -121,10 +124,16 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
   );
 }
 
+function sinceBaseline(baseline: Baseline, cameraShiftM: number | undefined): string {
+  const drift = `Drift ${fixed(baseline.driftM * 1e3, 2)} mm`;
+  if (cameraShiftM === undefined) return drift;
+  return `${drift}; by the cameras' own motion markers would be off by ${fixed(cameraShiftM * 1e3, 2)} mm, which is taken off`;
+}
+
 function Pressure({ link }: { link: Link }) {
   const report = useApp().store.value.link(link.name).newest?.pressure;
   if (!report || report.origin === PressureOrigin.NONE)
-    return <span title="Nobody says: taken as 0">0, assumed</span>;
+    return <span title="Nobody tells the pressure: configure pressure_kpa, or a sensor">not known</span>;
   const kpa = fixed(report.pressurePa / PASCALS_PER_KPA, 2);
   const how = report.stale ? ", stale" : report.assumed ? ", assumed" : "";
   return (

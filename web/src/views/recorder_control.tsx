@@ -58,13 +58,28 @@ export function RecorderControl() {
             {now.framesLost > 0n && `, ${now.framesLost} frames lost`}
           </span>
           <OperatorButton onClick={() => void stop()}>Stop</OperatorButton>
-          {now.trouble && <span class="bad small">{now.trouble}</span>}
+          <Trouble now={now} />
         </>
       ) : (
-        <OperatorButton onClick={() => (asking.value = true)}>● Record</OperatorButton>
+        <>
+          <OperatorButton onClick={() => (asking.value = true)}>● Record</OperatorButton>
+          <Trouble now={now} />
+        </>
       )}
       {asking.value && <StartDialog status={now} onClose={() => ((asking.value = false), void look())} />}
     </div>
+  );
+}
+
+/** What is wrong, or was since the recording began: what it lost stays lost. */
+function Trouble({ now }: { now: RecorderStatus }) {
+  if (now.trouble) return <span class="bad small">{now.trouble}</span>;
+  if (!now.lastTrouble) return null;
+  const time = new Date(secondsOf(now.lastTroubleUtcNs) * 1e3).toLocaleTimeString();
+  return (
+    <span class="bad small" title={now.lastTrouble}>
+      trouble at {time}
+    </span>
   );
 }
 

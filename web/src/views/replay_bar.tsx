@@ -94,7 +94,9 @@ function TimeLine({ feed, fromS, toS }: { feed: ReplayFeed; fromS: number; toS: 
     const step = steps[event.key];
     if (step === undefined) return;
     event.preventDefault();
-    void feed.seek(Math.min(toS, Math.max(fromS, positionS + step)));
+    // From where the last key led, which need not be drawn yet.
+    const nowS = feed.positionS.peek();
+    void feed.seek(Math.min(toS, Math.max(fromS, (Number.isFinite(nowS) ? nowS : fromS) + step)));
   };
   return (
     <div

@@ -4,7 +4,7 @@ import type { Link } from "../api/gen/taclink/v1/arm_pb";
 import type { MarkerRange } from "../api/gen/taclink/v1/events_pb";
 import { useApp } from "../app_state";
 import { colourTable, roundUp, StickyRange } from "../skin/colour_map";
-import { MarkerFields, QUANTITIES } from "../skin/fields";
+import { isKnown, MarkerFields, QUANTITIES } from "../skin/fields";
 import { sameShape } from "../skin/same_shape";
 import { outlineFlat, paintFlat } from "../skin/unroll";
 import { fixed } from "../ui/format";
@@ -41,7 +41,7 @@ export function UnrolledMap({ link }: { link: Link }) {
       const frame = store.link(link.name).shape;
       const quantity = app.quantity.value;
       const { scale } = QUANTITIES[quantity];
-      if (!frame) return painter.clear();
+      if (!frame || !isKnown(frame, quantity)) return painter.clear();
       const values = fields.values(frame, quantity);
       range.include(Math.max(...values) / scale);
       painter.paint(values, range.top * scale, colourTable(app.colourMap.value));
@@ -118,6 +118,8 @@ function Readout(props: { link: Link; cell: Cell | undefined; fields: MarkerFiel
   const frame = store.link(link.name).shape;
   if (!frame) return <p class="readout empty">Nothing is measured now: see the link's status.</p>;
   const top = roundUp(props.top);
+  if (!isKnown(frame, app.quantity.value))
+    return <p class="readout empty">No forces are known now: see the link's status.</p>;
   if (!cell)
     return (
       <p class="readout numbers">
@@ -125,14 +127,14 @@ function Readout(props: { link: Link; cell: Cell | undefined; fields: MarkerFiel
       </p>
     );
   const marker = cell.ring * link.model!.markers!.paths + cell.path;
-  const pressure = fields.values(frame, "pressure")[marker] / 1e3;
+  const pressure = isKnown(frame, "pressure") ? fields.values(frame, "pressure")[marker] / 1e3 : undefined;
   const move = fields.values(frame, "displacement")[marker] * 1e3;
   const force = frame.nodalForcesN.slice(3 * marker, 3 * marker + 3);
   const sigma = frame.nodalForceSigmasN[marker];
   return (
     <p class="readout numbers" aria-live="polite">
-      path {cell.path}, ring {cell.ring}: {fixed(pressure, 1)} kPa, {fixed(move, 2)} mm,{" "}
-      {force.length === 3 ? `${fixed(Math.hypot(...force), 3)} N` : "–"}
+      path {cell.path}, ring {cell.ring}: {pressure === undefined ? "–" : `${fixed(pressure, 1)} kPa`},{" "}
+      {fixed(move, 2)} mm, {force.length === 3 ? `${fixed(Math.hypot(...force), 3)} N` : "–"}
       {sigma > 0 ? ` ± ${fixed(sigma, 3)} N` : ""}
     </p>
   );

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import weakref
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from typing import Any, Generic, TypeVar
@@ -51,6 +52,7 @@ class Connection:
         self.closed = False
         self._settings = settings
         self._channel: Channel | None = None
+        self._streams: weakref.WeakSet[Stream[Any]] = weakref.WeakSet()
 
     def channel(self) -> Channel:
         if self.closed:
@@ -75,18 +77,36 @@ class Connection:
         error.__traceback__ = None
         return errors.from_rpc(error, self.address)
 
+    def hold(self, stream: Stream[Any]) -> None:
+        """close() ends it; the channel would only find calls that a task reads without anything in between."""
+        self._streams.add(stream)
+
     async def close(self) -> None:
         self.closed = True
+        for stream in tuple(self._streams):
+            await stream.close()
         if self._channel is not None:
             await self._channel.close()
+
+
+async def outcome_of(call: Any) -> Any:
+    """The next message, EOF, or the error in place of it, as a value.
+
+    A read outlives the task that waits for it, and nobody may ever ask what became of it; an exception that it raised
+    would then be printed by asyncio.run() as unhandled.
+    """
+    try:
+        return await call.read()
+    except (grpc.RpcError, asyncio.CancelledError) as error:
+        return error
 
 
 class Stream(StreamState[T], AsyncIterator[T]):
     """Messages of a server as they come: `async for`, in one task. Opened by the first message, or `async with`.
 
-    A task that stops waiting for a message (asyncio.wait_for) does not end the stream; close() does, the end of
-    an `async with`, and leaving a loop over a stream that nobody else holds. Errors: as of the streams that block;
-    what the server refuses with is raised by `async with`, or in place of the first message.
+    A task that stops waiting for a message (asyncio.wait_for) does not end a stream that is open; close() does, the
+    end of an `async with`, the client's close(), and leaving a loop over a stream that nobody else holds. Errors: as
+    of the streams that block; what the server refuses with is raised by `async with`, or in place of the first message.
     """
 
     def __init__(
@@ -101,6 +121,7 @@ class Stream(StreamState[T], AsyncIterator[T]):
         self._waiting: deque[T] = deque()  # read to see the server accept
         self._call: Any = None
         self._reading: asyncio.Future[Any] | None = None
+        connection.hold(self)
 
     async def __anext__(self) -> T:
         if self._call is None and not self._closed.is_set():
@@ -147,16 +168,19 @@ class Stream(StreamState[T], AsyncIterator[T]):
         if not self._answers_at_once:
             return
         try:
-            message = await asyncio.wait_for(call.read(), self._timeout_s)
+            message = await self._next_outcome(self._timeout_s)
         except asyncio.TimeoutError as error:
             call.cancel()
             raise errors.timed_out(self._connection.address) from error
-        except grpc.RpcError as error:
-            raise self._connection.failure(error, self._channel) from error
         except asyncio.CancelledError:
-            if self._ended_here():
-                raise errors.Cancelled("the stream was closed") from None
+            call.cancel()
             raise
+        if isinstance(message, BaseException) and self._ended_here():
+            raise errors.Cancelled("the stream was closed")
+        if isinstance(message, grpc.RpcError):
+            raise self._connection.failure(message, self._channel) from message
+        if isinstance(message, BaseException):
+            raise message
         if message is grpc.aio.EOF:
             raise errors.ended_by_server("it sent nothing", self._connection.address)
         item = self._take(message)
@@ -166,30 +190,26 @@ class Stream(StreamState[T], AsyncIterator[T]):
     def _ended_here(self) -> bool:
         return self._closed.is_set() or self._connection.closed
 
-    async def _next_message(self) -> Any:
-        """The read goes on when who waits for it is cancelled."""
+    async def _next_outcome(self, timeout_s: float | None = None) -> Any:
+        """The read goes on when who waits for it is cancelled, or waits no longer (TimeoutError)."""
         if self._reading is None:
-            self._reading = asyncio.ensure_future(self._call.read())
+            self._reading = asyncio.ensure_future(outcome_of(self._call))
         reading = self._reading
-        try:
-            message = await asyncio.shield(reading)
-        finally:
-            if reading.done():
-                self._reading = None
-        return message
+        done, _ = await asyncio.wait((reading,), timeout=timeout_s)
+        if not done:
+            raise asyncio.TimeoutError
+        self._reading = None
+        return reading.result()
 
     async def _read(self) -> T | None:
         """None: nothing for the user, or the stream was opened again."""
-        try:
-            message = await self._next_message()
-        except asyncio.CancelledError:
+        message = await self._next_outcome()
+        if isinstance(message, BaseException):
             if self._ended_here():
-                raise StopAsyncIteration from None
-            raise
-        except grpc.RpcError as error:
-            if self._ended_here():
-                raise StopAsyncIteration from None
-            await self._recover(self._broken(error))
+                raise StopAsyncIteration
+            if not isinstance(message, grpc.RpcError):
+                raise message
+            await self._recover(self._broken(message))
             return None
         if message is grpc.aio.EOF:
             self._closed.set()

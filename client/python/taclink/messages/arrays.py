@@ -49,6 +49,11 @@ def vector(message: Any) -> FloatArray:
     return numbers((message.x, message.y, message.z))
 
 
+def unknown_vector() -> FloatArray:
+    """Shape (3,); NaN."""
+    return numbers((np.nan, np.nan, np.nan))
+
+
 def covariances(values: Sequence[float]) -> FloatArray:
     """Shape (n, 3, 3); of upper triangles, row by row."""
     array: FloatArray = _frozen(rows(values, 6)[:, _SYMMETRIC].reshape(-1, 3, 3))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from taclink.messages.arm import Pose, pose_from
-from taclink.messages.arrays import FloatArray, alike, covariance, vector
+from taclink.messages.arrays import FloatArray, alike, covariance, unknown_vector, vector
 from taclink.messages.frame import FrameTimes, times_from
 from taclink.names import LinkStatus, PoseValidity, name_of
 from taclink.v1 import contacts_pb2
@@ -41,6 +41,7 @@ class LinkContacts:
     times: FrameTimes
     base_from_link: Pose  # at the exposure of that frame
     validity: PoseValidity
+    forces_unknown: bool  # it may be pressed; total and joint torques are without it
     joint_state_distance_s: float | None  # to the nearest joint state used; None: there is none
 
 
@@ -57,9 +58,9 @@ class JointTorque:
 class ArmContacts:
     links: tuple[LinkContacts, ...]
     contacts: tuple[ArmContact, ...]
-    total_force_n: FloatArray  # (3,)
-    total_moment_nm: FloatArray  # (3,), about the base frame's origin
-    joints: tuple[JointTorque, ...]  # from the base to the tips
+    total_force_n: FloatArray  # (3,), of links whose forces are known; NaN: those of no link are
+    total_moment_nm: FloatArray  # (3,), likewise, about the base frame's origin
+    joints: tuple[JointTorque, ...]  # likewise, from the base to the tips; empty: not known, or there are none
     validity: PoseValidity  # the worst of the links with contacts
     sequence: int  # of this stream's messages, from 1
     utc_ns: int  # when the server made it
@@ -102,13 +103,14 @@ def _torques_from(message: contacts_pb2.StreamContactsResponse) -> tuple[JointTo
 
 
 def arm_contacts_from(message: contacts_pb2.StreamContactsResponse, client_utc_ns: int = 0) -> ArmContacts:
+    known = message.HasField("total")
     return alike(
         ArmContacts,
         message,
         links=tuple(_link_from(link, client_utc_ns) for link in message.links),
         contacts=tuple(map(_contact_from, message.contacts)),
-        total_force_n=vector(message.total.force_n),
-        total_moment_nm=vector(message.total.moment_nm),
+        total_force_n=vector(message.total.force_n) if known else unknown_vector(),
+        total_moment_nm=vector(message.total.moment_nm) if known else unknown_vector(),
         joints=_torques_from(message),
         validity=name_of(PoseValidity, message.validity),
     )

@@ -15,6 +15,7 @@ from taclink.messages.arrays import (
     optional,
     rows,
     small_numbers,
+    unknown_vector,
     vector,
     whole_numbers,
 )
@@ -25,6 +26,7 @@ from taclink.names import (
     ForceModel,
     LinkStatus,
     PressureOrigin,
+    Reason,
     TrackingMode,
     name_of,
 )
@@ -55,8 +57,12 @@ class Contact:
 class StatusReason:
     """Why a frame is worse than it could be."""
 
-    id: str  # stable
+    reason: Reason
+    id: str  # its name, also of one that only a newer server knows
     text: str  # for people, with what to do
+    value: float | None  # the reason's number; None: it has none
+    limit: float | None  # where it begins to be told
+    unit: str  # "m", "Pa", "s"; empty: a number of markers, or a ratio
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -110,7 +116,7 @@ class PressureReport:
     """How the pressure inside a skin is known."""
 
     origin: PressureOrigin
-    assumed: bool  # configured, or taken as 0: not measured
+    assumed: bool  # configured, or told by nobody: not measured
     stale: bool  # the sensor's newest reading is too old, or there is none
     pressure_pa: float  # gauge
     age_s: float | None  # from the reading to the exposure; None: there is no reading
@@ -138,7 +144,7 @@ class Frame:
     markers_seen: int
     markers_inferred: int
     contacts: tuple[Contact, ...]
-    total_force_n: FloatArray  # (3,)
+    total_force_n: FloatArray  # (3,); NaN: no forces are known, and contacts is empty (see status_reason)
     force_model: ForceModel
     baseline_age_s: float
     baseline: Baseline
@@ -147,6 +153,16 @@ class Frame:
     tracking_mode: TrackingMode
     acquire_reason: AcquireReason
     labels_rejected: int
+    # A body that presses less may not be found, N; of all markers the largest. None: no forces are known, or
+    # their model (literal) tells none.
+    detection_limit_n: float | None
+    # The same of what presses alike all around at one place along the link: its sum, where it shows least.
+    detection_limit_around_n: float | None
+    # RMS of what the forces do not explain, in standard deviations. None: no forces are known.
+    force_residual: float | None
+    # How far cameras that have moved or changed since the baseline would put markers off, of the marker that
+    # they put off most; taken off shape and forces. None: no forces are known, or an older version's log.
+    camera_shift_m: float | None
     unchanged: bool  # within the stream's deadband
     replayed: bool  # from a log: the times are those of then
     # Detail geometry.
@@ -157,7 +173,7 @@ class Frame:
     nodal_forces_n: FloatArray  # (markers, 3)
     nodal_force_sigmas_n: FloatArray  # (markers,), along the normal; 0 where the force is 0
     marker_sources: ByteArray  # (markers,), of MarkerSource
-    force_residual: float  # RMS that the forces do not explain, in standard deviations
+    detection_limits_n: FloatArray  # (markers,), as detection_limit_n
     force_converged: bool
 
     @property
@@ -209,6 +225,20 @@ def _pressure_from(message: pressure_pb2.PressureReport) -> PressureReport:
     )
 
 
+_REASONS = {reason.value for reason in Reason}
+
+
+def _reason_from(message: frame_pb2.StatusReason) -> StatusReason:
+    return alike(
+        StatusReason,
+        message,
+        # All versions send the name.
+        reason=Reason(message.id) if message.id in _REASONS else Reason.UNKNOWN,
+        value=optional(message, "value"),
+        limit=optional(message, "limit"),
+    )
+
+
 def frame_from(message: frame_pb2.LinkFrame, client_utc_ns: int = 0, gap: int | None = None) -> Frame:
     return alike(
         Frame,
@@ -219,24 +249,31 @@ def frame_from(message: frame_pb2.LinkFrame, client_utc_ns: int = 0, gap: int | 
         detail=name_of(Detail, message.detail),
         pressure_pa=optional(message, "pressure_pa"),
         pressure=_pressure_from(message.pressure) if message.HasField("pressure") else None,
-        status_reasons=tuple(alike(StatusReason, reason) for reason in message.status_reasons),
+        status_reasons=tuple(map(_reason_from, message.status_reasons)),
         pressure_estimate=alike(PressureEstimate, message.pressure_estimate)
         if message.HasField("pressure_estimate")
         else None,
         contacts=tuple(map(_contact_from, message.contacts)),
-        total_force_n=vector(message.total_force_n),
+        total_force_n=vector(message.total_force_n)
+        if message.HasField("total_force_n")
+        else unknown_vector(),
         force_model=name_of(ForceModel, message.force_model),
         baseline=baseline_from(message.baseline),
         stage_times=alike(StageTimes, message.stage_times),
         cameras=tuple(alike(CameraCounts, camera) for camera in message.cameras),
         tracking_mode=name_of(TrackingMode, message.tracking_mode),
         acquire_reason=name_of(AcquireReason, message.acquire_reason),
+        detection_limit_n=optional(message, "detection_limit_n"),
+        detection_limit_around_n=optional(message, "detection_limit_around_n"),
+        force_residual=optional(message, "force_residual"),
+        camera_shift_m=optional(message, "camera_shift_m"),
         positions_m=rows(message.positions_m, 3),
         displacements_m=rows(message.displacements_m, 3),
         displacement_covariances_m2=covariances(message.displacement_covariances_m2),
         nodal_forces_n=rows(message.nodal_forces_n, 3),
         nodal_force_sigmas_n=numbers(message.nodal_force_sigmas_n),
         marker_sources=small_numbers(message.marker_sources),
+        detection_limits_n=numbers(message.detection_limits_n),
         force_converged=not message.force_not_converged,
     )
 

@@ -19,6 +19,8 @@ from taclink.v1 import log_pb2, recording_pb2
 class RecorderStatus:
     state: RecorderState
     trouble: str  # what is wrong and what to do; empty: nothing
+    last_trouble: str  # of this recording, also when it is over; empty: none
+    last_trouble_utc_ns: int  # when it was told
     log: str  # that is being written, or was last
     started_utc_ns: int  # 0: nothing was recorded yet
     bytes: int  # of this recording, over all its logs

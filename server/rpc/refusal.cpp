@@ -1,4 +1,4 @@
-#include "server/rpc/refused_stream.h"
+#include "server/rpc/refusal.h"
 
 #include <spdlog/spdlog.h>
 
@@ -18,9 +18,17 @@ class RefusedStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
 
 }  // namespace
 
+grpc::ServerUnaryReactor* RefuseCall(grpc::CallbackServerContext& context, const char* method,
+                                     const Error& error) {
+  SPDLOG_INFO("{}: {} refused: {}", PeerOf(context), method, error.message);
+  grpc::ServerUnaryReactor* const reactor = context.DefaultReactor();
+  reactor->Finish(ToGrpc(error));
+  return reactor;
+}
+
 grpc::ServerWriteReactor<grpc::ByteBuffer>* RefuseStream(const grpc::CallbackServerContext& context,
                                                          const char* method, const Error& error) {
-  spdlog::info("{}: {} refused: {}", PeerOf(context), method, error.message);
+  SPDLOG_INFO("{}: {} refused: {}", PeerOf(context), method, error.message);
   return new RefusedStream(error);  // deletes itself when gRPC is done with it
 }
 

@@ -1,0 +1,35 @@
+// Limits of detection: the part of LoadEstimator about what it can't see.
+#include <algorithm>
+#include <cmath>
+
+#include "sensing/estimation/load_estimator.h"
+#include "sensing/mechanics/dense.h"
+
+namespace taclink {
+
+// A load of F at a site is expected to explain chi^2 = F^2 |column|^2 and has to explain kHillGain, beside
+// noise of one standard deviation in the root of it.
+// A band is let in by the penalty of Select, a body by what it has to explain.
+const DetectionLimits& LoadEstimator::Limits() {
+  const int sites = mechanics_.site_count();
+  if (limits_.by_site_n.size() == sites) return limits_;
+  constexpr double kSurely = 1.645;  // standard deviations: 95 of 100
+  Eigen::VectorXf squares = gram_.diagonal();
+  if (hidden_.cols() > 0) {
+    Eigen::MatrixXf shadows;
+    dense::TransposedProduct(hidden_.cast<float>(), columns_, shadows);
+    squares -= shadows.colwise().squaredNorm().transpose();
+  }
+  squares = squares.cwiseMax(kRounding * gram_.diagonal());
+  const Eigen::VectorXd sigmas_n = squares.cast<double>().cwiseSqrt().cwiseInverse();
+  const double least_n = kLeastHillN * mechanics_.force_unit();
+  limits_.by_site_n = ((std::sqrt(kHillGain) + kSurely) * sigmas_n.head(sites)).cwiseMax(least_n);
+  limits_.around_n = least_n;
+  for (int row = 0; row < mechanics_.site_rows(); ++row) {
+    if (!mechanics_.IsBeyondMarkers(row * mechanics_.columns()))
+      limits_.around_n = std::max(limits_.around_n, (kBandSparsity + kSurely) * sigmas_n[sites + row]);
+  }
+  return limits_;
+}
+
+}  // namespace taclink

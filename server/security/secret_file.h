@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include "sensing/core/result.h"
+
+namespace taclink::server {
+
+/// A file that only the server, and who is in its group, may read or write: a private key, a password, the
+/// hashes of tokens. A group that may read it must be root's or one of the server's. `what` names its use in
+/// messages. Errors: kNotFound, kPermissionDenied with what to do.
+Result<void> CheckSecretFile(const std::string& what, const std::string& path);
+
+/// Its content. Errors: likewise, and those of ReadFile.
+Result<std::string> ReadSecretFile(const std::string& what, const std::string& path);
+
+/// The same where anybody may read it. Errors: those of ReadFile, with `what` before.
+Result<std::string> ReadSecurityFile(const std::string& what, const std::string& path);
+
+}  // namespace taclink::server
