@@ -5,16 +5,21 @@
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/client_interceptor.h>
 
+#include <chrono>
 #include <utility>
 #include <vector>
 
+#include "client/patience.h"
 #include "sensing/core/read_file.h"
 
 namespace taclink::client {
 namespace {
 
+using std::chrono::milliseconds;
+
 constexpr int kKeepaliveMs = 10'000;
-constexpr int kKeepaliveTimeoutMs = 5'000;
+constexpr milliseconds kKeepalivePatience{5'000};
+constexpr milliseconds kAttemptPatience{20'000};  // gRPC's own, of one attempt to connect
 
 // gRPC's own call credentials refuse to go without TLS, also to this machine itself.
 class TokenInterceptor final : public grpc::experimental::Interceptor {
@@ -79,6 +84,8 @@ Result<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const Credenti
 
 Result<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
                                                    const Credentials& credentials) {
+  const auto attempt = PatienceFromEnvironment(kAttemptPatience);
+  if (!attempt) return attempt.error();
   auto secrets = MakeCredentials(credentials);
   if (!secrets) return secrets.error();
   if (!credentials.token.empty() && credentials.ca_file.empty() && !StaysHere(address))
@@ -90,8 +97,9 @@ Result<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   // A server that is cut off says nothing: it is asked while calls are open, also when none of them sends.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, static_cast<int>(Patience(kKeepalivePatience).count()));
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, static_cast<int>(attempt->count()));  // not a pause
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
   if (!credentials.token.empty())
     interceptors.push_back(std::make_unique<TokenInterceptorFactory>(credentials.token));

@@ -10,7 +10,8 @@
 namespace taclink::client {
 
 /// A channel whose every call carries the token, if there is one. Errors: kNotFound (a file),
-/// kInvalidArgument (a token in the clear to another machine; a certificate without its key or TLS).
+/// kInvalidArgument (a token in the clear to another machine; a certificate without its key or TLS;
+/// TACLINK_PATIENCE_S).
 Result<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
                                                    const Credentials& credentials);
 

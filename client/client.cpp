@@ -5,6 +5,7 @@
 #include "client/channel.h"
 #include "client/connection.h"
 #include "client/messages.h"
+#include "client/patience.h"
 #include "client/stream_call.h"
 #include "taclink/v1/operations.grpc.pb.h"
 #include "taclink/v1/tactile.grpc.pb.h"
@@ -15,6 +16,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::system_clock;
 
+constexpr milliseconds kConnectPatience{3000};
+
 int64_t UtcNowNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(system_clock::now().time_since_epoch()).count();
 }
@@ -24,6 +27,17 @@ Error NoServer(const std::string& address) {
           "no server answers at " + address +
               "; start taclinkd there or choose another with --server; a server with TLS needs --tls-ca, one "
               "with client_ca also --tls-certificate and --tls-key"};
+}
+
+// More than the usual time is for a server that is slow to answer, not for one that is not there.
+bool WaitForServer(grpc::Channel& channel, milliseconds patience) {
+  const auto begin = system_clock::now();
+  if (channel.WaitForConnected(begin + kConnectPatience)) return true;
+  auto state = channel.GetState(true);
+  while ((state == GRPC_CHANNEL_IDLE || state == GRPC_CHANNEL_CONNECTING) &&
+         channel.WaitForStateChange(state, begin + patience))
+    state = channel.GetState(true);
+  return state == GRPC_CHANNEL_READY;
 }
 
 ErrorCode CodeOf(grpc::StatusCode code) {
@@ -107,21 +121,29 @@ const std::vector<StreamCounts>& FrameReader::counts() const {
   return call_->counts;
 }
 
+milliseconds Patience(milliseconds usual) {
+  const auto patience = PatienceFromEnvironment(usual);
+  return patience ? *patience : usual;  // Connect tells what is wrong
+}
+
 Client::Client(std::shared_ptr<Connection> connection) : connection_(std::move(connection)) {}
 Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 
+Result<Client> Client::Connect(const std::string& address, const Credentials& credentials) {
+  auto channel = MakeChannel(address, credentials);
+  if (!channel) return channel.error();
+  if (!WaitForServer(**channel, Patience(kConnectPatience))) return NoServer(address);
+  return Client(std::make_shared<Connection>(address, *std::move(channel)));
+}
+
 Result<Client> Client::Connect(const std::string& address, milliseconds timeout,
                                const Credentials& credentials) {
   auto channel = MakeChannel(address, credentials);
   if (!channel) return channel.error();
-  auto connection = std::make_shared<Connection>();
-  connection->address = address;
-  connection->channel = std::move(*channel);
-  if (!connection->channel->WaitForConnected(system_clock::now() + timeout)) return NoServer(address);
-  connection->stub = v1::TactileService::NewStub(connection->channel);
-  return Client(std::move(connection));
+  if (!(*channel)->WaitForConnected(system_clock::now() + timeout)) return NoServer(address);
+  return Client(std::make_shared<Connection>(address, *std::move(channel)));
 }
 
 Result<Arm> Client::GetArm(milliseconds timeout) {

@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "client/taclink/client.h"
 #include "taclink/v1/tactile.grpc.pb.h"
@@ -14,6 +15,9 @@ namespace taclink::client {
 // Internal to the library.
 
 struct Client::Connection {
+  Connection(std::string server, std::shared_ptr<grpc::Channel> over)
+      : address(std::move(server)), channel(std::move(over)), stub(v1::TactileService::NewStub(channel)) {}
+
   std::string address;
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<v1::TactileService::Stub> stub;

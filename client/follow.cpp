@@ -14,7 +14,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kConnectTimeout{3000};
 constexpr milliseconds kWait{60'000};  // of one read; then it is waited on again
 const Error kStopped{ErrorCode::kEndOfData, "stopped"};
 
@@ -87,7 +86,7 @@ class Subscription::Worker {
   void Run() {
     running_here = this;
     while (!stopping()) {
-      auto client = Client::Connect(options_.address, kConnectTimeout, options_.credentials);
+      auto client = Client::Connect(options_.address, options_.credentials);
       const Error error = client ? read_(*this, *client) : client.error();
       if (stopping()) break;
       if (IsForGood(error.code)) {

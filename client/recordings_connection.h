@@ -17,7 +17,7 @@ namespace taclink::client {
 
 struct Recordings::Connection {
   // Stopping waits for the disk, listing reads logs that were not looked at before.
-  static constexpr std::chrono::seconds kTimeout{60};
+  static constexpr std::chrono::seconds kPatience{60};
 
   std::string address;
   std::shared_ptr<grpc::Channel> channel;
@@ -27,7 +27,7 @@ struct Recordings::Connection {
   template <typename F>
   Result<void> Ask(const F& call) const {
     grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + kTimeout);
+    context.set_deadline(std::chrono::system_clock::now() + Patience(kPatience));
     const grpc::Status status = call(context);
     if (!status.ok()) return FromStatus(status, address);
     return {};

@@ -8,73 +8,95 @@ set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 add_library(taclink_flags INTERFACE)
 target_compile_options(taclink_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -Werror)
 target_include_directories(taclink_flags INTERFACE "${PROJECT_SOURCE_DIR}")
-# The presets compile the sources of a target eight together, for most read the same headers: a cold build takes a third
-# of the time. Names in unnamed namespaces may meet, then. The presets tsan and lint compile each source by itself.
 # GCC takes sources that are included for headers.
-if(CMAKE_UNITY_BUILD)
+if(TACLINK_BATCH_SIZE GREATER 1)
   target_compile_options(taclink_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endif()
+# Sanitizers instrument the code that parses foreign bytes or manages memory. The numerical libraries (taclink_library's
+# NUMERICAL) are optimized and not instrumented in the address sanitizer's build, with assertions on.
+add_library(taclink_instrumented INTERFACE)
+target_link_libraries(taclink_instrumented INTERFACE taclink_flags)
 if(TACLINK_SANITIZER)
   # Eigen aligns by hand under a sanitizer, but not in Ceres' library, whose copies of Eigen's functions may be linked.
   target_compile_definitions(taclink_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
-  # GCC warns of uninitialised values that are not there once the sanitizers change the code.
-  target_compile_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER} -fno-sanitize-recover=all
-                                                 $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+  # GCC warns of uninitialized values that do not exist once the sanitizers change the code.
+  target_compile_options(taclink_instrumented INTERFACE -fsanitize=${TACLINK_SANITIZER} -fno-sanitize-recover=all
+                                                        $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_options(taclink_flags INTERFACE -fsanitize=${TACLINK_SANITIZER})
   if(TACLINK_SANITIZER MATCHES "undefined")
     set(fuzzed $<BOOL:$<TARGET_PROPERTY:TACLINK_FUZZED>>)
-    set(fewer_checks -fno-sanitize=null$<COMMA>alignment$<COMMA>object-size$<COMMA>pointer-overflow)
     # Checks of every access, most of which the address sanitizer makes as well: with them Eigen's code takes twice as
-    # long to compile. What is fuzzed has them.
+    # long to compile. Fuzzed code has them.
+    set(fewer_checks -fno-sanitize=null$<COMMA>alignment$<COMMA>object-size$<COMMA>pointer-overflow)
     # What -fsanitize=fuzzer-no-link sets.
     set(coverage -fsanitize-coverage=inline-8bit-counters$<COMMA>indirect-calls$<COMMA>trace-cmp$<COMMA>pc-table)
-    target_compile_options(taclink_flags INTERFACE $<IF:${fuzzed},${coverage},${fewer_checks}>)
+    target_compile_options(taclink_instrumented INTERFACE $<IF:${fuzzed},${coverage},${fewer_checks}>)
   endif()
 endif()
 # clang warns of more than GCC; the builds by GCC are strict.
 target_compile_options(taclink_flags INTERFACE $<$<CXX_COMPILER_ID:Clang>:-Wno-error>)
 
-# taclink_library(NAME SOURCES ... LINKS ...): one static library a folder; LINKS are public.
-function(taclink_library name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
-  add_library(${name} STATIC ${arg_SOURCES})
-  target_link_libraries(${name} PUBLIC taclink_flags ${arg_LINKS})
-endfunction()
+# Sources are compiled TACLINK_BATCH_SIZE together, because most read the same headers: a cold build takes a third of the
+# time. Names in unnamed namespaces must therefore differ within a target; the presets tsan and lint compile each source by
+# itself. CMake's own unity build is not used: its files name sources by absolute path, so that no other checkout could take
+# an object from the compiler cache.
+set(TACLINK_BATCH_SIZE 1 CACHE STRING "Sources that are compiled together")
 
-# taclink_fast(TARGET [SOURCES ...]): all or these of its sources are compiled at -O3.
-function(taclink_fast target)
-  if(ARGN)
-    set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O3>")
-  else()
-    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O3>)
-  endif()
-endfunction()
-
-# The programs of the tests labelled slow or vm, and of all others.
-add_custom_target(slow_tests)
-add_custom_target(quick_tests)
-
-# taclink_test(NAME SOURCES ... LINKS ... [LABELS ...] [TIMEOUT seconds]): one GoogleTest program, its cases
-# known to ctest. Under a sanitizer all of them run in one process, for each start would take longer than most cases.
-function(taclink_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
-  if(NOT arg_TIMEOUT)
-    set(arg_TIMEOUT 300)
-  endif()
-  add_executable(${name} ${arg_SOURCES})
-  target_link_libraries(${name} PRIVATE taclink_flags ${arg_LINKS} GTest::gtest_main GTest::gmock)
-  target_compile_definitions(${name} PRIVATE TACLINK_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
-  if("slow" IN_LIST arg_LABELS)
-    add_dependencies(slow_tests ${name})
-  else()
-    add_dependencies(quick_tests ${name})
-  endif()
-  if(TACLINK_SANITIZER)
-    add_test(NAME ${name} COMMAND ${name} --gtest_brief=1)
-    set_tests_properties(${name} PROPERTIES TIMEOUT 1200 LABELS "${arg_LABELS}")
+# taclink_batches(TARGET RESULT SOURCES ...): the sources to compile instead of these, as absolute paths.
+function(taclink_batches target result)
+  set(paths "")
+  foreach(source IN LISTS ARGN)
+    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
+    list(APPEND paths "${source}")
+  endforeach()
+  list(LENGTH paths count)
+  if(count LESS 2 OR TACLINK_BATCH_SIZE LESS 2)
+    set(${result} "${paths}" PARENT_SCOPE)
     return()
   endif()
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}")
+  set(batches "")
+  math(EXPR last "${count} - 1")
+  foreach(first RANGE 0 ${last} ${TACLINK_BATCH_SIZE})
+    list(SUBLIST paths ${first} ${TACLINK_BATCH_SIZE} batch)
+    set(content "")
+    foreach(path IN LISTS batch)
+      cmake_path(RELATIVE_PATH path BASE_DIRECTORY "${PROJECT_SOURCE_DIR}")
+      string(APPEND content "#include \"${path}\"\n")
+    endforeach()
+    set(file "${CMAKE_CURRENT_BINARY_DIR}/${target}_${first}.cpp")
+    file(CONFIGURE OUTPUT "${file}" CONTENT "${content}" @ONLY)  # written only if it differs
+    list(APPEND batches "${file}")
+  endforeach()
+  set(${result} "${batches}" PARENT_SCOPE)
+endfunction()
+
+# taclink_library(NAME SOURCES ... [FAST ...] LINKS ... [NUMERICAL]): one static library a folder; LINKS are public. The
+# FAST sources, each by itself, and those of a NUMERICAL library are compiled at -O3.
+function(taclink_library name)
+  cmake_parse_arguments(arg "NUMERICAL" "" "SOURCES;FAST;LINKS" ${ARGN})
+  taclink_batches(${name} sources ${arg_SOURCES})
+  add_library(${name} STATIC ${sources} ${arg_FAST})
+  target_link_libraries(${name} PUBLIC taclink_flags ${arg_LINKS})
+  set(optimize "$<$<CONFIG:Release>:-O3>")
+  if(arg_FAST)
+    set_source_files_properties(${arg_FAST} PROPERTIES COMPILE_OPTIONS "${optimize}")
+  endif()
+  if(NOT arg_NUMERICAL)
+    target_link_libraries(${name} PRIVATE taclink_instrumented)
+  elseif(TACLINK_SANITIZER MATCHES "address")
+    target_compile_options(${name} PRIVATE -O2)
+  else()
+    target_link_libraries(${name} PRIVATE taclink_instrumented)
+    target_compile_options(${name} PRIVATE "${optimize}")
+  endif()
+endfunction()
+
+# taclink_program(NAME SOURCES ... LINKS ...)
+function(taclink_program name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
+  taclink_batches(${name} sources ${arg_SOURCES})
+  add_executable(${name} ${sources})
+  target_link_libraries(${name} PRIVATE taclink_instrumented ${arg_LINKS})
 endfunction()
 
 # taclink_embed(TARGET FUNCTION NAME FILES ...): files become `std::span<const EmbeddedFile> FUNCTION()`.

@@ -83,7 +83,9 @@ SourceConfig Reader::ReadSource(YamlMap& link) const {
       return config;
     }
     default:
-      return SimulatedSourceConfig{.scene = NameOrPath(link.Text("scene"))};
+      return SimulatedSourceConfig{
+          .scene = NameOrPath(link.Text("scene")),
+          .pace = static_cast<ScenePace>(link.Choice("pace", {kPaceNames.begin(), kPaceNames.end()}, 0))};
   }
 }
 

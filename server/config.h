@@ -12,6 +12,7 @@
 #include "sensing/core/geometry.h"
 #include "sensing/core/result.h"
 #include "sensing/pipeline/drift_options.h"
+#include "sensing/simulation/scene_pace.h"
 #include "server/config_http.h"
 #include "server/config_kinematics.h"
 #include "server/config_limits.h"
@@ -47,6 +48,7 @@ struct FileSourceConfig {
 
 struct SimulatedSourceConfig {
   std::string scene;  ///< name of a shipped one or path
+  ScenePace pace = ScenePace::kFrames;
 };
 
 using SourceConfig = std::variant<V4l2SourceConfig, FileSourceConfig, SimulatedSourceConfig>;

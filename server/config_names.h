@@ -11,7 +11,8 @@ namespace taclink::server {
 // Words of the configuration file, shared by its reader and its writer.
 inline constexpr int kConfigVersion = 1;
 inline constexpr std::array<std::string_view, 3> kSourceNames = {"v4l2", "files",
-                                                                 "simulated"};  // as SourceConfig
+                                                                 "simulated"};      // as SourceConfig
+inline constexpr std::array<std::string_view, 2> kPaceNames = {"frames", "clock"};  // as ScenePace
 /// "auto", then as kCameraFormats.
 inline constexpr std::array<std::string_view, 4> kFormatNames = {"auto", "yuyv", "mjpeg", "grey"};
 inline constexpr std::array<PixelFormat, 3> kCameraFormats = {PixelFormat::kYuyv, PixelFormat::kMjpeg,

@@ -53,7 +53,8 @@ struct SourceWriter {
         << "      yuyv: " << (files.yuyv ? "true" : "false") << "\n";
   }
   void operator()(const SimulatedSourceConfig& simulated) const {
-    out << "      scene: " << Quoted(simulated.scene) << "\n";
+    out << "      scene: " << Quoted(simulated.scene) << "\n"
+        << "      pace: " << kPaceNames[static_cast<size_t>(simulated.pace)] << "\n";
   }
 };
 

@@ -119,6 +119,7 @@ void LinkWorker::Capture(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     capture_mark_.Begin(WorkStage::kWait, clock_.MonotonicNs());
     cameras_.CarryOut(supervisor_);
+    if (supervisor_.WaitsForReader() && !mailbox_.WaitUntilTaken(options_.poll)) continue;
     if (!supervisor_.Next(frame, options_.poll)) continue;
     if (options_.pressure) options_.pressure->Apply(frame);
     frame.pressure.mpa = ExactInPascals(frame.pressure.mpa);

@@ -24,12 +24,21 @@ class Mailbox {
     filled_.notify_one();
   }
 
+  /// Waits until the place is empty. False: the last value was not taken in time.
+  bool WaitUntilTaken(std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    return taken_.wait_for(lock, timeout, [this] { return !full_; });
+  }
+
   /// Waits for a value and swaps it with `value`. False: none came in time, `value` is untouched.
   bool Take(T& value, std::chrono::milliseconds timeout) {
-    std::unique_lock lock(mutex_);
-    if (!filled_.wait_for(lock, timeout, [this] { return full_; })) return false;
-    std::swap(value, place_);
-    full_ = false;
+    {
+      std::unique_lock lock(mutex_);
+      if (!filled_.wait_for(lock, timeout, [this] { return full_; })) return false;
+      std::swap(value, place_);
+      full_ = false;
+    }
+    taken_.notify_one();
     return true;
   }
 
@@ -41,7 +50,7 @@ class Mailbox {
 
  private:
   mutable std::mutex mutex_;
-  std::condition_variable filled_;
+  std::condition_variable filled_, taken_;
   // Guarded by mutex_.
   T place_{};
   bool full_ = false;

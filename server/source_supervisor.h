@@ -47,6 +47,9 @@ class SourceSupervisor {
   /// As FrameSource::SetCamera. Next's thread.
   Result<void> SetCamera(CameraId id, const CameraSettings& settings);
 
+  /// As FrameSource::WaitsForReader.
+  bool WaitsForReader() const { return source_->WaitsForReader(); }
+
   SourceCondition condition() const;
 
  private:

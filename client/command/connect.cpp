@@ -32,7 +32,11 @@ void AddServerOption(const Arguments& command, std::string& address) {
 }
 
 Result<client::Client> ConnectTo(const std::string& server) {
-  return client::Client::Connect(server, std::chrono::seconds(3), ChosenCredentials());
+  return client::Client::Connect(server, ChosenCredentials());
+}
+
+std::chrono::milliseconds SilencePatience() {
+  return client::Patience(std::chrono::seconds(5));
 }
 
 }  // namespace taclink::command

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <string>
 
 #include "client/taclink/client.h"
@@ -8,5 +9,8 @@ namespace taclink::command {
 
 /// As the options say that AddServerOption gives a command: `--server`, `--token`, `--tls-ca`, ...
 Result<client::Client> ConnectTo(const std::string& server);
+
+/// How long a stream may be silent on which the server says something once a second, if no option says it.
+std::chrono::milliseconds SilencePatience();
 
 }  // namespace taclink::command

@@ -15,7 +15,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPatience{5000};  // the server says something once a second
 constexpr const char* kHomeAndClear = "\x1b[H\x1b[2J";
 
 struct ContactsOptions {
@@ -32,12 +31,13 @@ Result<void> RunContacts(const ContactsOptions& options) {
   if (!reader) return reader.error();
   CatchInterrupts();
   const bool live = !options.json && isatty(STDOUT_FILENO) == 1;
+  const milliseconds patience = SilencePatience() + milliseconds(static_cast<int64_t>(3e3 / options.rate_hz));
   milliseconds silence{0};
   for (uint64_t taken = 0; !IsInterrupted() && (options.count == 0 || taken < options.count);) {
     const auto arm = (*reader)->Next(kInterruptPoll);
     if (!arm) {
       if (arm.error().code != ErrorCode::kTimeout) return arm.error();
-      if ((silence += kInterruptPoll) > kPatience + milliseconds(static_cast<int64_t>(3e3 / options.rate_hz)))
+      if ((silence += kInterruptPoll) > patience)
         return Error{ErrorCode::kUnavailable, "nothing from the server at " + options.server +
                                                   " for some seconds; check server and network"};
       continue;

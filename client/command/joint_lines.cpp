@@ -69,6 +69,13 @@ Result<std::optional<JointLine>> JointLineReader::ReadJson(const std::string& li
   } catch (const Json::exception&) {
     return Wrong(R"("positions" must be {"joint": number, ...}, or a list beside "names")");
   }
+  const auto differs = [&](const char* key, size_t count) {
+    return Wrong(std::to_string(count) + " \"" + key + "\" for " + std::to_string(out.names.size()) +
+                 " joints; give one number per joint");
+  };
+  if (out.positions.size() != out.names.size()) return differs("positions", out.positions.size());
+  if (!out.velocities.empty() && out.velocities.size() != out.names.size())
+    return differs("velocities", out.velocities.size());
   return std::optional(std::move(out));
 }
 

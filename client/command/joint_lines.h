@@ -8,7 +8,8 @@
 
 namespace taclink::command {
 
-/// Joint positions of one line. Names always given; positions in rad, prismatic: m.
+/// Joint positions of one line, in rad (prismatic joints: m). `positions` has one number per name;
+/// `velocities` (rad/s, m/s) has as many or is empty.
 struct JointLine {
   std::optional<double> time_s;  ///< since any instant; none: the line's own
   std::vector<std::string> names;

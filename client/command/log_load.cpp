@@ -273,7 +273,7 @@ Result<std::vector<RecordResult>> MeasureRecording(const LoadPictures& pictures,
                         << folder << "/logs\", split_mb: 0}\n";
   const auto server = ServerProcess::Start(taclinkd, config, folder + "/record.log");
   if (!server) return server.error();
-  auto connection = client::Client::Connect((*server)->address(), std::chrono::seconds(10));
+  auto connection = client::Client::Connect((*server)->address(), client::Patience(std::chrono::seconds(10)));
   if (!connection) return connection.error();
   if (const auto ready = WaitUntilMeasuring(*connection); !ready) return ready.error();
   const auto pause = [&] { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); };

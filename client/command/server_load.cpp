@@ -52,7 +52,7 @@ int64_t MonotonicNs() {
 class LoadClient {
  public:
   static Result<std::unique_ptr<LoadClient>> Start(const std::string& address, client::Detail detail) {
-    auto connection = client::Client::Connect(address, std::chrono::seconds(10));
+    auto connection = client::Client::Connect(address, client::Patience(std::chrono::seconds(10)));
     if (!connection) return connection.error();
     auto reader = connection->StreamFrames({.detail = detail, .delivery = client::Delivery::kEvery});
     if (!reader) return reader.error();
@@ -253,7 +253,7 @@ Result<std::vector<LoadResult>> MeasureLoads(const std::vector<ServerLoad>& load
   std::ofstream(config) << LoadConfigText(pictures, links, loads.front().rate_hz) << more;
   const auto server = ServerProcess::Start(taclinkd, config, log);
   if (!server) return server.error();
-  auto connection = client::Client::Connect((*server)->address(), std::chrono::seconds(10));
+  auto connection = client::Client::Connect((*server)->address(), client::Patience(std::chrono::seconds(10)));
   if (!connection) return connection.error();
   if (const auto ready = WaitUntilMeasuring(*connection); !ready) return ready.error();
   std::vector<LoadResult> results;

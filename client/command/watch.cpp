@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <memory>
+#include <optional>
 
 #include "client/command/commands.h"
 #include "client/command/connect.h"
@@ -12,15 +15,13 @@
 namespace taclink::command {
 namespace {
 
-using std::chrono::milliseconds;
-
 struct WatchOptions {
   std::string server = "127.0.0.1:50051";
   std::vector<std::string> links;
   std::string detail = "contacts";
   double rate_hz = 0;
   double deadband_n = 0, deadband_mm = 0;
-  double patience_s = 5;
+  std::optional<double> patience_s;
   bool every = false;
   bool json = false;
   uint64_t count = 0;
@@ -45,7 +46,9 @@ Result<void> RunWatch(const WatchOptions& options) {
   CatchInterrupts();
   FrameOutput output("taclink watch " + options.server + "   (Ctrl-C ends)", options.json);
   // Every link says something once a second, so silence means a server or a network that hangs.
-  const double patience_s = std::max(options.patience_s, options.rate_hz > 0 ? 3 / options.rate_hz : 0);
+  const double chosen_s =
+      options.patience_s.value_or(std::chrono::duration<double>(SilencePatience()).count());
+  const double patience_s = std::max(chosen_s, options.rate_hz > 0 ? 3 / options.rate_hz : 0);
   double silence_s = 0;
   for (uint64_t taken = 0; !IsInterrupted() && (options.count == 0 || taken < options.count);) {
     const auto frame = (*reader)->Next(kInterruptPoll);
@@ -85,9 +88,10 @@ void AddWatch(const Arguments& app, Selected& selected) {
       .Must(Positive());
   command.AddFlag("--every", options->every, "Every frame in order, not only the newest");
   command.AddFlag("--json", options->json, "One JSON object a line for each frame");
-  command.AddOption("--patience", options->patience_s, "Seconds without any word before it gives up")
-      .Must(Positive())
-      .ShowDefault();
+  command
+      .AddOption("--patience", options->patience_s,
+                 "Seconds without any word before it gives up (5, or TACLINK_PATIENCE_S if that is more)")
+      .Must(Positive());
   command.AddOption("--count", options->count, "End after so many frames").Must(Positive());
   command.OnChosen([options, &selected] { selected = [options] { return RunWatch(*options); }; });
 }

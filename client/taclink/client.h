@@ -356,6 +356,12 @@ struct Credentials {
   std::string key_file = {};          ///< of that certificate
   std::string token = {};             ///< goes with every call; never in the clear to another machine
 };
+
+/// `usual`, or the seconds in the environment variable TACLINK_PATIENCE_S where these are more: how long
+/// calls wait at most whose timeout is not given. Slow machines need more; whoever gets an answer waits no
+/// longer. `usual` too where the variable is not a positive number, but then Client::Connect has refused it.
+std::chrono::milliseconds Patience(std::chrono::milliseconds usual);
+
 class Recordings;        // taclink/recordings.h
 class ContactReader;     // taclink/arm_contacts.h
 class JointStateWriter;  // likewise
@@ -363,42 +369,44 @@ class JointStateWriter;  // likewise
 /// A connection to one server.
 class Client {
  public:
-  /// Errors: kUnavailable (no server there within `timeout`, with what to do), kNotFound (a file),
-  /// kInvalidArgument (credentials that can't be used so).
-  static Result<Client> Connect(const std::string& address,
-                                std::chrono::milliseconds timeout = std::chrono::seconds(3),
+  /// Waits 3 s for a server, and as long as Patience says for one that accepts the connection but is slow.
+  /// Errors: kUnavailable (no server there, with what to do), kNotFound (a file), kInvalidArgument
+  /// (credentials that can't be used so, or a TACLINK_PATIENCE_S that is not a positive number).
+  static Result<Client> Connect(const std::string& address, const Credentials& credentials = {});
+  /// As above, but waits for `timeout` in either case.
+  static Result<Client> Connect(const std::string& address, std::chrono::milliseconds timeout,
                                 const Credentials& credentials = {});
   ~Client();
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
 
-  Result<Arm> GetArm(std::chrono::milliseconds timeout = std::chrono::seconds(10));
+  Result<Arm> GetArm(std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
 
   /// Returns once the server has accepted. Errors: kNotFound (no such link), kInvalidArgument,
   /// kResourceExhausted, kUnavailable.
   Result<std::unique_ptr<FrameReader>> StreamFrames(
-      const StreamOptions& options, std::chrono::milliseconds timeout = std::chrono::seconds(10));
+      const StreamOptions& options, std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
 
   /// Gives the link a fresh source and processor, as after the server's start. Returns when it is ordered;
   /// GetArm tells how it goes. Errors: kNotFound, kUnavailable.
   Result<void> RestartLink(const std::string& link,
-                           std::chrono::milliseconds timeout = std::chrono::seconds(10));
+                           std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
 
   /// `camera`: "top", "bottom" or empty for both. Holds until the server ends. Errors: kNotFound,
   /// kInvalidArgument (with what the camera takes), kUnsupported (nothing to set), kUnavailable (the camera
   /// is not there now).
   Result<void> SetCamera(const std::string& link, const std::string& camera, const CameraSettings& settings,
-                         std::chrono::milliseconds timeout = std::chrono::seconds(20));
+                         std::chrono::milliseconds timeout = Patience(std::chrono::seconds(20)));
   /// Computes the link's forces by `model` from the next frame on. Errors: kNotFound, kInvalidArgument,
   /// kFailedPrecondition (kLinear on a skin that may be inflated), kUnavailable.
   Result<void> SetForceModel(const std::string& link, ForceModel model,
-                             std::chrono::milliseconds timeout = std::chrono::seconds(60));
+                             std::chrono::milliseconds timeout = Patience(std::chrono::seconds(60)));
 
   /// Finds the link's cameras and rest shape anew; nothing may touch the skin. Waits for the end. Errors:
   /// kNotFound, kFailedPrecondition (touched, moved, does not fit: the message says), kUnavailable,
   /// kEndOfData (cancelled); then the link stays as it was.
   Result<CalibrationResult> Calibrate(const CalibrateOptions& options, const CalibrateProgress& progress = {},
-                                      std::chrono::milliseconds timeout = std::chrono::seconds(60));
+                                      std::chrono::milliseconds timeout = Patience(std::chrono::seconds(60)));
 
   /// The server's recordings; see taclink/recordings.h.
   Recordings RecordingCalls() const;
@@ -406,7 +414,7 @@ class Client {
   /// All contacts of the arm in its base frame. `max_rate_hz` 0: whenever a link publishes. Returns once the
   /// server has accepted. Errors: kInvalidArgument, kResourceExhausted, kUnavailable.
   Result<std::unique_ptr<ContactReader>> StreamContacts(
-      double max_rate_hz = 0, std::chrono::milliseconds timeout = std::chrono::seconds(10));
+      double max_rate_hz = 0, std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
 
   /// Begins to tell the server where the joints are. What it refuses is told by the writer.
   std::unique_ptr<JointStateWriter> UpdateJointStates();
@@ -414,16 +422,16 @@ class Client {
   /// Makes what the links show now their baseline; each is accepted or refused for itself. Errors: kNotFound,
   /// kInvalidArgument, kUnavailable.
   Result<std::vector<LinkTare>> Tare(const TareRequest& request,
-                                     std::chrono::milliseconds timeout = std::chrono::seconds(60));
+                                     std::chrono::milliseconds timeout = Patience(std::chrono::seconds(60)));
 
   /// `region` empty: the whole link. Errors: kNotFound (no such link or region), kInvalidArgument.
-  Result<ForceLevelState> SetThresholds(const std::string& link, const std::string& region,
-                                        const Thresholds& thresholds,
-                                        std::chrono::milliseconds timeout = std::chrono::seconds(10));
+  Result<ForceLevelState> SetThresholds(
+      const std::string& link, const std::string& region, const Thresholds& thresholds,
+      std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
 
   /// Returns once the server has accepted. Errors: as StreamFrames.
   Result<std::unique_ptr<EventReader>> StreamEvents(
-      const EventOptions& options, std::chrono::milliseconds timeout = std::chrono::seconds(10));
+      const EventOptions& options, std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
 
  private:
   friend class JointStateWriter;

@@ -40,7 +40,8 @@ class Subscription {
   Subscription(const Subscription&) = delete;
   Subscription& operator=(const Subscription&) = delete;
 
-  /// No callback runs after it returns, but the one that calls it. May take 3 s while there is no server.
+  /// No callback runs after it returns, but the one that calls it. May take as long as Client::Connect while
+  /// there is no server.
   void Stop();
   /// By Stop or because the server refused.
   bool ended() const;

@@ -83,8 +83,8 @@ class Recordings {
   Result<void> Download(const std::string& log, uint64_t offset, const LogSink& sink);
   /// Returns once the server has the log open. Errors: kNotFound (no such log or link), kInvalidArgument
   /// (range, speed), kInternal (the log is damaged beyond reading), kResourceExhausted, kUnavailable.
-  Result<std::unique_ptr<ReplayReader>> Replay(const ReplayOptions& options,
-                                               std::chrono::milliseconds timeout = std::chrono::seconds(60));
+  Result<std::unique_ptr<ReplayReader>> Replay(
+      const ReplayOptions& options, std::chrono::milliseconds timeout = Patience(std::chrono::seconds(60)));
 
  private:
   friend class Client;

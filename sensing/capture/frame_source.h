@@ -80,6 +80,10 @@ class FrameSource {
   /// Before Start: what the cameras are to be set to when they are opened.
   virtual void Remember(CameraId, const CameraSettings&) {}
 
+  /// The source produces a pair when it is asked for one. The caller then asks for the next pair only after
+  /// it has passed the last one on, so that no pair is skipped.
+  virtual bool WaitsForReader() const { return false; }
+
   virtual SourceInfo Info() const = 0;
   virtual SourceCounters Counters() const { return {}; }
 };

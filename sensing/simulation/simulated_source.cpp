@@ -21,18 +21,20 @@ double Brightness(const CameraSettings& settings) {
 }  // namespace
 
 Result<std::unique_ptr<SimulatedSource>> SimulatedSource::Make(const LinkModel& model, const Scene& scene,
-                                                               Clock& clock) {
+                                                               Clock& clock, ScenePace pace) {
   const int64_t start_ns = clock.MonotonicNs();
   auto skin = SimulatedSkin::Make(model, scene);
   if (!skin) return skin.error();
   const double took_s = 1e-9 * static_cast<double>(clock.MonotonicNs() - start_ns);
-  return std::unique_ptr<SimulatedSource>(new SimulatedSource(model, scene, clock, std::move(*skin), took_s));
+  return std::unique_ptr<SimulatedSource>(
+      new SimulatedSource(model, scene, clock, std::move(*skin), took_s, pace));
 }
 
 SimulatedSource::SimulatedSource(const LinkModel& model, Scene scene, Clock& clock,
-                                 std::unique_ptr<SimulatedSkin> skin, double took_s)
+                                 std::unique_ptr<SimulatedSkin> skin, double took_s, ScenePace pace)
     : scene_(std::move(scene)),
       clock_(clock),
+      pace_(pace),
       skin_(std::move(skin)),
       renderer_(model, MountedRig(model.nominal_rig, scene_.camera), scene_.camera, scene_.seed) {
   const CameraModel& camera = model.nominal_rig[CameraId::kTop];
@@ -76,15 +78,25 @@ int64_t SimulatedSource::ExposureNs(uint64_t frame) const {
   return start_ns_ + std::llround(static_cast<double>(frame) * 1e9 / scene_.frame_rate_hz);
 }
 
+// A late caller skips to the newest frame, or by frames moves the scene's start by its delay.
+uint64_t SimulatedSource::NextDue(int64_t now_ns) {
+  if (pace_ == ScenePace::kFrames) {
+    if (ExposureNs(next_frame_ + 1) <= now_ns) start_ns_ += now_ns - ExposureNs(next_frame_);
+    return next_frame_;
+  }
+  uint64_t due = next_frame_;
+  while (ExposureNs(due + 1) <= now_ns) {  // most of the way at once
+    const double behind = static_cast<double>(now_ns - ExposureNs(due)) * 1e-9 * scene_.frame_rate_hz;
+    due += std::max<uint64_t>(1, behind > 2 ? static_cast<uint64_t>(behind) - 1 : 1);
+  }
+  return due;
+}
+
 Result<void> SimulatedSource::Next(StereoFrame& frame, std::chrono::milliseconds timeout) {
   if (!started_) return Error{ErrorCode::kUnavailable, name_ + ": not started"};
   const int64_t now = clock_.MonotonicNs();
   const int64_t deadline = now + std::chrono::nanoseconds(timeout).count();
-  uint64_t due = next_frame_;
-  while (ExposureNs(due + 1) <= now) {  // late: skip to the newest, most of the way at once
-    const double behind = static_cast<double>(now - ExposureNs(due)) * 1e-9 * scene_.frame_rate_hz;
-    due += std::max<uint64_t>(1, behind > 2 ? static_cast<uint64_t>(behind) - 1 : 1);
-  }
+  const uint64_t due = NextDue(now);
   if (!scene_.loop && static_cast<double>(due) > scene_.duration_s * scene_.frame_rate_hz)
     return Error{ErrorCode::kEndOfData, name_ + ": the scene is over"};
   const int64_t exposure = ExposureNs(due);
@@ -116,8 +128,8 @@ void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
 }
 
 Result<std::unique_ptr<FrameSource>> MakeSimulatedSource(const LinkModel& model, const Scene& scene,
-                                                         Clock& clock) {
-  auto source = SimulatedSource::Make(model, scene, clock);
+                                                         Clock& clock, ScenePace pace) {
+  auto source = SimulatedSource::Make(model, scene, clock, pace);
   if (!source) return source.error();
   return std::unique_ptr<FrameSource>(std::move(*source));
 }

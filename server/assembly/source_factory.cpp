@@ -39,7 +39,7 @@ struct SourceMaker {
   SourceResult operator()(const SimulatedSourceConfig& config) const {
     const auto scene = LoadScene(config.scene);
     if (!scene) return scene.error();
-    return MakeSimulatedSource(model, *scene, clock);
+    return MakeSimulatedSource(model, *scene, clock, config.pace);
   }
 };
 

@@ -8,6 +8,7 @@
 
 #include "sensing/model/model_file.h"
 #include "tests/accuracy/probe.h"
+#include "tests/support/paths.h"
 
 namespace taclink {
 namespace {
@@ -19,7 +20,7 @@ struct Judged {
 };
 
 std::vector<Judged> Judgements() {
-  std::ifstream file(std::string(TACLINK_TEST_DATA) + "/../accuracy/calculix/results.csv");
+  std::ifstream file(testing::CalculixData("results.csv"));
   std::vector<Judged> all;
   std::string line;
   std::getline(file, line);

@@ -11,6 +11,7 @@
 #include "sensing/mechanics/material_fit.h"
 #include "sensing/model/model_file.h"
 #include "tests/support/inflated_skin.h"
+#include "tests/support/paths.h"
 
 namespace taclink {
 namespace {
@@ -87,7 +88,7 @@ TEST_P(MaterialOf, AnotherMeshComesOutWithinItsStandardDeviation) {
 
 // Radial growth of the inner wall in calculix/results.csv, at a pressure; at 1 kPa along z.
 std::vector<std::pair<double, double>> GrowthAlong(const std::string& law, double pressure_kpa) {
-  std::ifstream file(std::string(TACLINK_TEST_DATA) + "/../accuracy/calculix/results.csv");
+  std::ifstream file(testing::CalculixData("results.csv"));
   std::vector<std::pair<double, double>> all;
   for (std::string line; std::getline(file, line);) {
     std::istringstream in(line);

@@ -16,8 +16,11 @@ std::string Text(const char* format, double a, double b) {
   return text;
 }
 
-// What is wrong with the sum of all loads; empty: nothing.
-std::string FaultOfSum(const SolidScene& scene, const std::vector<Contact>& found) {
+void Accuse(SolidVerdict& verdict, std::string fault) {
+  if (verdict.fault.empty()) verdict.fault = std::move(fault);
+}
+
+void JudgeSum(const SolidScene& scene, const std::vector<Contact>& found, SolidVerdict& verdict) {
   Vec3 truth = Vec3::Zero(), sum = Vec3::Zero();
   double total = 0, normal = 0;
   for (const SolidContact& c : scene.contacts) {
@@ -29,10 +32,11 @@ std::string FaultOfSum(const SolidScene& scene, const std::vector<Contact>& foun
     normal += f.normal_force_n;
   }
   const double allowed = std::max(kShare * total, kLeastN);
-  if (std::abs(normal - total) > allowed) return Text("total %.3f instead of %.3f N", normal, total);
-  if ((sum - truth).norm() > allowed)
-    return Text("vector off by %.3f of %.3f N", (sum - truth).norm(), total);
-  return {};
+  const double vector_error = (sum - truth).norm();
+  verdict.force_error_n = std::max({verdict.force_error_n, std::abs(normal - total), vector_error});
+  if (std::abs(normal - total) > allowed)
+    Accuse(verdict, Text("total %.3f instead of %.3f N", normal, total));
+  if (vector_error > allowed) Accuse(verdict, Text("vector off by %.3f of %.3f N", vector_error, total));
 }
 
 struct Matched {
@@ -57,29 +61,38 @@ std::pair<size_t, double> Nearest(const SolidScene& scene, const Contact& found)
 
 }  // namespace
 
-std::string FaultOf(const SolidScene& scene, const std::vector<Contact>& found) {
+SolidVerdict JudgeContacts(const SolidScene& scene, const std::vector<Contact>& found) {
   const bool wide = scene.IsDistributed();
+  SolidVerdict verdict;
   std::vector<Matched> matched(scene.contacts.size());
   for (const Contact& f : found) {
     const auto [nearest, off] = Nearest(scene, f);
     const double strongest = std::max(f.force_n.norm(), f.normal_force_n);
-    if (off > (wide ? 60 : kNearMm) && strongest > kLeastN)
-      return Text("phantom of %.3f N, %.0f mm", strongest, off);
+    if (off > (wide ? 60 : kNearMm) && strongest > kLeastN) {
+      verdict.force_error_n = std::max(verdict.force_error_n, strongest);
+      Accuse(verdict, Text("phantom of %.3f N, %.0f mm", strongest, off));
+    }
     if (scene.contacts.empty()) continue;
     matched[nearest].force += f.force_n;
     matched[nearest].center += f.normal_force_n * f.center_mm;
     matched[nearest].weight += f.normal_force_n;
   }
-  if (wide) return FaultOfSum(scene, found);
+  if (wide) {
+    JudgeSum(scene, found, verdict);
+    return verdict;
+  }
   for (size_t i = 0; i < matched.size(); ++i) {
     const SolidContact& c = scene.contacts[i];
     const double off = (matched[i].force - c.force_n).norm(), size = c.force_n.norm();
-    if (off > std::max(kShare * size, kLeastN)) return Text("force off by %.3f of %.3f N", off, size);
-    if (size < kLeastN) continue;
-    const double away = (matched[i].center / std::max(matched[i].weight, 1e-9) - c.center_mm).norm();
-    if (away > kCenterMm) return Text("center %.1f mm off (%.3f N)", away, size);
+    verdict.force_error_n = std::max(verdict.force_error_n, off);
+    if (off > std::max(kShare * size, kLeastN))
+      Accuse(verdict, Text("force off by %.3f of %.3f N", off, size));
+    if (size < kLeastN || matched[i].weight <= 0) continue;
+    const double away = (matched[i].center / matched[i].weight - c.center_mm).norm();
+    verdict.center_error_mm = std::max(verdict.center_error_mm, away);
+    if (away > kCenterMm) Accuse(verdict, Text("center %.1f mm off (%.3f N)", away, size));
   }
-  return {};
+  return verdict;
 }
 
 }  // namespace taclink

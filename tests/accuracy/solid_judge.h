@@ -8,8 +8,14 @@
 
 namespace taclink {
 
-/// What is wrong with contacts that were found of a scene; empty: nothing. Each body's force (of distributed
-/// loads, their sum) within a tenth or 0.03 N, its center within 4 mm, nothing else above 0.03 N.
-std::string FaultOf(const SolidScene& scene, const std::vector<Contact>& found);
+/// Contacts that were found, against the true ones.
+struct SolidVerdict {
+  /// What is wrong; empty: nothing. Each body's force (of distributed loads, their sum) must be within a
+  /// tenth or 0.03 N, its center within 4 mm, and nothing else above 0.03 N may be found.
+  std::string fault;
+  double force_error_n = 0;    ///< the largest of the bodies', and of contacts that do not exist
+  double center_error_mm = 0;  ///< the largest of the bodies' above 0.03 N; distributed loads: 0
+};
+SolidVerdict JudgeContacts(const SolidScene& scene, const std::vector<Contact>& found);
 
 }  // namespace taclink

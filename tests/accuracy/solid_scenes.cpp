@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "sensing/model/model_file.h"
+#include "tests/support/paths.h"
 
 namespace taclink {
 namespace {
@@ -20,7 +21,7 @@ std::vector<std::string> Cells(const std::string& line) {
 }
 
 std::string Folder() {
-  return std::string(TACLINK_TEST_DATA) + "/../accuracy/calculix/";
+  return testing::CalculixData("");
 }
 
 std::vector<Row> Table(const std::string& name) {

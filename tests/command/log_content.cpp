@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "foxglove/image.pb.h"
+#include "tests/support/paths.h"
 #include "wire/mcap/check.h"
 #include "wire/mcap/cursor.h"
 #include "wire/mcap/file_sink.h"
@@ -270,7 +271,7 @@ LogToolTest::LogToolTest() {
 }
 
 Finished LogToolTest::Log(const std::vector<std::string>& arguments) {
-  std::vector<std::string> command = {TACLINK, "log"};
+  std::vector<std::string> command = {kTaclink, "log"};
   command.insert(command.end(), arguments.begin(), arguments.end());
   return RunToEnd(command);
 }

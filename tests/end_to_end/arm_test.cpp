@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -13,7 +14,7 @@ class SampleArm : public ScratchFolder {
  protected:
   void StartServer(const std::string& config) {
     server_ = std::make_unique<Process>(
-        std::vector<std::string>{TACLINKD, "--config", config, "--listen", "127.0.0.1:0"});
+        std::vector<std::string>{kTaclinkd, "--config", config, "--listen", "127.0.0.1:0"});
     address_ = AddressOf(*server_);
     ASSERT_NE(address_, "");
   }
@@ -23,9 +24,9 @@ class SampleArm : public ScratchFolder {
 };
 
 TEST_F(SampleArm, ContactsMoveWithTheJoints) {
-  StartServer(TACLINK_CONFIGS "/arm.yaml");
-  Process player({TACLINK, "joints", "--server", address_, "--loop", TACLINK_CONFIGS "/arm-joints.csv"});
-  Process contacts({TACLINK, "contacts", "--server", address_, "--json"});
+  StartServer(ShippedConfig("arm.yaml"));
+  Process player({kTaclink, "joints", "--server", address_, "--loop", ShippedConfig("arm-joints.csv")});
+  Process contacts({kTaclink, "contacts", "--server", address_, "--json"});
   double nearest_x = 1e9, farthest_x = -1e9;
   bool loaded = false;
   for (int i = 0; i < 3000 && !(loaded && farthest_x - nearest_x > 50); ++i) {
@@ -50,12 +51,12 @@ TEST_F(SampleArm, MistakesSayWhatToDo) {
                               "  links:\n    - {name: b, model: cylinder, source: simulated, "
                               "scene: press, pose: {position_mm: [0, 0, 0]" +
                               pose + "}}\n");
-    const Finished run = RunToEnd({TACLINKD, "--config", config, "--listen", "127.0.0.1:0"});
+    const Finished run = RunToEnd({kTaclinkd, "--config", config, "--listen", "127.0.0.1:0"});
     EXPECT_EQ(run.exit_code, 1);
     return run.err;
   };
   EXPECT_THAT(complaint(", frame: hand", ""), HasSubstr("must have a 'urdf'"));
-  const std::string urdf = std::string("  urdf: ") + TACLINK_CONFIGS "/arm.urdf\n";
+  const std::string urdf = "  urdf: " + ShippedConfig("arm.urdf") + "\n";
   EXPECT_THAT(complaint(", frame: elbow_link", urdf),
               HasSubstr("no link 'elbow_link'; there are: base_link, shoulder, upper_arm"));
   EXPECT_THAT(complaint("", urdf + "  base: floor\n"), HasSubstr("no link 'floor'"));
@@ -63,7 +64,7 @@ TEST_F(SampleArm, MistakesSayWhatToDo) {
 }
 
 TEST_F(SampleArm, JointsThatAreNotThereAreNamed) {
-  StartServer(TACLINK_CONFIGS "/arm.yaml");
+  StartServer(ShippedConfig("arm.yaml"));
   const Finished joints = Taclink({"joints", "--server", address_, Write("bad.csv", "knee\n0.1\n0.2\n")});
   EXPECT_EQ(joints.exit_code, 1);
   EXPECT_THAT(joints.err, HasSubstr("no joint 'knee'; there are: waist, shoulder_lift, elbow"));

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -62,7 +63,7 @@ TEST_F(CommandTest, HelpAndVersionAreNoErrors) {
 
 TEST_F(CommandTest, DetectFindsTheMarkersOfARealPicture) {
   const Finished run =
-      Taclink({"detect", TACLINK_TEST_DATA "/barrel_real_bottom.jpg", "--json", "--draw", Path("drawn.png")});
+      Taclink({"detect", TestData("barrel_real_bottom.jpg"), "--json", "--draw", Path("drawn.png")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const auto markers = json::parse(run.out).at("markers");
   EXPECT_GE(markers.size(), 230u);

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -74,7 +75,7 @@ class ConfigCheckTest : public ScratchFolder {
     return "taclink_config: 1\n" + sections + arm;
   }
   static bool Starts(const std::string& config) {
-    Process server({TACLINKD, "--config", config});
+    Process server({kTaclinkd, "--config", config});
     const bool starts = server.ReadUntil("listening on", kStartOrEnd, true).has_value();
     if (starts) server.Signal(SIGTERM);
     const int code = server.Wait(kStartOrEnd).exit_code;
@@ -123,7 +124,7 @@ TEST_F(ConfigCheckTest, WhatItPassesStartsAndTheRestDoesNot) {
   for (const ConfigCase& at : Cases()) {
     SCOPED_TRACE(at.name);
     const std::string config = Write("arm.yaml", at.config);
-    const Finished checked = RunToEnd({TACLINKD, "--check-config", "--config", config});
+    const Finished checked = RunToEnd({kTaclinkd, "--check-config", "--config", config});
     const bool passes = at.complaint[0] == '\0';
     EXPECT_EQ(checked.exit_code, passes ? 0 : 1) << checked.err;
     EXPECT_THAT(checked.err, HasSubstr(at.complaint));
@@ -135,7 +136,7 @@ TEST_F(ConfigCheckTest, WhatItPassesStartsAndTheRestDoesNot) {
 TEST_F(ConfigCheckTest, ItNotesWhatTheServerWouldGoWithout) {
   const std::string config = Write("arm.yaml", With(std::string(kAnyPort) + "events: {audit: file/audit}\n" +
                                                     "recording: {folder: file/logs, at_start: true}\n"));
-  const Finished checked = RunToEnd({TACLINKD, "--check-config", "--config", config});
+  const Finished checked = RunToEnd({kTaclinkd, "--check-config", "--config", config});
   EXPECT_EQ(checked.exit_code, 0) << checked.err;
   EXPECT_THAT(checked.err, HasSubstr("note: recording.folder: "));
   EXPECT_THAT(checked.err, HasSubstr("note: events.audit: "));
@@ -146,10 +147,10 @@ TEST_F(ConfigCheckTest, ItNotesWhatTheServerWouldGoWithout) {
 TEST_F(ConfigCheckTest, TheServerThatRunsIsNoError) {
   for (const std::string& listen : {std::string("127.0.0.1:0"), "unix:" + Path("socket")}) {
     SCOPED_TRACE(listen);
-    Process server({TACLINKD, "--config", Write("arm.yaml", With(kAnyPort)), "--listen", listen});
+    Process server({kTaclinkd, "--config", Write("arm.yaml", With(kAnyPort)), "--listen", listen});
     const std::string address = AddressOf(server);
     const Finished checked =
-        RunToEnd({TACLINKD, "--check-config", "--config", Path("arm.yaml"), "--listen", address});
+        RunToEnd({kTaclinkd, "--check-config", "--config", Path("arm.yaml"), "--listen", address});
     EXPECT_EQ(checked.exit_code, 0) << checked.err;
     EXPECT_THAT(checked.err, HasSubstr(address + " is in use by another taclinkd (pid " +
                                        std::to_string(server.pid()) + ")"));

@@ -3,6 +3,7 @@
 #include <signal.h>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -40,11 +41,11 @@ class EventCommandTest : public ScratchFolder {
   void Start(const char* scene) {
     Write("steady.yaml", scene);
     server_ = std::make_unique<Process>(
-        std::vector<std::string>{TACLINKD, "--config", Write("arm.yaml", kArm), "--listen", "127.0.0.1:0"});
+        std::vector<std::string>{kTaclinkd, "--config", Write("arm.yaml", kArm), "--listen", "127.0.0.1:0"});
     address_ = AddressOf(*server_);
     ASSERT_NE(address_, "");
     events_ = std::make_unique<Process>(
-        std::vector<std::string>{TACLINK, "events", "--server", address_, "--json", "--all"});
+        std::vector<std::string>{kTaclink, "events", "--server", address_, "--json", "--all"});
   }
   // The next event of that kind.
   json Next(const std::string& kind) {

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 #include "tests/wire/mcap/judge.h"
 
 namespace taclink::testing {
@@ -29,7 +30,7 @@ class LogJudge : public ScratchFolder {
                   "    - {name: a, model: cylinder, source: simulated, scene: touch.yaml}\n"
                   "    - {name: b, model: cylinder, source: simulated, scene: touch.yaml,\n"
                   "       pose: {position_mm: [0, 0, 200]}}\n");
-    Process server({TACLINKD, "--config", config});
+    Process server({kTaclinkd, "--config", config});
     const std::string address = AddressOf(server);
     const Finished recorded =
         Taclink({"record", "start", "--json", "--duration", "4", "--pictures", "--server", address});

@@ -13,6 +13,7 @@
 #include "taclink/v1/frame.pb.h"
 #include "tests/end_to_end/support.h"
 #include "tests/sensing/capture/pictures.h"
+#include "tests/support/paths.h"
 #include "wire/log/log_writer.h"
 #include "wire/log/topics.h"
 #include "wire/mcap/cursor.h"
@@ -49,7 +50,7 @@ class LogSolveTest : public ScratchFolder {
     const std::string config = Write("arm.yaml", "taclink_config: 1\nrecording: {folder: logs" + recording +
                                                      "}\narm:\n  name: test\n  links:\n" + links);
     server_ = std::make_unique<Process>(
-        std::vector<std::string>{TACLINKD, "--config", config, "--listen", "127.0.0.1:0"});
+        std::vector<std::string>{kTaclinkd, "--config", config, "--listen", "127.0.0.1:0"});
     address_ = AddressOf(*server_);
     ASSERT_NE(address_, "");
   }
@@ -61,7 +62,7 @@ class LogSolveTest : public ScratchFolder {
   }
   // Frames are the clock here.
   void WaitFor(const std::string& link, size_t frames, size_t contacts) const {
-    Process watch({TACLINK, "watch", "--server", address_, "--json", "--patience", "60", "--links", link});
+    Process watch({kTaclink, "watch", "--server", address_, "--json", "--patience", "60", "--links", link});
     for (int i = 0; i < 3000 && frames > 0; ++i) {
       const auto line = watch.ReadLine(seconds(60));
       ASSERT_TRUE(line.has_value());
@@ -369,8 +370,8 @@ TEST_F(LogSolveTest, WhatCannotBeSolvedIsRefusedAndLeavesNothing) {
   refused({log, "-o", out, "--calibration", Write("bad.yaml", "taclink_calibration: x\n")}, "bad.yaml:1");
   EXPECT_FALSE(std::filesystem::exists(out));
   refused({log, "-o", log}, "log.mcap");
-  refused({TACLINK_LOGS "/truncated", "-o", out}, "log recover");
-  refused({TACLINK_LOGS "/zstd", "-o", out}, "no frames of any link");
+  refused({FuzzLog("truncated"), "-o", out}, "log recover");
+  refused({FuzzLog("zstd"), "-o", out}, "no frames of any link");
   refused({Path("none.mcap"), "-o", out}, "none.mcap");
   refused({log, "-o", Path("no/folder/out.mcap")}, "no/folder");
   EXPECT_FALSE(std::filesystem::exists(out));

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -13,7 +14,7 @@ using ::testing::HasSubstr;
 
 class LogTest : public ScratchFolder {
  protected:
-  static std::string Log(const std::string& name) { return TACLINK_LOGS "/" + name; }
+  static std::string Log(const std::string& name) { return FuzzLog(name); }
 };
 
 TEST_F(LogTest, InfoTellsWhatALogHolds) {

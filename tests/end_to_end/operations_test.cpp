@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 #include "tests/support/service_manager.h"
 
 namespace taclink::testing {
@@ -29,7 +30,7 @@ class OperationsTest : public ScratchFolder {
 
 TEST_F(OperationsTest, SystemdHearsOfItsLife) {
   const ServiceManager systemd{"@taclink-end-to-end-" + std::to_string(getpid())};
-  Process server({"/usr/bin/env", "NOTIFY_SOCKET=" + systemd.name(), "WATCHDOG_USEC=2000000", TACLINKD,
+  Process server({"/usr/bin/env", "NOTIFY_SOCKET=" + systemd.name(), "WATCHDOG_USEC=2000000", kTaclinkd,
                   "--config", Config("server: {listen: '127.0.0.1:0'}\n")});
   EXPECT_THAT(systemd.Await("READY=1"), HasSubstr("STATUS=listening on 127.0.0.1:"));
   for (int i = 0; i < 3; ++i) systemd.Await("WATCHDOG=1");
@@ -42,7 +43,7 @@ TEST_F(OperationsTest, SystemdHearsOfItsLife) {
 }
 
 TEST_F(OperationsTest, SighupTakesOverWhatItCanAndNamesTheRest) {
-  Process server({TACLINKD, "--config", Config("server: {listen: '127.0.0.1:0'}\n")});
+  Process server({kTaclinkd, "--config", Config("server: {listen: '127.0.0.1:0'}\n")});
   ASSERT_TRUE(server.ReadUntil("listening on", seconds(60), true).has_value());
   Config("server: {listen: '127.0.0.1:1'}\nlimits: {max_streams: 2}\nlog: {format: json}\n");
   server.Signal(SIGHUP);
@@ -64,11 +65,11 @@ TEST_F(OperationsTest, SighupTakesOverWhatItCanAndNamesTheRest) {
 }
 
 TEST_F(OperationsTest, CheckConfigFindsAllThatIsWrongAndStartsNothing) {
-  const Finished good = RunToEnd({TACLINKD, "--check-config", "--config", Config("")});
+  const Finished good = RunToEnd({kTaclinkd, "--check-config", "--config", Config("")});
   EXPECT_EQ(good.exit_code, 0) << good.err;
   EXPECT_EQ(good.out, "OK\n");
   const Finished bad = RunToEnd(
-      {TACLINKD, "--check-config", "--config",
+      {kTaclinkd, "--check-config", "--config",
        Write("bad.yaml",
              "taclink_config: 1\nserver: {listen: '0.0.0.0:0'}\nsecurity: {tokens: no-such-tokens}\n"
              "publish: {url: 'nats://localhost', token_file: no-such-secret}\narm:\n  name: x\n  links:\n"

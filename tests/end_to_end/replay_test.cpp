@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -53,7 +54,7 @@ TEST_F(ReplayTest, WhatWasRecordedIsPlayedAndServed) {
   std::string log;
   std::set<std::pair<std::string, int64_t>> exposures;  // of all frames of the log
   {
-    Process server({TACLINKD, "--config", Config()});
+    Process server({kTaclinkd, "--config", Config()});
     const std::string address = AddressOf(server);
     log = Record(address);
     const Finished played = Taclink(
@@ -80,7 +81,7 @@ TEST_F(ReplayTest, WhatWasRecordedIsPlayedAndServed) {
     EXPECT_EQ(server.Wait(seconds(60)).exit_code, 0);
   }
 
-  Process server({TACLINKD, "--replay", Path("logs/" + log), "--listen", "127.0.0.1:0"});
+  Process server({kTaclinkd, "--replay", Path("logs/" + log), "--listen", "127.0.0.1:0"});
   const std::string address = AddressOf(server);
   const Finished watched =
       Taclink({"watch", "--json", "--every", "--count", "60", "--patience", "60", "--server", address});
@@ -108,9 +109,8 @@ TEST_F(ReplayTest, WhatWasRecordedIsPlayedAndServed) {
 }
 
 TEST_F(ReplayTest, WhatCannotBeServedIsSaid) {
-  for (const std::string& file :
-       {Path("none.mcap"), Write("text.mcap", "this is no log"), std::string(TACLINK_LOGS "/zstd")}) {
-    const Finished run = RunToEnd({TACLINKD, "--replay", file});
+  for (const std::string& file : {Path("none.mcap"), Write("text.mcap", "this is no log"), FuzzLog("zstd")}) {
+    const Finished run = RunToEnd({kTaclinkd, "--replay", file});
     EXPECT_EQ(run.exit_code, 1);
     EXPECT_THAT(run.err, HasSubstr(file));
   }

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -38,7 +39,7 @@ class TokenTest : public ScratchFolder {
                      "  name: test\n  links:\n"
                      "    - {name: a, model: cylinder, source: simulated, scene: rest.yaml}\n");
   }
-  Process Serve() const { return Process({TACLINKD, "--config", Config(), "--listen", "127.0.0.1:0"}); }
+  Process Serve() const { return Process({kTaclinkd, "--config", Config(), "--listen", "127.0.0.1:0"}); }
   std::string Read(const std::string& name) const {
     std::ifstream in(Path(name));
     return {std::istreambuf_iterator<char>(in), {}};
@@ -101,7 +102,7 @@ TEST_F(TokenTest, AnEmptiedFileLetsNobodyInUntilItIsMendedAndSighupTellsWhatChan
 TEST_F(TokenTest, FilesAreForOwnerAndGroupWhateverTheUmask) {
   Write("tokens", Make({"otto"}).line);
   Process server({"/bin/sh", "-c", "umask 0; exec \"$0\" --config \"$1\" --listen 127.0.0.1:0 2>\"$2\"",
-                  TACLINKD,
+                  kTaclinkd,
                   Config("log: {file: " + Path("log.txt") + "}\nrecording: {folder: " + Path("logs") +
                          ", at_start: true}\n"),
                   Path("errors")});

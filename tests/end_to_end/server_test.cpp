@@ -6,6 +6,7 @@
 #include "sensing/camera/calibration.h"
 #include "sensing/model/model_file.h"
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -27,8 +28,8 @@ contacts:
 class ServerTest : public ScratchFolder {
  protected:
   void StartServer(const std::string& config) {
-    server_ = std::make_unique<Process>(
-        std::vector<std::string>{TACLINKD, "--config", Write("arm.yaml", config), "--listen", "127.0.0.1:0"});
+    server_ = std::make_unique<Process>(std::vector<std::string>{
+        kTaclinkd, "--config", Write("arm.yaml", config), "--listen", "127.0.0.1:0"});
     address_ = AddressOf(*server_);
     ASSERT_NE(address_, "");
   }
@@ -41,7 +42,8 @@ class ServerTest : public ScratchFolder {
   }
 
   std::vector<std::string> Watch(std::vector<std::string> more) const {
-    std::vector<std::string> command = {TACLINK, "watch", "--server", address_, "--json", "--patience", "60"};
+    std::vector<std::string> command = {kTaclink, "watch",      "--server", address_,
+                                        "--json", "--patience", "60"};
     command.insert(command.end(), more.begin(), more.end());
     return command;
   }
@@ -148,7 +150,7 @@ TEST_F(ServerTest, CalibrationIsSavedAndUsedFromTheNextStartOn) {
   Process watch(Watch({}));
   EXPECT_TRUE(watch.ReadLine(seconds(60)).has_value());
   Write("a_cameras.yaml", "taclink_calibration: nonsense\n");
-  const Finished refused = RunToEnd({TACLINKD, "--config", Path("arm.yaml"), "--listen", "127.0.0.1:0"});
+  const Finished refused = RunToEnd({kTaclinkd, "--config", Path("arm.yaml"), "--listen", "127.0.0.1:0"});
   EXPECT_NE(refused.exit_code, 0);
   EXPECT_THAT(refused.err, HasSubstr("a_cameras.yaml:1"));
 }
@@ -230,7 +232,7 @@ TEST_F(ServerTest, TheBenchMeasuresAServerOfItsOwn) {
 
 TEST_F(ServerTest, BadConfigurationIsRefusedWithFileAndLine) {
   const auto refused = [&](const std::string& config, const std::string& hint) {
-    const Finished run = RunToEnd({TACLINKD, "--config", Write("bad.yaml", config)});
+    const Finished run = RunToEnd({kTaclinkd, "--config", Write("bad.yaml", config)});
     EXPECT_EQ(run.exit_code, 1) << config;
     EXPECT_THAT(run.err, HasSubstr(hint));
   };
@@ -245,8 +247,8 @@ TEST_F(ServerTest, BadConfigurationIsRefusedWithFileAndLine) {
       "taclink_config: 1\narm:\n  name: x\n  links:\n    - {name: a, model: cube, source: simulated, scene: "
       "press}\n",
       "cube");
-  EXPECT_EQ(RunToEnd({TACLINKD, "--no-such-option"}).exit_code, 2);
-  const Finished open = RunToEnd({TACLINKD, "--listen", "0.0.0.0:0"});
+  EXPECT_EQ(RunToEnd({kTaclinkd, "--no-such-option"}).exit_code, 2);
+  const Finished open = RunToEnd({kTaclinkd, "--listen", "0.0.0.0:0"});
   EXPECT_EQ(open.exit_code, 1);
   EXPECT_THAT(open.err, HasSubstr("--insecure-open"));
 }

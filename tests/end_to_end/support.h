@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "sensing/core/geometry.h"
+#include "tests/support/paths.h"
 #include "tests/support/process.h"
 
 namespace taclink::testing {
@@ -17,7 +18,7 @@ namespace taclink::testing {
 using nlohmann::json;
 
 inline Finished Taclink(const std::vector<std::string>& arguments) {
-  std::vector<std::string> command = {TACLINK};
+  std::vector<std::string> command = {kTaclink};
   command.insert(command.end(), arguments.begin(), arguments.end());
   return RunToEnd(command);
 }

@@ -46,7 +46,7 @@ void ReadJoints(std::string_view text) {
   for (std::string line; std::getline(lines, line);) {
     const auto read = reader.Read(line);
     MustSayWhy(read);
-    if (read.ok() && *read && (*read)->positions.size() > (*read)->names.size()) std::abort();
+    if (read.ok() && *read && (*read)->positions.size() != (*read)->names.size()) std::abort();
   }
 }
 

@@ -12,6 +12,7 @@
 #include "tests/integration/raw_socket.h"
 #include "tests/integration/support.h"
 #include "tests/support/memory.h"
+#include "tests/support/paths.h"
 #include "tests/support/process.h"
 
 namespace taclink::server {
@@ -22,13 +23,17 @@ using std::chrono::steady_clock;
 
 constexpr double kGrowthMb = 24;  // that noise of the allocator and thread stacks may make
 
-ServiceLimits HostileLimits() {
-  return {.max_streams = 16,
-          .max_streams_per_peer = 16,
-          .queue_messages = 64,
-          .keepalive = milliseconds(300),
-          .keepalive_timeout = milliseconds(2000),
-          .handshake_timeout = milliseconds(1000)};
+// All waits of the server are patient: they hold for the witness, too, whose threads may not run for seconds.
+ServiceLimits PatientLimits() {
+  return {.max_streams = 16, .max_streams_per_peer = 16, .queue_messages = 64};
+}
+
+ServiceLimits ImpatientLimits() {
+  ServiceLimits limits = PatientLimits();
+  limits.keepalive = milliseconds(300);
+  limits.keepalive_timeout = milliseconds(2000);
+  limits.handshake_timeout = milliseconds(1000);
+  return limits;
 }
 
 /// A call whose answers are read and forgotten.
@@ -90,10 +95,11 @@ class Hostile : public ::testing::Test {
     }
     EXPECT_EQ(witness_->counts().at(0).frames_dropped, 0u);
   }
-  void WaitForStreams(size_t count) {
+  void WaitForStreams(size_t count) { WaitForStreams(server_.server(), count); }
+  void WaitForStreams(const RpcServer& server, size_t count) {
     const auto give_up = steady_clock::now() + kForever;
-    while (server_.server().streams() != count && steady_clock::now() < give_up) Frames(1);
-    EXPECT_EQ(server_.server().streams(), count);
+    while (server.streams() != count && steady_clock::now() < give_up) Frames(1);
+    EXPECT_EQ(server.streams(), count);
   }
   std::shared_ptr<grpc::Channel> NewChannel() {
     grpc::ChannelArguments arguments;
@@ -102,8 +108,14 @@ class Hostile : public ::testing::Test {
     return grpc::CreateCustomChannel(server_.server().address(), grpc::InsecureChannelCredentials(),
                                      arguments);
   }
+  // Another server of the same arm, for those that are to be given up soon.
+  std::unique_ptr<RpcServer> ImpatientServer() {
+    auto server = RpcServer::Start("127.0.0.1:0", server_.arm(), ImpatientLimits());
+    EXPECT_TRUE(server.ok()) << server.error().message;
+    return std::move(*server);
+  }
 
-  TestServer server_{HostileLimits()};
+  TestServer server_{PatientLimits()};
   client::Client client_ = server_.Connect();
   std::unique_ptr<client::FrameReader> witness_ = Stream(client_, Every(client::Detail::kFull));
   uint64_t sequence_ = 0;
@@ -122,10 +134,12 @@ TEST_F(Hostile, GarbageOnThePort) {
 }
 
 TEST_F(Hostile, ConnectionsThatSayNothingAreClosed) {
-  std::vector<RawSocket> silent, half_open;
+  const auto impatient = ImpatientServer();
+  std::vector<RawSocket> silent, half_open, beside_witness;
   for (int i = 0; i < 100; ++i) {
-    silent.emplace_back(server_.server().address());
-    half_open.emplace_back(server_.server().address());
+    beside_witness.emplace_back(server_.server().address());
+    silent.emplace_back(impatient->address());
+    half_open.emplace_back(impatient->address());
     half_open.back().Send(Http2Preface());
   }
   Frames(50);
@@ -136,16 +150,17 @@ TEST_F(Hostile, ConnectionsThatSayNothingAreClosed) {
 
 TEST_F(Hostile, AStoppedProgramIsGivenUp) {
   using taclink::testing::Process;
-  Process watch(
-      {TACLINK, "watch", "--server", server_.server().address(), "--json", "--every", "--detail", "full"});
-  WaitForStreams(2);
+  const auto impatient = ImpatientServer();
+  Process watch({testing::kTaclink, "watch", "--server", impatient->address(), "--json", "--every",
+                 "--detail", "full"});
+  WaitForStreams(*impatient, 1);
   watch.Signal(SIGSTOP);
-  WaitForStreams(1);
+  WaitForStreams(*impatient, 0);
 }
 
 TEST_F(Hostile, AKilledProgramIsForgotten) {
   using taclink::testing::Process;
-  Process watch({TACLINK, "watch", "--server", server_.server().address(), "--json"});
+  Process watch({testing::kTaclink, "watch", "--server", server_.server().address(), "--json"});
   WaitForStreams(2);
   watch.Signal(SIGKILL);
   WaitForStreams(1);

@@ -6,6 +6,7 @@
 #include <regex>
 
 #include "tests/end_to_end/support.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -39,7 +40,7 @@ class ClientPackageTest : public ScratchFolder {
   }
   /// Prints links and forces of a simulated arm.
   void ExpectWorks(const std::string& program) {
-    Process server({TACLINKD, "--listen", "127.0.0.1:0", "--http-listen", ""});
+    Process server({kTaclinkd, "--listen", "127.0.0.1:0", "--http-listen", ""});
     const std::string address = AddressOf(server);
     Process monitor({program, address, "300"});
     const auto first = monitor.ReadLine(kLong);

@@ -21,6 +21,27 @@ TEST(Mailbox, KeepsTheNewestAndCountsTheOthers) {
   EXPECT_EQ(taken, 3);
 }
 
+TEST(Mailbox, AWriterThatWaitsLosesNothing) {
+  constexpr int kCount = 2000;
+  Mailbox<int> mailbox;
+  EXPECT_TRUE(mailbox.WaitUntilTaken(milliseconds(0))) << "nothing was put in";
+  std::jthread writer([&] {
+    for (int i = 1; i <= kCount; ++i) {
+      while (!mailbox.WaitUntilTaken(milliseconds(100))) {
+      }
+      int value = i;
+      mailbox.Put(value);
+    }
+  });
+  for (int i = 1; i <= kCount; ++i) {
+    int value = 0;
+    while (!mailbox.Take(value, milliseconds(100))) {
+    }
+    ASSERT_EQ(value, i);
+  }
+  EXPECT_EQ(mailbox.overwritten(), 0u);
+}
+
 TEST(Mailbox, BuffersGoRound) {
   Mailbox<std::vector<int>> mailbox;
   std::vector<int> written(100), read(100);

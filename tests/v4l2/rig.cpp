@@ -3,6 +3,8 @@
 #include <ctime>
 #include <fstream>
 
+#include "tests/support/paths.h"
+
 namespace taclink::testing {
 namespace {
 
@@ -53,7 +55,7 @@ std::string Rig::StartServer() {
   std::ofstream(kConfigPath) << "taclink_config: 1\narm:\n  name: rig\n  links:\n"
                              << LinkConfig("a", "mjpeg") << LinkConfig("b", "auto");
   server_ = std::make_unique<Process>(
-      std::vector<std::string>{TACLINKD, "--config", kConfigPath, "--listen", "127.0.0.1:0"});
+      std::vector<std::string>{kTaclinkd, "--config", kConfigPath, "--listen", "127.0.0.1:0"});
   const auto line = server_->ReadUntil("listening on ", std::chrono::seconds(60), true);
   if (!line) return "the server does not start: " + server_->Wait(std::chrono::seconds(1)).err;
   address_ = line->substr(line->find("listening on ") + 13);

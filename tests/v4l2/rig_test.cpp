@@ -18,6 +18,7 @@
 #include "sensing/core/clock.h"
 #include "taclink/v1/tactile.grpc.pb.h"
 #include "tests/sensing/capture/pictures.h"
+#include "tests/support/paths.h"
 
 namespace taclink::testing {
 namespace {
@@ -359,7 +360,7 @@ TEST_F(RigTest, FCamerasAreListed) {
   EmulatedCamera camera("listed", [](int64_t, uint8_t) { return std::span<const uint8_t>(); });
   ASSERT_EQ(camera.Plug(7), "");
   while (!FindCamera("serial:listed")) LetTimePass();
-  const Finished listed = RunToEnd({TACLINK, "cameras"});
+  const Finished listed = RunToEnd({kTaclink, "cameras"});
   EXPECT_EQ(listed.exit_code, 0) << listed.err;
   EXPECT_THAT(listed.out, HasSubstr("'Emulated camera' usb:1-8 serial:listed"));
   EXPECT_THAT(listed.out, HasSubstr("MJPG  320x240    120, 60, 30 per second"));

@@ -52,7 +52,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[servers.Server]
         servers.link("pressed", "press", PRESSED),
         servers.link("idle", "rest", ", pose: {position_mm: [0, 0, 240]}"),
     )
-    running = servers.touched_later(tmp_path_factory.mktemp("server"), config, "pressed")
+    running = servers.measuring(tmp_path_factory.mktemp("server"), config, "pressed")
     yield running
     running.stop()
 

@@ -31,7 +31,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[servers.Server]:
     pose = ", pose: {frame: forearm, position_mm: [0, 0, 0], rotation_deg: [0, 0, 90]}"
     links = servers.links(servers.link("skin", "press", pose))
     config = servers.HEAD + links.replace("  name: test\n", "  name: test\n  urdf: arm.urdf\n", 1)
-    running = servers.touched_later(folder, config, "skin")
+    running = servers.measuring(folder, config, "skin")
     yield running
     running.stop()
 

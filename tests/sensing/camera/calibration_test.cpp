@@ -9,6 +9,7 @@
 #include "sensing/markers/detector.h"
 #include "sensing/markers/rest_labels.h"
 #include "sensing/model/model_file.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_jpeg.h"
 #include "tests/support/synthetic_markers.h"
 
@@ -197,7 +198,7 @@ TEST(Calibration, RealPicture) {
   const LinkModel model = LoadLinkModel("barrel").value();
   MarkerDetector detector;
   Detections found;
-  detector.Detect(ReadJpegGray(std::string(TACLINK_TEST_DATA) + "/barrel_real_bottom.jpg"), found);
+  detector.Detect(ReadJpegGray(testing::TestData("barrel_real_bottom.jpg")), found);
   const auto labels = LabelRestPicture(model, CameraId::kBottom, found);
   ASSERT_TRUE(labels.ok()) << labels.error().message;
   for (const LensKind lens : {LensKind::kDivision, LensKind::kKannalaBrandt}) {

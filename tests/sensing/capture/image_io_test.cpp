@@ -10,6 +10,7 @@
 #include <random>
 
 #include "tests/sensing/capture/pictures.h"
+#include "tests/support/paths.h"
 
 namespace taclink {
 namespace {
@@ -84,7 +85,7 @@ TEST_F(ImageIo, JpegIsRead) {
   const auto read = ReadGrayImage(path_);
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_LE(LargestDifference(*read, picture), 3);
-  const auto real = ReadGrayImage(std::string(TACLINK_TEST_DATA) + "/barrel_real_bottom.jpg");
+  const auto real = ReadGrayImage(testing::TestData("barrel_real_bottom.jpg"));
   ASSERT_TRUE(real) << real.error().message;
   EXPECT_EQ(real->size(), cv::Size(640, 480));
 }

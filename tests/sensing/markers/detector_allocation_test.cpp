@@ -4,15 +4,16 @@
 
 #include "sensing/markers/detector.h"
 #include "tests/support/count_allocations.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_jpeg.h"
 
 namespace taclink {
 namespace {
 
 TEST(DetectorAllocation, NoneOncePicturesOfTheKindWereSeen) {
-  const std::string folder = TACLINK_TEST_DATA;
-  const cv::Mat real = ReadJpegGray(folder + "/barrel_real_bottom.jpg"),
-                simulated = ReadJpegGray(folder + "/barrel_simulated_top.jpg");
+  const std::string folder = testing::TestData("");
+  const cv::Mat real = ReadJpegGray(folder + "barrel_real_bottom.jpg"),
+                simulated = ReadJpegGray(folder + "barrel_simulated_top.jpg");
   MarkerDetector detector;
   Detections found;
   const long before = allocations;

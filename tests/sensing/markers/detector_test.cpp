@@ -9,6 +9,7 @@
 #include <string>
 
 #include "tests/support/drawn_vector.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_jpeg.h"
 
 namespace taclink {
@@ -241,7 +242,7 @@ TEST(Detector, OddPicturesGiveNothing) {
 }
 
 std::vector<Vec2> ReadPoints(const std::string& name) {
-  std::ifstream file(std::string(TACLINK_TEST_DATA) + "/" + name);
+  std::ifstream file(testing::TestData(name));
   std::vector<Vec2> points;
   for (std::string line; std::getline(file, line);) {
     double x = 0, y = 0;
@@ -255,7 +256,7 @@ TEST(Detector, RealPictureAgainstMarkersFoundByEye) {
   ASSERT_EQ(truth.size(), 256u);
   MarkerDetector detector;
   Detections found;
-  detector.Detect(ReadJpegGray(std::string(TACLINK_TEST_DATA) + "/barrel_real_bottom.jpg"), found);
+  detector.Detect(ReadJpegGray(testing::TestData("barrel_real_bottom.jpg")), found);
   int hits = 0;
   for (const Vec2& marker : truth) hits += Nearest(found, marker, 2.5) != nullptr ? 1 : 0;
   int wrong = 0;
@@ -273,10 +274,10 @@ TEST(Detector, RealPictureAgainstMarkersFoundByEye) {
 }
 
 TEST(Detector, SimulatedPictures) {
-  for (const char* name : {"/barrel_simulated_top.jpg", "/barrel_simulated_bottom.jpg"}) {
+  for (const char* name : {"barrel_simulated_top.jpg", "barrel_simulated_bottom.jpg"}) {
     MarkerDetector detector;
     Detections found;
-    detector.Detect(ReadJpegGray(std::string(TACLINK_TEST_DATA) + name), found);
+    detector.Detect(ReadJpegGray(testing::TestData(name)), found);
     // 256 discs, and a jagged rim of which some bits look like dim ones.
     const auto bright =
         std::count_if(found.begin(), found.end(), [](const Detection& d) { return d.area_px2 > 7; });

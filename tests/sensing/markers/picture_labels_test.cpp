@@ -9,6 +9,7 @@
 
 #include "sensing/markers/detector.h"
 #include "sensing/model/model_file.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_jpeg.h"
 
 namespace taclink {
@@ -21,7 +22,7 @@ struct TrueMarker {
 
 // Places and labels that somebody saw and counted in enlarged crops.
 std::vector<TrueMarker> ReadTruth(const LinkModel& model) {
-  std::ifstream file(std::string(TACLINK_TEST_DATA) + "/barrel_real_bottom_markers.csv");
+  std::ifstream file(testing::TestData("barrel_real_bottom_markers.csv"));
   std::string line;
   std::getline(file, line);
   std::vector<TrueMarker> truth;
@@ -90,7 +91,7 @@ class RealPictureLabels : public ::testing::Test {
 
   MarkerDetector detector_;
   const LinkModel model_ = LoadLinkModel("barrel").value();
-  const cv::Mat picture_ = ReadJpegGray(std::string(TACLINK_TEST_DATA) + "/barrel_real_bottom.jpg");
+  const cv::Mat picture_ = ReadJpegGray(testing::TestData("barrel_real_bottom.jpg"));
   const std::vector<TrueMarker> truth_ = ReadTruth(model_);
   int labelled_ = 0, wrong_ = 0, shown_ = 0;
 };

@@ -8,6 +8,7 @@
 #include "sensing/simulation/renderer.h"
 #include "sensing/simulation/simulated_skin.h"
 #include "tests/support/drawn_vector.h"
+#include "tests/support/paths.h"
 #include "tests/support/read_jpeg.h"
 #include "tests/support/synthetic_markers.h"
 
@@ -149,7 +150,7 @@ TEST(RestLabels, RealPicture) {
   const LinkModel model = LoadLinkModel("barrel").value();
   MarkerDetector detector;
   Detections found;
-  detector.Detect(ReadJpegGray(std::string(TACLINK_TEST_DATA) + "/barrel_real_bottom.jpg"), found);
+  detector.Detect(ReadJpegGray(testing::TestData("barrel_real_bottom.jpg")), found);
   const auto seen = LabelRestPicture(model, CameraId::kBottom, found);
   ASSERT_TRUE(seen.ok()) << seen.error().message;
   EXPECT_GE(std::count_if(seen->begin(), seen->end(), [](const auto& o) { return o.seen; }), 225);

@@ -72,6 +72,26 @@ TEST_F(SimulatedSourceTest, SkipsToTheNewestWhenLate) {
   EXPECT_EQ(frame_.sequence, 360'006U);
 }
 
+TEST_F(SimulatedSourceTest, PacedByFramesSkipsNothing) {
+  auto made =
+      SimulatedSource::Make(Model("cylinder"), SceneWith("frame_rate_hz: 100\n"), clock_, ScenePace::kFrames);
+  ASSERT_TRUE(made.ok());
+  const auto source = std::move(*made);
+  EXPECT_TRUE(source->WaitsForReader());
+  ASSERT_TRUE(source->Start().ok());
+  int64_t last_ns = 0;
+  for (uint64_t k = 0; k < 6; ++k) {
+    clock_.now_ns += (k % 2 == 0 ? 2 : 3000) * kMs;  // within the period, and far behind it
+    ASSERT_TRUE(source->Next(frame_, milliseconds(20)).ok());
+    EXPECT_EQ(frame_.sequence, k);
+    EXPECT_EQ(source->truth().frame, k);
+    EXPECT_GE(frame_.times.exposure_monotonic_ns, last_ns + (k == 0 ? 0 : 10 * kMs))
+        << "at most at the scene's rate";
+    EXPECT_LT(clock_.now_ns - frame_.times.exposure_monotonic_ns, 10 * kMs) << "exposed just now";
+    last_ns = frame_.times.exposure_monotonic_ns;
+  }
+}
+
 TEST_F(SimulatedSourceTest, TimesOutAndComesBack) {
   const auto source = Source("");
   ASSERT_TRUE(source->Start().ok());
@@ -121,7 +141,7 @@ TEST_F(SimulatedSourceTest, EndsWhereTheSceneDoes) {
 TEST_F(SimulatedSourceTest, ReusesTheFramesBuffers) {
   Scene scene = LoadScene("stroke").value();
   scene.skin = SkinKind::kLinear;
-  const auto source = MakeSimulatedSource(Model("cylinder"), scene, clock_);
+  const auto source = MakeSimulatedSource(Model("cylinder"), scene, clock_, ScenePace::kClock);
   ASSERT_TRUE(source.ok());
   ASSERT_TRUE((*source)->Start().ok());
   ASSERT_TRUE((*source)->Next(frame_, milliseconds(50)).ok());

@@ -11,7 +11,7 @@ endif()
 if("${installed}" STREQUAL "${wanted}")
   return()
 endif()
-execute_process(COMMAND "${NPM}" ci --ignore-scripts --no-audit --no-fund --prefer-offline
+execute_process(COMMAND "${NPM}" ci --ignore-scripts --no-audit --no-fund --prefer-offline --fetch-retries=5
                 WORKING_DIRECTORY "${FOLDER}" RESULT_VARIABLE failed ERROR_VARIABLE trouble OUTPUT_QUIET)
 if(failed)
   message(FATAL_ERROR "npm can't install the packages of ${FOLDER}/package.json; is there a network?\n${trouble}")

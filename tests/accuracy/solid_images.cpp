@@ -1,26 +1,17 @@
-// The whole way from pictures to forces against three-dimensional solids: pictures of their markers, by
-// cameras that sit elsewhere than the model says and blur more than the renderer's default.
-// TACLINK_SOLIDS=NAME: the scenes whose name begins so, and all of them for "" (the test takes those that
-// were kept out of tuning).
-#include <gtest/gtest.h>
+#include "tests/accuracy/solid_images.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <opencv2/core.hpp>
 
 #include "sensing/core/clock.h"
 #include "sensing/pipeline/link_pipeline.h"
 #include "sensing/simulation/renderer.h"
-#include "tests/accuracy/solid_judge.h"
-#include "tests/accuracy/solid_scenes.h"
 
 namespace taclink {
 namespace {
 
 constexpr int kRestFrames = 4, kWayFrames = 5, kHeldFrames = 3;
-constexpr double kRmsMm = 0.15, kWorstMm = 3;
 
 // The skin between its markers is straight; its normals are those of their neighbors.
 class SolidWriter {
@@ -158,57 +149,27 @@ class SolidLink {
   std::string tare_trouble_;
 };
 
-struct Shape {
-  double rms_mm = 0, worst_mm = 0;
-};
-
-Shape ShapeOf(const SolidScene& scene, const LinkModel& model, const LinkState& state) {
-  Shape shape;
+void AddShapeErrors(const SolidScene& scene, const LinkState& state, AccuracyRow& row) {
+  const LinkModel model = SolidSkin();
+  double sum = 0;
   for (int m = 0; m < model.markers.count(); ++m) {
     const auto i = static_cast<size_t>(m);
     const double off = (state.shape.positions_mm[i] - model.RestMarker(m) - scene.markers_mm[i]).norm();
-    shape.rms_mm += off * off / model.markers.count();
-    shape.worst_mm = std::max(shape.worst_mm, off);
+    sum += off * off;
+    row.shape_worst_mm = std::max(row.shape_worst_mm, off);
   }
-  shape.rms_mm = std::sqrt(shape.rms_mm);
-  return shape;
-}
-
-TEST(SolidPictures, ForcesHold) {
-  const char* only = std::getenv("TACLINK_SOLIDS");
-  const LinkModel model = SolidSkin();
-  int all = 0, held = 0, said = 0, silent = 0, near = 0, close = 0, ok = 0;
-  for (const SolidScene& scene : ReadSolidScenes()) {
-    if (only == nullptr ? !scene.held_out : !scene.name.starts_with(only)) continue;
-    SolidLink link;
-    const LinkState& state = link.Show(scene);
-    ++all;
-    const std::string fault = state.measured() ? FaultOf(scene, state.contacts) : "no answer";
-    const bool is_ok = state.status == LinkStatus::kOk;
-    held += fault.empty();
-    said += !fault.empty() && !is_ok;
-    silent += !fault.empty() && is_ok;
-    Shape shape;
-    if (is_ok) {
-      shape = ShapeOf(scene, model, state);
-      ++ok;
-      near += shape.rms_mm <= kRmsMm;
-      close += shape.worst_mm <= kWorstMm;
-    }
-    if (!fault.empty() || only != nullptr || shape.worst_mm > kWorstMm)
-      std::printf("  %s: %s; %s%s; markers %.3f mm RMS, %.2f mm at most; %d seen\n", scene.name.c_str(),
-                  fault.empty() ? "holds" : fault.c_str(), is_ok ? "ok" : state.status_reason.c_str(),
-                  link.tare_trouble().c_str(), shape.rms_mm, shape.worst_mm, state.shape.seen());
-  }
-  std::printf(
-      "pictures: %d of %d hold, %d more say that they don't, %d don't; of %d that are ok, %d within %.2f mm "
-      "RMS, "
-      "%d within %.0f mm\n",
-      held, all, said, silent, ok, near, kRmsMm, close, kWorstMm);
-  ASSERT_GT(all, 0) << "tests/accuracy/calculix has no scenes";
-  EXPECT_GE(held, 0.8 * all);
-  EXPECT_GE(close, 0.95 * ok);
+  row.shape_rms_mm = std::sqrt(sum / model.markers.count());
 }
 
 }  // namespace
+
+AccuracyRow SolveSolidImages(const SolidScene& scene) {
+  SolidLink link;
+  const LinkState& state = link.Show(scene);
+  AccuracyRow row = MakeRow("images", scene, state);
+  if (row.is_ok) AddShapeErrors(scene, state, row);
+  if (!link.tare_trouble().empty()) row.fault += " " + link.tare_trouble();
+  return row;
+}
+
 }  // namespace taclink
