@@ -19,7 +19,7 @@ using std::chrono::milliseconds;
 
 constexpr int kKeepaliveMs = 10'000;
 constexpr milliseconds kKeepalivePatience{5'000};
-constexpr milliseconds kAttemptPatience{20'000};  // gRPC's own, of one attempt to connect
+constexpr milliseconds kAttemptPatience{20'000};  // gRPC's own
 
 // gRPC's own call credentials refuse to go without TLS, also to this machine itself.
 class TokenInterceptor final : public grpc::experimental::Interceptor {
@@ -99,7 +99,8 @@ Result<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, static_cast<int>(Patience(kKeepalivePatience).count()));
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, static_cast<int>(attempt->count()));  // not a pause
+  // Despite its name: how long one attempt to connect may take.
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, static_cast<int>(attempt->count()));
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
   if (!credentials.token.empty())
     interceptors.push_back(std::make_unique<TokenInterceptorFactory>(credentials.token));

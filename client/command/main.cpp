@@ -12,6 +12,9 @@ namespace {
 
 constexpr int kFailed = 1;
 constexpr int kUsage = 2;
+constexpr const char* kEnvironment =
+    "Environment: TACLINK_PATIENCE_S is the least number of seconds that a server gets to answer, for\n"
+    "slow machines. Without it: 3 to connect, 5 between messages of a stream, 10 or more for a call.";
 
 int Complain(std::string message, int code) {
   std::replace(message.begin(), message.end(), '\n', ' ');
@@ -48,6 +51,7 @@ int main(int argc, char** argv) {
   taclink::command::AddEvents(arguments, selected);
   taclink::command::AddThresholds(arguments, selected);
   taclink::command::AddSet(arguments, selected);
+  app.footer(kEnvironment);  // last: commands that are added later inherit it
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -1,4 +1,5 @@
 // Lists the links, then prints all contacts of the arm: places in m, forces in N, both in the arm's base frame.
+import { patienceS } from "./lib/patience.mjs";
 import { name, vector } from "./lib/print.mjs";
 import { number, program } from "./lib/program.mjs";
 import { utcText } from "./lib/taclink.mjs";
@@ -39,7 +40,8 @@ await program(OPTIONS, async ({ tactile }, options) => {
   printLinks((await tactile.getArm()).arm);
   let taken = 0;
   // The server says something at least once a second, but never more often than asked for.
-  for await (const message of tactile.streamContacts({ max_rate_hz: rate }, { silenceS: 5 + 3 / rate })) {
+  const silenceS = patienceS(5) + 3 / rate;
+  for await (const message of tactile.streamContacts({ max_rate_hz: rate }, { silenceS })) {
     printContacts(message);
     if (++taken >= count && count > 0) break;
   }

@@ -4,6 +4,7 @@ import foxglove from "@foxglove/ws-protocol";
 import { WebSocketServer } from "ws";
 
 import { encode, sceneOf, schemaOf, transformOf } from "./lib/foxglove.mjs";
+import { patienceS } from "./lib/patience.mjs";
 import { number, program } from "./lib/program.mjs";
 
 const { FoxgloveServer } = foxglove;
@@ -67,7 +68,7 @@ function timeOf({ exposure_utc_ns: ns }) {
 async function sendFrames({ tactile }, arm, channels, rate) {
   const grids = new Map(arm.links.map((link) => [link.name, link.model.markers]));
   const request = { detail: "DETAIL_GEOMETRY", max_rate_hz: rate };
-  for await (const { frame } of tactile.streamFrames(request, { silenceS: SILENCE_S })) {
+  for await (const { frame } of tactile.streamFrames(request, { silenceS: patienceS(SILENCE_S) })) {
     if (!frame) continue;
     const ns = timeOf(frame.times);
     channels.send(`/links/${frame.link}/frame`, ns, () => frame);
@@ -76,13 +77,13 @@ async function sendFrames({ tactile }, arm, channels, rate) {
 }
 
 async function sendContacts({ tactile }, channels, rate) {
-  for await (const contacts of tactile.streamContacts({ max_rate_hz: rate }, { silenceS: SILENCE_S })) {
+  for await (const contacts of tactile.streamContacts({ max_rate_hz: rate }, { silenceS: patienceS(SILENCE_S) })) {
     channels.send("/contacts", contacts.utc_ns, () => contacts);
   }
 }
 
 async function sendEvents({ tactile }, channels) {
-  for await (const { event } of tactile.streamEvents({}, { silenceS: SILENCE_S })) {
+  for await (const { event } of tactile.streamEvents({}, { silenceS: patienceS(SILENCE_S) })) {
     if (event) channels.send("/events", event.times.raised_utc_ns, () => event);
   }
 }

@@ -1,4 +1,5 @@
 // Records some seconds of what the arm feels on the server, lists the logs there, and plays the new one again.
+import { patienceS } from "./lib/patience.mjs";
 import { number, program } from "./lib/program.mjs";
 import { secondsBetween, utcText } from "./lib/taclink.mjs";
 
@@ -26,7 +27,7 @@ async function pause(seconds) {
 async function record(recording, name, seconds) {
   await recording.startRecording({ name, note: "record_replay.mjs" });
   await pause(seconds);
-  const { status } = await recording.stopRecording({}, { timeoutS: 60 });
+  const { status } = await recording.stopRecording({}, { timeoutS: patienceS(60) });
   if (status.trouble) throw new Error(status.trouble);
   console.log(
     `recorded ${status.log}: ${status.frames} frames, ${status.frames_lost} lost, ${status.bytes} bytes`,
@@ -82,7 +83,7 @@ async function replay(recording, log, speed) {
   let frames = 0;
   let status;
   console.log(`plays ${log}`);
-  for await (const reply of recording.replay(request, { silenceS: 10 })) {
+  for await (const reply of recording.replay(request, { silenceS: patienceS(10) })) {
     if (reply.message === "status") status = reply.status;
     if (reply.message !== "frame") continue;
     ++frames;

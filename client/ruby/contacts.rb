@@ -37,7 +37,8 @@ program.run do |client, options|
   print_links(client.tactile.get_arm.arm)
   rate = options[:rate].to_f
   # The server says something at least once a second, but never more often than asked for.
-  client.tactile.stream_contacts({ max_rate_hz: rate }, silence_s: 5 + 3 / rate).with_index(1) do |message, taken|
+  silence_s = Taclink::Patience.seconds(5) + 3 / rate
+  client.tactile.stream_contacts({ max_rate_hz: rate }, silence_s: silence_s).with_index(1) do |message, taken|
     print_contacts(message)
     break if options[:count].positive? && taken >= options[:count]
   end

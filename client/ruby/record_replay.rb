@@ -16,7 +16,7 @@ end
 def record(recording, name, seconds)
   recording.start_recording({ name: name, note: 'record_replay.rb' })
   pause(seconds)
-  status = recording.stop_recording({}, timeout_s: 60).status
+  status = recording.stop_recording({}, timeout_s: Taclink::Patience.seconds(60)).status
   raise Taclink::Error, status.trouble unless status.trouble.empty?
 
   puts "recorded #{status.log}: #{status.frames} frames, #{status.frames_lost} lost, #{status.bytes} bytes"
@@ -62,7 +62,7 @@ def replay(recording, log, speed)
   seconds = Seconds.new
   status = nil
   frames = 0
-  recording.replay(request, silence_s: 10) do |reply|
+  recording.replay(request, silence_s: Taclink::Patience.seconds(10)) do |reply|
     status = reply.status if reply.message == :status
     next unless reply.message == :frame
 

@@ -100,7 +100,7 @@ TEST_F(EventCommandTest, FromTheTouchToTheTareThatIsForced) {
   EXPECT_NE(Taclink({"thresholds", "--link", "a", "--alarm", "0.05", "--server", address_}).exit_code, 0);
 
   server_->Signal(SIGTERM);
-  EXPECT_EQ(server_->Wait(seconds(30)).exit_code, 0);
+  EXPECT_EQ(server_->Wait(seconds(60)).exit_code, 0);
   std::ifstream file(Path("audit.jsonl"));
   std::vector<std::string> what;
   for (std::string line; std::getline(file, line);) what.push_back(json::parse(line).at("what"));

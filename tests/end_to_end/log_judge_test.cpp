@@ -17,7 +17,7 @@ using std::chrono::seconds;
 
 class LogJudge : public ScratchFolder {
  protected:
-  // Some seconds of two links, pictures as well. Returns the log's path.
+  // Four seconds' frames of two links, pictures as well. Returns the log's path.
   std::string Record(const std::string& compression) const {
     Write("touch.yaml",
           "taclink_scene: 1\nname: touch\nmodel: cylinder\nframe_rate_hz: 10\nduration_s: 3\n"
@@ -32,13 +32,10 @@ class LogJudge : public ScratchFolder {
                   "       pose: {position_mm: [0, 0, 200]}}\n");
     Process server({kTaclinkd, "--config", config});
     const std::string address = AddressOf(server);
-    const Finished recorded =
-        Taclink({"record", "start", "--json", "--duration", "4", "--pictures", "--server", address});
-    EXPECT_EQ(recorded.exit_code, 0) << recorded.err;
+    const std::string log = RecordFrames(address, {"a", "b"}, 80, {"--pictures"});
     server.Signal(SIGTERM);
     EXPECT_EQ(server.Wait(seconds(60)).exit_code, 0);
-    return recorded.exit_code == 0 ? Path("logs/" + json::parse(recorded.out).at("log").get<std::string>())
-                                   : "";
+    return log.empty() ? "" : Path("logs/" + log);
   }
   void Make(const std::vector<std::string>& arguments) const {
     const Finished made = Taclink(arguments);

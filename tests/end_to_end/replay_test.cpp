@@ -3,7 +3,6 @@
 #include <signal.h>
 
 #include <set>
-#include <sstream>
 
 #include "tests/end_to_end/support.h"
 #include "tests/support/paths.h"
@@ -13,13 +12,6 @@ namespace {
 
 using std::chrono::seconds;
 using ::testing::HasSubstr;
-
-std::vector<json> Lines(const std::string& text) {
-  std::vector<json> out;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) out.push_back(json::parse(line));
-  return out;
-}
 
 class ReplayTest : public ScratchFolder {
  protected:
@@ -32,22 +24,6 @@ class ReplayTest : public ScratchFolder {
                      "    - {name: b, model: cylinder, source: simulated, scene: rest.yaml,\n"
                      "       pose: {position_mm: [0, 0, 200]}}\n");
   }
-  static void WaitUntilMeasuring(const std::string& address, const std::string& link) {
-    for (int i = 0; i < 100; ++i) {
-      const Finished one = Taclink(
-          {"watch", "--json", "--links", link, "--count", "3", "--patience", "60", "--server", address});
-      ASSERT_EQ(one.exit_code, 0) << one.err;
-      if (Lines(one.out).back().at("status") == "ok") return;
-    }
-    FAIL() << link << " does not measure";
-  }
-  /// Some seconds of it; returns the log's name.
-  static std::string Record(const std::string& address) {
-    for (const char* link : {"a", "b"}) WaitUntilMeasuring(address, link);
-    const Finished recorded = Taclink({"record", "start", "--json", "--duration", "3", "--server", address});
-    EXPECT_EQ(recorded.exit_code, 0) << recorded.err;
-    return recorded.exit_code == 0 ? json::parse(recorded.out).at("log").get<std::string>() : "";
-  }
 };
 
 TEST_F(ReplayTest, WhatWasRecordedIsPlayedAndServed) {
@@ -56,7 +32,7 @@ TEST_F(ReplayTest, WhatWasRecordedIsPlayedAndServed) {
   {
     Process server({kTaclinkd, "--config", Config()});
     const std::string address = AddressOf(server);
-    log = Record(address);
+    log = RecordFrames(address, {"a", "b"}, 60);
     const Finished played = Taclink(
         {"record", "play", log, "--json", "--speed", "0", "--detail", "geometry", "--server", address});
     ASSERT_EQ(played.exit_code, 0) << played.err;

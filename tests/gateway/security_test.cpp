@@ -12,6 +12,7 @@
 #include "tests/gateway/security_support.h"
 #include "tests/server/support.h"
 #include "tests/support/log_capture.h"
+#include "tests/support/prerequisite.h"
 
 namespace taclink::server {
 namespace {
@@ -140,7 +141,7 @@ TEST_F(SecurityTest, KeysAndTokensThatOthersMayUseAreRefused) {
 }
 
 TEST_F(SecurityTest, AGroupThatMayReadIsTheServersOwn) {
-  if (geteuid() != 0) GTEST_SKIP() << "only root gives files to other groups";
+  TACLINK_REQUIRE(geteuid() == 0, "only root gives files to other groups: run the tests as root");
   constexpr gid_t kStrangers = 54321;
   for (const char* name : {"server.key", "tokens"}) {
     ASSERT_EQ(chown(Path(name).c_str(), getuid(), kStrangers), 0);

@@ -43,10 +43,11 @@ class Heard {
   std::vector<T> all_;
 };
 
-/// A server that can be taken away and come back at the same address.
+/// A server that can be taken away and come back at the same address: a port could be another program's by
+/// then.
 class FollowTest : public ::testing::Test {
  protected:
-  FollowTest() : server_(std::make_unique<TestServer>()), address_(server_->server().address()) {
+  FollowTest() {
     options_.address = address_;
     options_.first_delay = milliseconds(1);
     options_.longest_delay = milliseconds(4);
@@ -55,8 +56,9 @@ class FollowTest : public ::testing::Test {
     options_.on_refused = refused_.Listener();
   }
 
-  std::unique_ptr<TestServer> server_;
-  const std::string address_;
+  const std::string address_ = "unix:" + NewFolder("follow");
+  std::unique_ptr<TestServer> server_ = std::make_unique<TestServer>(
+      TestLimits(), nullptr, TestServer::MakePressure{}, RecordingConfig{}, address_);
   Heard<bool> connected_;
   Heard<Disconnection> disconnected_;
   Heard<Error> refused_;

@@ -8,6 +8,8 @@
 #include <array>
 #include <cstring>
 
+#include "tests/support/prerequisite.h"
+
 namespace taclink::server {
 namespace {
 
@@ -247,9 +249,9 @@ class SmallDiskTest : public RecordingFaultsTest {
  protected:
   void SetUp() override {
     fs::create_directories(folder_);
-    if (::mount("none", folder_.c_str(), "tmpfs", 0, "size=1m") != 0)
-      GTEST_SKIP() << "may not mount: " << std::strerror(errno);
-    is_mounted_ = true;
+    is_mounted_ = ::mount("none", folder_.c_str(), "tmpfs", 0, "size=1m") == 0;
+    TACLINK_REQUIRE(is_mounted_, "may not mount a tmpfs (" << std::strerror(errno)
+                                                           << "): run the tests as root with CAP_SYS_ADMIN");
   }
   ~SmallDiskTest() override { Unmount(); }
   void Unmount() {

@@ -302,12 +302,8 @@ TEST(Stream, CancelWakesAReader) {
 }
 
 TEST(Stream, NoServerSaysWhatToDo) {
-  std::string address;
-  {
-    TestServer server;
-    address = server.server().address();
-  }
-  const auto client = client::Client::Connect(address, milliseconds(200));
+  // A port of a server that has gone could be another program's by now.
+  const auto client = client::Client::Connect("127.0.0.1:1", milliseconds(200));
   ASSERT_FALSE(client.ok());
   EXPECT_EQ(client.error().code, ErrorCode::kUnavailable);
   EXPECT_THAT(client.error().message, HasSubstr("start taclinkd"));

@@ -3,12 +3,13 @@ import nats from "nats";
 
 import { read, staysHere } from "./credentials.mjs";
 import { Follower, streamInfo } from "./follower.mjs";
+import { patienceS } from "./patience.mjs";
 import { decode } from "./taclink.mjs";
 
 const TYPES = { contacts: "LinkFrame", event: "Event" }; // by the last part of the subject
 const URL_PATTERN = /^(?<scheme>nats|tls):\/\/(?<host>\[[\da-f:.]+\]|[^\s,@/:[\]]+)(?::(?<port>\d+))?$/;
 const PART_PATTERN = /^[\w-]+$/; // of a subject
-const CONNECT_MS = 3000;
+const CONNECT_S = 3;
 
 function connectOptions({ url, token, tlsCa }) {
   const { scheme, host, port = "4222" } = URL_PATTERN.exec(url)?.groups ?? {};
@@ -23,7 +24,7 @@ function connectOptions({ url, token, tlsCa }) {
     // The host is what the certificate must name, also where it is an address.
     tls: tls ? { ca: tlsCa && read(tlsCa), host: host.replace(/[[\]]/g, "") } : undefined,
     ignoreClusterUpdates: !tls, // other machines', where the token would go in the clear
-    timeout: CONNECT_MS,
+    timeout: 1000 * patienceS(CONNECT_S),
     maxReconnectAttempts: -1,
     reconnectTimeWait: 500,
     pingInterval: 5000,

@@ -9,7 +9,9 @@ const SERVER_OPTIONS = {
   "tls-key": ["FILE", "the key of this client's certificate", process.env.TACLINK_TLS_KEY],
 };
 
-const SERVER_NOTE = "The server's token is in the environment variable TACLINK_TOKEN.";
+const SERVER_NOTE =
+  "The server's token is in the environment variable TACLINK_TOKEN.\n" +
+  "TACLINK_PATIENCE_S: seconds to wait for a slow server, where that is more than usual.";
 
 function help(options, note) {
   const lines = Object.entries(options).map(([name, [kind, what, preset]]) => {

@@ -7,6 +7,7 @@ import protoLoader from "@grpc/proto-loader";
 
 import { answerOf, answerTo, messagesOf } from "./calls.mjs";
 import { callMetadata, channelCredentials } from "./credentials.mjs";
+import { patienceS } from "./patience.mjs";
 
 /** Folder of the .proto files. */
 export const PROTO = fileURLToPath(new URL("../../../proto", import.meta.url));
@@ -23,6 +24,7 @@ const { v1 } = grpc.loadPackageDefinition(definition).taclink;
 
 const CONNECT_S = 3;
 const CALL_S = 10;
+const PING_ANSWER_S = 5;
 
 // A service's methods as functions: `await getArm()`, `for await (const m of streamContacts({...}))`,
 // `await updateJointStates(messages)`.
@@ -37,7 +39,7 @@ function callsOf(Service, server, channel, metadata) {
       calls[originalName] = (request = {}, { silenceS = 0 } = {}) =>
         messagesOf(() => call(request, metadata), silenceS);
     } else {
-      calls[originalName] = (request = {}, { timeoutS = CALL_S } = {}) =>
+      calls[originalName] = (request = {}, { timeoutS = patienceS(CALL_S) } = {}) =>
         answerOf((options, done) => call(request, metadata, options, done), timeoutS);
     }
   }
@@ -56,14 +58,15 @@ function noServer(server, error) {
 
 /**
  * A connection with the services `tactile`, `recording` and `operations`, the `caller` that the server takes this
- * client for, and `close()`. A token goes with every call, never in the clear to another machine. Files are PEM.
+ * client for, and `close()`. A token goes with every call, never in the clear to another machine. Files are PEM. It
+ * waits 3 s for the server, and calls wait 10 s, or what TACLINK_PATIENCE_S says where that is more.
  */
 export async function connect({ server = "127.0.0.1:50051", ...secrets } = {}) {
   const metadata = callMetadata({ server, ...secrets });
   const channel = new grpc.Channel(server, channelCredentials(secrets), {
     "grpc.enable_http_proxy": 0, // robots are on the local network
     "grpc.keepalive_time_ms": 10_000, // a server that hangs, or whose network is gone, is noticed
-    "grpc.keepalive_timeout_ms": 5_000,
+    "grpc.keepalive_timeout_ms": Math.round(1000 * patienceS(PING_ANSWER_S)),
     "grpc.use_local_subchannel_pool": 1,
   });
   const connection = {
@@ -73,7 +76,7 @@ export async function connect({ server = "127.0.0.1:50051", ...secrets } = {}) {
     close: () => channel.close(),
   };
   try {
-    connection.caller = await connection.operations.getCaller({}, { timeoutS: CONNECT_S });
+    connection.caller = await connection.operations.getCaller({}, { timeoutS: patienceS(CONNECT_S) });
   } catch (error) {
     channel.close();
     const unreachable = [grpc.status.UNAVAILABLE, grpc.status.DEADLINE_EXCEEDED].includes(error.code);

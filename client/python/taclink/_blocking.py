@@ -11,7 +11,7 @@ import grpc
 
 from taclink import errors
 from taclink._calls import Call
-from taclink._channel import OPTIONS, Settings, stubs
+from taclink._channel import Settings, stubs
 from taclink._reconnect import RETRIED, Attempts
 from taclink._streams import StreamState
 
@@ -27,9 +27,9 @@ class Channel:
         self._address = settings.address
         self._metadata = settings.metadata
         if settings.credentials is None:
-            self._channel = grpc.insecure_channel(settings.address, OPTIONS)
+            self._channel = grpc.insecure_channel(settings.address, settings.options)
         else:
-            self._channel = grpc.secure_channel(settings.address, settings.credentials, OPTIONS)
+            self._channel = grpc.secure_channel(settings.address, settings.credentials, settings.options)
         self._stubs = stubs(self._channel)
 
     def start(self, service: str, method: str, request: Any, timeout_s: float | None = None) -> Any:

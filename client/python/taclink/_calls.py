@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from taclink._patience import SLOW_S, chosen_s
 from taclink.errors import InvalidArgument
 from taclink.messages.arm import Arm, arm_from
 from taclink.messages.baseline import LinkTare, tares_from
@@ -23,9 +24,6 @@ from taclink.names import Compression, ForceModel, number_of
 from taclink.v1 import events_pb2, operations_pb2, recording_pb2, tactile_pb2, tare_pb2
 
 T = TypeVar("T")
-
-# Waits for frames, a new model or the disk; servers answer all else at once.
-SLOW_S = 60.0
 
 
 @dataclass(frozen=True)
@@ -61,10 +59,10 @@ def restart_link(link: str) -> Call[None]:
 
 
 def tare(
-    links: str | Iterable[str], force: bool, frames: int, timeout: float
+    links: str | Iterable[str], force: bool, frames: int, timeout: float | None
 ) -> Call[tuple[LinkTare, ...]]:
     request = tare_pb2.TareRequest(links=names(links), force=force, frames=frames)
-    return Call("tactile", "Tare", request, tares_from, timeout)
+    return Call("tactile", "Tare", request, tares_from, chosen_s(timeout, SLOW_S))
 
 
 def set_thresholds(
@@ -80,10 +78,10 @@ def set_thresholds(
     )
 
 
-def set_force_model(link: str, model: str, timeout: float) -> Call[None]:
+def set_force_model(link: str, model: str, timeout: float | None) -> Call[None]:
     number = number_of(ForceModel, model, "model")
     request = tactile_pb2.SetForceModelRequest(link=link, model=number)
-    return Call("tactile", "SetForceModel", request, _nothing, timeout)
+    return Call("tactile", "SetForceModel", request, _nothing, chosen_s(timeout, SLOW_S))
 
 
 def set_camera(
@@ -92,14 +90,14 @@ def set_camera(
     automatic_exposure: bool,
     exposure_s: float | None,
     gain: int | None,
-    timeout: float,
+    timeout: float | None,
 ) -> Call[None]:
     if automatic_exposure and exposure_s is not None:
         raise InvalidArgument("either the camera decides on the exposure, or exposure_s says it")
     request = tactile_pb2.SetCameraRequest(link=link, camera=camera, exposure_s=exposure_s, gain=gain)
     if automatic_exposure:
         request.automatic = True
-    return Call("tactile", "SetCamera", request, _nothing, timeout)
+    return Call("tactile", "SetCamera", request, _nothing, chosen_s(timeout, SLOW_S))
 
 
 def calibrate_request(link: str, pairs: int, save: bool, force: bool) -> tactile_pb2.CalibrateRequest:
@@ -107,7 +105,7 @@ def calibrate_request(link: str, pairs: int, save: bool, force: bool) -> tactile
 
 
 def start_recording(
-    name: str, links: str | Iterable[str], pictures: bool, compression: str, note: str, timeout: float
+    name: str, links: str | Iterable[str], pictures: bool, compression: str, note: str, timeout: float | None
 ) -> Call[RecorderStatus]:
     request = recording_pb2.StartRecordingRequest(
         name=name,
@@ -116,31 +114,29 @@ def start_recording(
         compression=number_of(Compression, compression, "compression"),
         note=note,
     )
-    return Call("recording", "StartRecording", request, _status_of, timeout)
+    return Call("recording", "StartRecording", request, _status_of, chosen_s(timeout, SLOW_S))
 
 
 def _status_of(answer: Any) -> RecorderStatus:
     return recorder_from(answer.status)
 
 
-def stop_recording(timeout: float) -> Call[RecorderStatus]:
-    return Call(
-        "recording", "StopRecording", recording_pb2.StopRecordingRequest(), _status_of, timeout
-    )
+def stop_recording(timeout: float | None) -> Call[RecorderStatus]:
+    request = recording_pb2.StopRecordingRequest()
+    return Call("recording", "StopRecording", request, _status_of, chosen_s(timeout, SLOW_S))
 
 
 def recorder() -> Call[RecorderStatus]:
     return Call("recording", "GetRecorder", recording_pb2.GetRecorderRequest(), _status_of)
 
 
-def logs(timeout: float) -> Call[tuple[Log, ...]]:
-    return Call("recording", "ListLogs", recording_pb2.ListLogsRequest(), logs_from, timeout)
+def logs(timeout: float | None) -> Call[tuple[Log, ...]]:
+    return Call("recording", "ListLogs", recording_pb2.ListLogsRequest(), logs_from, chosen_s(timeout, SLOW_S))
 
 
-def describe_log(log: str, timeout: float) -> Call[LogDescription]:
-    return Call(
-        "recording", "DescribeLog", recording_pb2.DescribeLogRequest(log=log), description_from, timeout
-    )
+def describe_log(log: str, timeout: float | None) -> Call[LogDescription]:
+    request = recording_pb2.DescribeLogRequest(log=log)
+    return Call("recording", "DescribeLog", request, description_from, chosen_s(timeout, SLOW_S))
 
 
 def delete_log(log: str) -> Call[None]:

@@ -10,21 +10,30 @@ from typing import Any, Union
 
 import grpc
 
+from taclink._patience import patience_s
 from taclink.errors import InvalidArgument, NotFound
 from taclink.v1 import operations_pb2_grpc, recording_pb2_grpc, tactile_pb2_grpc
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
 FilePath = Union[str, "os.PathLike[str]"]
 
-OPTIONS: tuple[tuple[str, int], ...] = (
-    ("grpc.enable_http_proxy", 0),  # robots are on the local network
-    # A connection of its own: on a shared one, a stream that is not read would hold up the others.
-    ("grpc.use_local_subchannel_pool", 1),
-    # A server or a network that vanished without a word is noticed within 15 s. Servers allow a ping each 5 s.
-    ("grpc.keepalive_time_ms", 10_000),
-    ("grpc.keepalive_timeout_ms", 5_000),
-    ("grpc.http2.max_pings_without_data", 0),
-)
+PING_ANSWER_S = 5.0
+ATTEMPT_S = 20.0  # gRPC's own
+
+
+def options() -> tuple[tuple[str, int], ...]:
+    """Errors: InvalidArgument (TACLINK_PATIENCE_S)."""
+    return (
+        ("grpc.enable_http_proxy", 0),  # robots are on the local network
+        # A connection of its own: on a shared one, a stream that is not read would hold up the others.
+        ("grpc.use_local_subchannel_pool", 1),
+        # A server or a network that vanished without a word is noticed within 15 s. Servers allow a ping each 5 s.
+        ("grpc.keepalive_time_ms", 10_000),
+        ("grpc.keepalive_timeout_ms", round(1e3 * patience_s(PING_ANSWER_S))),
+        ("grpc.http2.max_pings_without_data", 0),
+        # Despite its name: how long one attempt to connect may take.
+        ("grpc.min_reconnect_backoff_ms", round(1e3 * patience_s(ATTEMPT_S))),
+    )
 
 
 @dataclass(frozen=True)
@@ -34,6 +43,7 @@ class Settings:
     address: str
     credentials: Any = field(repr=False)  # None: in the clear
     metadata: tuple[tuple[str, str], ...] = field(repr=False)  # goes with each call
+    options: tuple[tuple[str, int], ...] = field(repr=False)  # gRPC's
 
 
 def stubs(channel: Any) -> dict[str, Any]:
@@ -89,4 +99,4 @@ def settings(
     if ca_file is not None:
         credentials = grpc.ssl_channel_credentials(_read(ca_file), _read(key_file), _read(certificate_file))
     metadata = (("authorization", f"Bearer {token}"),) if token else ()
-    return Settings(address, credentials, metadata)
+    return Settings(address, credentials, metadata, options())

@@ -10,9 +10,9 @@ import grpc
 
 from taclink import _calls, _channel, _requests, errors
 from taclink._blocking import Connection
-from taclink._calls import SLOW_S
 from taclink._channel import DEFAULT_ADDRESS, FilePath
 from taclink._download import Download
+from taclink._patience import CALL_S, SLOW_S, chosen_s
 from taclink._reconnect import OnReconnect, attempts
 from taclink.messages.arm import Arm
 from taclink.messages.baseline import CalibrationResult, LinkTare, calibration_from
@@ -39,10 +39,13 @@ class Client:
     token: shows who calls; never sent in the clear to another machine.
     ca_file: PEM; the server's certificate must be signed by one of these. None: no TLS.
     certificate_file, key_file: PEM; this client's own, for servers that ask for one.
-    timeout: s that a call, or the beginning of a stream, may take. What takes longer by nature has its own.
+    timeout: s that a call, or the beginning of a stream, may take; None: 10 s. What takes longer by nature has its
+    own; None: 60 s. Where it is None, the environment variable TACLINK_PATIENCE_S, a number of seconds, is taken if
+    it is more, for slow machines; a server then also has so long, not only 5 s, to show that it still lives.
 
     Errors of all methods, beside those they name (all TaclinkError): Unavailable, Timeout, Unauthenticated,
-    PermissionDenied; of streams also ResourceExhausted. Errors of the constructor: InvalidArgument, NotFound (a file).
+    PermissionDenied; of streams also ResourceExhausted. Errors of the constructor: InvalidArgument (also where
+    TACLINK_PATIENCE_S is not a positive number), NotFound (a file).
     Calls may come from several threads; one stream belongs to one.
     """
 
@@ -54,10 +57,10 @@ class Client:
         ca_file: FilePath | None = None,
         certificate_file: FilePath | None = None,
         key_file: FilePath | None = None,
-        timeout: float = 10.0,
+        timeout: float | None = None,
     ) -> None:
         settings = _channel.settings(address, token, ca_file, certificate_file, key_file)
-        self._connection = Connection(settings, timeout)
+        self._connection = Connection(settings, chosen_s(timeout, CALL_S))
 
     @property
     def address(self) -> str:
@@ -165,7 +168,7 @@ class Client:
         *,
         force: bool = False,
         frames: int = 10,
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> tuple[LinkTare, ...]:
         """Makes what the links show now (none: all) their untouched skins, each accepted or refused for itself.
 
@@ -182,7 +185,7 @@ class Client:
         save: bool = False,
         force: bool = False,
         on_progress: Callable[[int, int], object] | None = None,
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> CalibrationResult:
         """Finds a link's cameras and rest shape anew; nothing may touch its skin. Waits for the end.
 
@@ -193,7 +196,7 @@ class Client:
         """
         request = _calls.calibrate_request(link, pairs, save, force)
         channel = self._connection.channel()
-        call = channel.start("tactile", "Calibrate", request, timeout)
+        call = channel.start("tactile", "Calibrate", request, chosen_s(timeout, SLOW_S))
         try:
             for message in call:
                 if message.WhichOneof("message") == "result":
@@ -221,7 +224,7 @@ class Client:
         """
         return self._connection.ask(_calls.set_thresholds(link, warning_n, alarm_n, hysteresis_n, region))
 
-    def set_force_model(self, link: str, model: str, *, timeout: float = SLOW_S) -> None:
+    def set_force_model(self, link: str, model: str, *, timeout: float | None = None) -> None:
         """Computes the link's forces by "linear", "pressurised", "nonlinear" or "literal" until the server ends.
 
         Errors: NotFound (no such link), InvalidArgument, Refused (a log is played; "linear" on a skin that may be
@@ -237,7 +240,7 @@ class Client:
         automatic_exposure: bool = False,
         exposure_s: float | None = None,
         gain: int | None = None,
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> None:
         """How "top", "bottom" or (empty) both expose, until the server ends; what is not given stays.
 
@@ -270,7 +273,7 @@ class Client:
         pictures: bool = False,
         compression: str = "configured",
         note: str = "",
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> RecorderStatus:
         """name: part of the logs' names; empty: the arm's. links: none: all. compression: "none", "zstd" or "lz4".
 
@@ -280,7 +283,7 @@ class Client:
             _calls.start_recording(name, links, pictures, compression, note, timeout)
         )
 
-    def stop_recording(self, *, timeout: float = SLOW_S) -> RecorderStatus:
+    def stop_recording(self, *, timeout: float | None = None) -> RecorderStatus:
         """Returns when the last log is closed. Errors: Refused (none is under way)."""
         return self._connection.ask(_calls.stop_recording(timeout))
 
@@ -288,11 +291,11 @@ class Client:
         """How the server's recorder does."""
         return self._connection.ask(_calls.recorder())
 
-    def logs(self, *, timeout: float = SLOW_S) -> tuple[Log, ...]:
+    def logs(self, *, timeout: float | None = None) -> tuple[Log, ...]:
         """In the server's folder, oldest first."""
         return self._connection.ask(_calls.logs(timeout))
 
-    def describe_log(self, log: str, *, timeout: float = SLOW_S) -> LogDescription:
+    def describe_log(self, log: str, *, timeout: float | None = None) -> LogDescription:
         """What a log holds. Errors: NotFound, DataLoss (damaged)."""
         return self._connection.ask(_calls.describe_log(log, timeout))
 
@@ -341,7 +344,7 @@ class Client:
         events: bool = True,
         contacts: bool = True,
         arm: bool = True,
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> Replay:
         """Plays a log: what frames(), contacts() and events() gave then, at its pace, with the times of then.
 
@@ -354,4 +357,4 @@ class Client:
         request = _requests.replay(
             log, links, detail, from_utc_ns, to_utc_ns, speed, loop, paused, without
         )
-        return Replay(self._connection, request, timeout)
+        return Replay(self._connection, request, chosen_s(timeout, SLOW_S))

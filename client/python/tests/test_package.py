@@ -89,7 +89,8 @@ def test_the_sources_stay_clean(library: Path) -> None:
 
 
 def test_types_are_complete(library: Path, tmp_path: Path) -> None:
-    pytest.importorskip("mypy", reason="mypy is not installed: apt-get install mypy")
+    if os.environ.get("CI") != "true":  # there every test must run, and the command below says what is missing
+        pytest.importorskip("mypy", reason="mypy is not installed: apt-get install mypy")
     sources = [str(path) for path in library.rglob("*.py") if "_pb2" not in path.name]
     users = [str(path) for folder in ("examples", "tests") for path in (PACKAGE / folder).glob("*.py")]
     options = ("--config-file", str(PACKAGE / "pyproject.toml"), "--cache-dir", str(tmp_path))

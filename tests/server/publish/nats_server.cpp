@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <utility>
 
 namespace taclink::testing {
@@ -42,10 +44,16 @@ void NatsServer::Start() {
   out << "listen: \"127.0.0.1:" << (port_ == 0 ? -1 : port_) << "\"\n" << more_ << "\n";
   if (jetstream_) out << "jetstream { store_dir: \"" << folder_ << "/store\" }\n";
   out.close();
-  process_ = std::make_unique<Process>(std::vector<std::string>{NATS_SERVER, "-c", config});
   const std::string mark = "Listening for client connections on 127.0.0.1:";
-  const auto line = process_->ReadUntil(mark, kForever, true);
-  ASSERT_TRUE(line.has_value()) << "nats-server does not listen";
+  std::optional<std::string> line;
+  // The port that it had may meanwhile be another program's, for one connection. It must be the same, because
+  // clients are to find it there again.
+  const auto give_up = std::chrono::steady_clock::now() + kForever;
+  do {
+    process_ = std::make_unique<Process>(std::vector<std::string>{NATS_SERVER, "-c", config});
+    line = process_->ReadUntil(mark, kForever, true);
+  } while (!line && port_ != 0 && std::chrono::steady_clock::now() < give_up);
+  ASSERT_TRUE(line.has_value()) << "nats-server does not listen: " << process_->Wait(seconds(1)).err;
   port_ = std::stoi(line->substr(line->find(mark) + mark.size()));
   ASSERT_TRUE(process_->ReadUntil("Server is ready", kForever, true).has_value());
 }
@@ -70,7 +78,7 @@ std::vector<Stored> ReadStream(const std::string& url, const std::string& stream
   EXPECT_EQ(js_SubscribeSync(&subscription, js, "taclink.>", nullptr, &options, nullptr), NATS_OK);
   std::vector<Stored> out;
   natsMsg* message = nullptr;
-  while (!done(out) && natsSubscription_NextMsg(&message, subscription, 30'000) == NATS_OK) {
+  while (!done(out) && natsSubscription_NextMsg(&message, subscription, 60'000) == NATS_OK) {
     out.push_back(
         {natsMsg_GetSubject(message),
          std::string(natsMsg_GetData(message), static_cast<size_t>(natsMsg_GetDataLength(message)))});

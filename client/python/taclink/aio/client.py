@@ -11,9 +11,9 @@ import grpc
 
 import taclink.client
 from taclink import _calls, _channel, _requests, errors
-from taclink._calls import SLOW_S
 from taclink._channel import DEFAULT_ADDRESS, FilePath
 from taclink._download import Download
+from taclink._patience import CALL_S, SLOW_S, chosen_s
 from taclink._reconnect import OnReconnect, attempts
 from taclink.aio._descriptions import described_by
 from taclink.aio._waiting import Connection
@@ -50,10 +50,10 @@ class Client:
         ca_file: FilePath | None = None,
         certificate_file: FilePath | None = None,
         key_file: FilePath | None = None,
-        timeout: float = 10.0,
+        timeout: float | None = None,
     ) -> None:
         settings = _channel.settings(address, token, ca_file, certificate_file, key_file)
-        self._connection = Connection(settings, timeout)
+        self._connection = Connection(settings, chosen_s(timeout, CALL_S))
 
     @property
     def address(self) -> str:
@@ -130,7 +130,7 @@ class Client:
         *,
         force: bool = False,
         frames: int = 10,
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> tuple[LinkTare, ...]:
         return await self._connection.ask(_calls.tare(links, force, frames, timeout))
 
@@ -142,11 +142,11 @@ class Client:
         save: bool = False,
         force: bool = False,
         on_progress: Callable[[int, int], object] | None = None,
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> CalibrationResult:
         request = _calls.calibrate_request(link, pairs, save, force)
         channel = self._connection.channel()
-        call = channel.start("tactile", "Calibrate", request, timeout)
+        call = channel.start("tactile", "Calibrate", request, chosen_s(timeout, SLOW_S))
         try:
             async for message in call:
                 if message.WhichOneof("message") == "result":
@@ -170,7 +170,7 @@ class Client:
     ) -> ForceLevelState:
         return await self._connection.ask(_calls.set_thresholds(link, warning_n, alarm_n, hysteresis_n, region))
 
-    async def set_force_model(self, link: str, model: str, *, timeout: float = SLOW_S) -> None:
+    async def set_force_model(self, link: str, model: str, *, timeout: float | None = None) -> None:
         await self._connection.ask(_calls.set_force_model(link, model, timeout))
 
     async def set_camera(
@@ -181,7 +181,7 @@ class Client:
         automatic_exposure: bool = False,
         exposure_s: float | None = None,
         gain: int | None = None,
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> None:
         await self._connection.ask(
             _calls.set_camera(link, camera, automatic_exposure, exposure_s, gain, timeout)
@@ -206,22 +206,22 @@ class Client:
         pictures: bool = False,
         compression: str = "configured",
         note: str = "",
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> RecorderStatus:
         return await self._connection.ask(
             _calls.start_recording(name, links, pictures, compression, note, timeout)
         )
 
-    async def stop_recording(self, *, timeout: float = SLOW_S) -> RecorderStatus:
+    async def stop_recording(self, *, timeout: float | None = None) -> RecorderStatus:
         return await self._connection.ask(_calls.stop_recording(timeout))
 
     async def recorder(self) -> RecorderStatus:
         return await self._connection.ask(_calls.recorder())
 
-    async def logs(self, *, timeout: float = SLOW_S) -> tuple[Log, ...]:
+    async def logs(self, *, timeout: float | None = None) -> tuple[Log, ...]:
         return await self._connection.ask(_calls.logs(timeout))
 
-    async def describe_log(self, log: str, *, timeout: float = SLOW_S) -> LogDescription:
+    async def describe_log(self, log: str, *, timeout: float | None = None) -> LogDescription:
         return await self._connection.ask(_calls.describe_log(log, timeout))
 
     async def download_log(
@@ -263,10 +263,10 @@ class Client:
         events: bool = True,
         contacts: bool = True,
         arm: bool = True,
-        timeout: float = SLOW_S,
+        timeout: float | None = None,
     ) -> Replay:
         without = {"frames": not frames, "events": not events, "contacts": not contacts, "arm": not arm}
         request = _requests.replay(
             log, links, detail, from_utc_ns, to_utc_ns, speed, loop, paused, without
         )
-        return Replay(self._connection, request, timeout)
+        return Replay(self._connection, request, chosen_s(timeout, SLOW_S))

@@ -61,7 +61,7 @@ module Taclink
     private
 
     def define_unary(name, type)
-      define_singleton_method(name) do |request = {}, timeout_s: CALL_S|
+      define_singleton_method(name) do |request = {}, timeout_s: Patience.seconds(CALL_S)|
         @stub.public_send(name, type.new(**request), metadata: @metadata, deadline: Time.now + timeout_s)
       end
     end

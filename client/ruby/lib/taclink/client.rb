@@ -10,22 +10,27 @@ end
 require 'taclink/calls'
 require 'taclink/credentials'
 require 'taclink/generated'
+require 'taclink/patience'
 
 module Taclink
   # A connection to a server. Fields are those of proto/taclink/v1, in SI units (m, N, Pa, s, rad); enums are symbols.
   class Client
     CONNECT_S = 3
+    ATTEMPT_S = 20 # gRPC's own
     UNREACHABLE = [GRPC::Unavailable, GRPC::DeadlineExceeded].freeze
 
     # Services, and whom the server takes this client for.
     attr_reader :tactile, :recording, :operations, :caller
 
-    # A token goes with every call, never in the clear to another machine.
+    # A token goes with every call, never in the clear to another machine. It waits 3 s for the server, and calls wait
+    # 10 s, or what TACLINK_PATIENCE_S says where that is more.
     def initialize(server: '127.0.0.1:50051', **secrets)
       credentials = Credentials.new(**secrets)
       metadata = credentials.for_calls(server)
-      # Robots are on the local network: no proxy.
-      options = { 'grpc.enable_http_proxy' => 0, 'grpc.use_local_subchannel_pool' => 1 }
+      # Robots are on the local network: no proxy. The last is, despite its name, how long one attempt to connect may
+      # take.
+      options = { 'grpc.enable_http_proxy' => 0, 'grpc.use_local_subchannel_pool' => 1,
+                  'grpc.min_reconnect_backoff_ms' => (1000 * Patience.seconds(ATTEMPT_S)).round }
       @channel = GRPC::Core::Channel.new(server, options, credentials.for_channel)
       @tactile, @recording, @operations = [V1::TactileService, V1::RecordingService, V1::OperationsService].map do |service|
         Calls.new(service, server, @channel, metadata)
@@ -40,7 +45,7 @@ module Taclink
     private
 
     def greet(server)
-      @caller = @operations.get_caller({}, timeout_s: CONNECT_S)
+      @caller = @operations.get_caller({}, timeout_s: Patience.seconds(CONNECT_S))
     rescue GRPC::BadStatus => e
       close
       raise unless UNREACHABLE.include?(e.class)

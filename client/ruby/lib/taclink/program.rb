@@ -54,6 +54,7 @@ module Taclink
       @parser.on('--tls-certificate FILE', "this client's own certificate") { |value| @values[:tls_certificate] = value }
       @parser.on('--tls-key FILE', "the key of this client's certificate") { |value| @values[:tls_key] = value }
       @parser.separator "The server's token is in the environment variable TACLINK_TOKEN."
+      @parser.separator 'TACLINK_PATIENCE_S: seconds to wait for a slow server, where that is more than usual.'
       rest = @parser.parse(ARGV)
       raise Error, "unknown argument #{rest.first}" unless rest.empty?
     end
