@@ -7,7 +7,8 @@
 # `live`, `vm` and `network` may be repeated once if they fail (deploy/test), `unit` and `accuracy` never.
 # A test runs in one stage of deploy/test: with the address sanitizer (label `sanitized`, target sanitized_tests) if it is
 # there to exercise code that parses foreign bytes or manages memory, otherwise (OPTIMIZED, target optimized_tests) as
-# users run the code, because it is about numbers, memory bounds or time.
+# users run the code, because it is about numbers, memory bounds or time. A test that checks foreign bytes and memory
+# bounds at once runs in both (BOTH_STAGES).
 add_custom_target(sanitized_tests)
 add_custom_target(optimized_tests)
 set(TACLINK_TEST_KINDS unit live vm network accuracy)
@@ -30,10 +31,10 @@ configure_file("${PROJECT_SOURCE_DIR}/tests/support/paths.cpp.in" "${PROJECT_BIN
 add_library(taclink_test_paths STATIC "${PROJECT_BINARY_DIR}/tests/paths.cpp")
 target_link_libraries(taclink_test_paths PUBLIC taclink_flags)
 
-# taclink_test(NAME SOURCES ... LINKS ... [KIND kind] [OPTIMIZED] [TIMEOUT seconds]): one GoogleTest program, its cases
+# taclink_test(NAME SOURCES ... LINKS ... [KIND kind] [OPTIMIZED | BOTH_STAGES] [TIMEOUT seconds]): one GoogleTest program, its cases
 # known to ctest. Under a sanitizer all of them run in one process, because each start would take longer than most cases.
 function(taclink_test name)
-  cmake_parse_arguments(arg "OPTIMIZED" "KIND;TIMEOUT" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(arg "OPTIMIZED;BOTH_STAGES" "KIND;TIMEOUT" "SOURCES;LINKS" ${ARGN})
   if(arg_OPTIMIZED AND TACLINK_SANITIZER)
     return()
   endif()
@@ -44,19 +45,19 @@ function(taclink_test name)
     set(arg_KIND unit)
   endif()
   taclink_program(${name} SOURCES ${arg_SOURCES} LINKS ${arg_LINKS} taclink_test_paths GTest::gtest_main GTest::gmock)
-  if(arg_OPTIMIZED)
-    set(stage optimized)
-  else()
-    set(stage sanitized)
+  if(NOT arg_OPTIMIZED)
+    add_dependencies(sanitized_tests ${name})
   endif()
-  add_dependencies(${stage}_tests ${name})
+  if(arg_OPTIMIZED OR arg_BOTH_STAGES)
+    add_dependencies(optimized_tests ${name})
+  endif()
   if(TACLINK_SANITIZER)
     add_test(NAME ${name} COMMAND ${name} --gtest_brief=1)
     taclink_test_properties(${name} ${arg_KIND} TIMEOUT 1200)
     return()
   endif()
   set(labels ${arg_KIND})
-  if(stage STREQUAL sanitized)
+  if(NOT arg_OPTIMIZED AND NOT arg_BOTH_STAGES)
     list(APPEND labels sanitized)
   endif()
   set(processors 1)

@@ -1,11 +1,28 @@
 #include "tests/accuracy/accuracy_row.h"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 #include "tests/accuracy/solid_judge.h"
 
 namespace taclink {
+namespace {
+
+constexpr double kSameBodyMm = 10;
+
+void CountSigmas(const SolidScene& scene, const std::vector<Contact>& found, AccuracyRow& row) {
+  for (const SolidContact& body : scene.contacts) {
+    for (const Contact& contact : found) {
+      if ((contact.center_mm - body.center_mm).norm() > kSameBodyMm || !contact.force_covariance_n2) continue;
+      ++row.forces;
+      row.within_2_sigma +=
+          (contact.force_n - body.force_n).norm() < 2 * std::sqrt(contact.force_covariance_n2->trace());
+    }
+  }
+}
+
+}  // namespace
 
 AccuracyRow MakeRow(const std::string& input, const SolidScene& scene, const LinkState& state) {
   AccuracyRow row;
@@ -18,6 +35,7 @@ AccuracyRow MakeRow(const std::string& input, const SolidScene& scene, const Lin
   row.force_error_n = judged.force_error_n;
   row.center_error_mm = judged.center_error_mm;
   row.fault = answered ? judged.fault : "no answer";
+  if (answered) CountSigmas(scene, state.contacts, row);
   row.is_ok = state.status == LinkStatus::kOk;
   row.verdict = row.fault.empty() ? Verdict::kHolds : row.is_ok ? Verdict::kSilent : Verdict::kReported;
   return row;

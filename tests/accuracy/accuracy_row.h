@@ -25,7 +25,8 @@ struct AccuracyRow {
          center_error_mm = 0;  ///< as SolidVerdict; an answer without contacts: all is missing
   bool is_ok = false;          ///< status
   double shape_rms_mm = 0, shape_worst_mm = 0;  ///< of the markers' displacements; not in the report
-  std::string fault;                            ///< in words; not in the report
+  int forces = 0, within_2_sigma = 0;  ///< contacts near a body, by their covariance; not in the report
+  std::string fault;                   ///< in words; not in the report
 };
 
 /// Judges the contacts of a state; a state that is not measured has no answer.

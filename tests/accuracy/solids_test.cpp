@@ -34,6 +34,13 @@ TEST(Solids, HeldOutScenesHold) {
     }
   }
   const AccuracyShares shares = SharesOf(rows);
+  int forces = 0, within = 0;
+  for (const AccuracyRow& row : rows) {
+    forces += row.forces;
+    within += row.within_2_sigma;
+  }
+  std::printf("%d of %d forces are within 2 sigma\n", within, forces);
+  EXPECT_GE(within, 0.9 * forces);
   std::printf("%d rows, %d hold, %d are silently wrong\n", shares.rows, shares.holds, shares.silent);
   ASSERT_GE(shares.rows, 200) << "tests/accuracy/calculix has no scenes";
   EXPECT_GE(shares.Holds(), kLeastThatHold);

@@ -5,7 +5,13 @@ page=$1 bin=$(realpath "$2")
 shift 2
 folder=$(mktemp -d)
 server=
-trap '[ -z "$server" ] || kill "$server"; rm -rf "$folder"' EXIT
+# A server that still runs would write into the folder while it is deleted. It gets a minute to end.
+end_server() {
+  [ -n "$server" ] && kill "$server" 2>/dev/null || return 0
+  timeout 60 tail -f /dev/null --pid="$server" -s 0.05 || { echo "the server does not end: it is killed" >&2; kill -KILL "$server"; }
+  wait "$server" || true
+}
+trap 'end_server; rm -rf "$folder"' EXIT
 awk '/^```sh$/ {on = 1; next} /^```/ {on = 0} on' "$page" >"$folder/page.sh"
 [ -s "$folder/page.sh" ] || { echo "$page has no blocks of sh" >&2; exit 1; }
 ln -s "$(realpath "$(dirname "$page")/../deploy")" "$folder/deploy"

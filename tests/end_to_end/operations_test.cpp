@@ -14,7 +14,7 @@ using std::chrono::seconds;
 using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
-constexpr const char* kArm =
+constexpr const char* kLinks =
     "arm:\n  name: test\n  links:\n"
     "    - {name: a, model: cylinder, source: simulated, scene: rest.yaml}\n";
 constexpr const char* kRestScene =
@@ -24,7 +24,7 @@ class OperationsTest : public ScratchFolder {
  protected:
   OperationsTest() { Write("rest.yaml", kRestScene); }
   std::string Config(const std::string& sections) const {
-    return Write("arm.yaml", "taclink_config: 1\n" + sections + kArm);
+    return Write("arm.yaml", "taclink_config: 1\n" + sections + kLinks);
   }
 };
 

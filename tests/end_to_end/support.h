@@ -13,6 +13,7 @@
 #include "sensing/core/geometry.h"
 #include "tests/support/paths.h"
 #include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
 
 namespace taclink::testing {
 
@@ -74,26 +75,23 @@ inline Vec3 ToVec3(const json& list) {
 /// A folder of this test's own, gone with it.
 class ScratchFolder : public ::testing::Test {
  protected:
-  ScratchFolder() {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    std::string name =
-        std::string(test->test_suite_name()) + "." + test->name() + "." + std::to_string(getpid());
-    for (char& c : name) c = c == '/' ? '_' : c;
-    folder_ = std::filesystem::temp_directory_path() / name;
-    std::filesystem::create_directories(folder_);
-  }
-  ~ScratchFolder() override { std::filesystem::remove_all(folder_); }
-
-  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string Path(const std::string& name) const { return folder_ / name; }
   /// For this user alone.
   std::string Write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name) << text;
-    std::filesystem::permissions(folder_ / name, std::filesystem::perms(0600));
+    std::ofstream(Path(name)) << text;
+    std::filesystem::permissions(Path(name), std::filesystem::perms(0600));
     return Path(name);
   }
 
  private:
-  std::filesystem::path folder_;
+  static std::string NameOfTest() {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    std::string name = std::string(test->test_suite_name()) + "." + test->name();
+    for (char& c : name) c = c == '/' ? '_' : c;
+    return name;
+  }
+
+  const TemporaryFolder folder_{NameOfTest()};
 };
 
 }  // namespace taclink::testing

@@ -11,7 +11,7 @@ import grpc
 from lives import Server
 from verdict import Verdict
 
-from taclink._channel import OPTIONS, stubs
+from taclink._channel import options, stubs
 from taclink.v1 import frame_pb2, tactile_pb2
 
 # Until a stream must have told that it dropped frames: it does so once a second, behind what waits.
@@ -66,7 +66,7 @@ class FrameReader:
 
     def _run(self) -> None:
         while not self._closed.is_set():
-            with grpc.insecure_channel(self.address, OPTIONS) as channel:
+            with grpc.insecure_channel(self.address, options()) as channel:
                 try:
                     self._read(stubs(channel)["tactile"])
                 except grpc.RpcError:

@@ -19,6 +19,7 @@
 #include "taclink/v1/frame.pb.h"
 #include "tests/support/paths.h"
 #include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
 #include "wire/log/topics.h"
 #include "wire/mcap/check.h"
 #include "wire/mcap/cursor.h"
@@ -45,9 +46,7 @@ int Crashes() {
 
 class CrashTest : public ::testing::Test {
  protected:
-  CrashTest()
-      : root_(::testing::TempDir() + "crash." + std::to_string(::getpid())), folder_(root_ + "/logs") {
-    fs::create_directories(root_);
+  CrashTest() {
     std::ofstream(root_ + "/scene.yaml") << kScene;
     std::ofstream(root_ + "/arm.yaml")
         << "taclink_config: 1\narm:\n  name: crash\n  links:\n"
@@ -55,7 +54,6 @@ class CrashTest : public ::testing::Test {
         << "    - {name: b, model: cylinder, source: simulated, scene: scene.yaml}\n"
         << "recording: {folder: \"" << folder_.path() << "\", at_start: true, pictures: true, sync_s: 0.2}\n";
   }
-  ~CrashTest() override { fs::remove_all(root_); }
 
   using FrameId = std::pair<std::string, uint64_t>;  // link, sequence
   struct Killed {
@@ -144,8 +142,9 @@ class CrashTest : public ::testing::Test {
                 static_cast<int>(recorded));
   }
 
-  const std::string root_;
-  const server::LogFolder folder_;
+  const TemporaryFolder scratch_{"crash"};
+  const std::string root_ = scratch_.path();
+  const server::LogFolder folder_{root_ + "/logs"};
 };
 
 TEST_F(CrashTest, WhatWasSyncedIsNotLost) {

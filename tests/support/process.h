@@ -44,6 +44,6 @@ class Process {
 };
 
 Finished RunToEnd(const std::vector<std::string>& command,
-                  std::chrono::seconds timeout = std::chrono::seconds(120));
+                  std::chrono::seconds timeout = std::chrono::seconds(300));
 
 }  // namespace taclink::testing

@@ -3,21 +3,75 @@
 #include <ctime>
 #include <fstream>
 
-#include "tests/support/paths.h"
+#include "sensing/model/model_file.h"
+#include "sensing/pipeline/picture_stage.h"
+#include "server/assembly/encoder.h"
+#include "server/assembly/source_factory.h"
+#include "server/config.h"
+#include "tests/server/test_state.h"
 
 namespace taclink::testing {
 namespace {
 
-constexpr const char* kConfigPath = "/tmp/rig.yaml";
+constexpr std::array kLinks = {"a", "b"};
 
-std::string LinkConfig(const char* link, const char* format) {
-  const std::string name(link);
-  return "    - name: " + name +
-         "\n      model: cylinder\n      source: v4l2\n      devices: [\"serial:" + name +
-         "-top\", \"serial:" + name + "-bottom\"]\n      frame_rate_hz: " + std::to_string(kRigRateHz) +
-         "\n      format: " + format +
-         "\n      pressure_kpa: 0\n      force_model: linear\n";  // the scene's too; others cost the guest
-                                                                  // minutes
+/// Judges a frame's images and invents the rest.
+class ImageProcessor final : public server::LinkProcessor {
+ public:
+  explicit ImageProcessor(const StereoRig& rig) : rig_(rig) {
+    for (const CameraId id : kBothCameras) {
+      rig_[id].width_px = kRigWidthPx;
+      rig_[id].height_px = kRigHeightPx;
+    }
+  }
+
+  void Process(const StereoFrame& frame, LinkState& state) override {
+    server::FillTestState(0, frame.sequence, state);
+    state.times = frame.times;
+    state.reasons.clear();
+    images_.Take(frame, rig_, false, state);
+    if (!images_.trouble()) return;
+    state.status = LinkStatus::kDegraded;
+    state.status_reason = images_.trouble()->text;
+    state.reasons.push_back(*images_.trouble());
+  }
+  Result<void> BeginCalibration(const server::CalibrationOrder&) override {
+    return Error{ErrorCode::kUnsupported, "the rig's links have no markers"};
+  }
+  server::CalibrationProgress PollCalibration() override { return {}; }
+  void CancelCalibration() override {}
+
+ private:
+  StereoRig rig_;
+  PictureStage images_;
+};
+
+server::LinkConfig LinkConfig(const std::string& name, std::optional<PixelFormat> format) {
+  server::LinkConfig config;
+  config.name = name;
+  config.source =
+      server::V4l2SourceConfig{.devices = {"serial:" + name + "-top", "serial:" + name + "-bottom"},
+                               .width_px = kRigWidthPx,
+                               .height_px = kRigHeightPx,
+                               .frame_rate_hz = kRigRateHz,
+                               .format = format,
+                               .exposure_100us = {},
+                               .gain = {}};
+  return config;
+}
+
+Result<server::LinkParts> MakeLink(const server::LinkConfig& config, Clock& clock) {
+  auto model = LoadLinkModel("cylinder");
+  if (!model) return model.error();
+  auto source = server::MakeSource(config, *model, clock);
+  if (!source) return source.error();
+  auto processor = std::make_unique<ImageProcessor>(model->nominal_rig);
+  return server::LinkParts{.description = {.name = config.name,
+                                           .model = std::move(*model),
+                                           .base_from_link = {},
+                                           .source = server::SourceKind::kV4l2},
+                           .source = std::move(*source),
+                           .processor = std::move(processor)};
 }
 
 }  // namespace
@@ -28,13 +82,13 @@ int64_t MonotonicNs() {
   return int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
 
-Rig::Rig(const std::string& picture_folder) : pictures_(picture_folder, kRigRateHz) {
+Rig::Rig() {
   // The virtual hub loses devices that the kernel put to sleep.
   std::ofstream("/sys/module/usbcore/parameters/autosuspend") << -1;
-  for (const char* link : {"a", "b"}) {
+  for (const char* link : kLinks) {
     for (const CameraId id : kBothCameras) {
-      cameras_.push_back(
-          std::make_unique<EmulatedCamera>(std::string(link) + "-" + Name(id), pictures_.For(id)));
+      cameras_.push_back(std::make_unique<EmulatedCamera>(std::string(link) + "-" + Name(id),
+                                                          pictures_[Index(id)].Source()));
     }
   }
 }
@@ -48,18 +102,25 @@ void Rig::StopServer() {
   if (receiver_.joinable()) receiver_.join();
   reader_.reset();
   client_.reset();
+  if (server_) server_->Shutdown("the rig ends", std::chrono::seconds(60));
   server_.reset();
+  arm_.reset();
 }
 
 std::string Rig::StartServer() {
-  std::ofstream(kConfigPath) << "taclink_config: 1\narm:\n  name: rig\n  links:\n"
-                             << LinkConfig("a", "mjpeg") << LinkConfig("b", "auto");
-  server_ = std::make_unique<Process>(
-      std::vector<std::string>{kTaclinkd, "--config", kConfigPath, "--listen", "127.0.0.1:0"});
-  const auto line = server_->ReadUntil("listening on ", std::chrono::seconds(60), true);
-  if (!line) return "the server does not start: " + server_->Wait(std::chrono::seconds(1)).err;
-  address_ = line->substr(line->find("listening on ") + 13);
-  auto client = client::Client::Connect(address_, std::chrono::seconds(60));
+  std::vector<server::LinkParts> links;
+  for (const auto& config : {LinkConfig("a", PixelFormat::kMjpeg), LinkConfig("b", std::nullopt)}) {
+    auto link = MakeLink(config, clock_);
+    if (!link) return link.error().message;
+    links.push_back(std::move(*link));
+  }
+  arm_ = std::make_unique<server::Arm>("rig", std::move(links), server::MakeEncoder({"a", "b"}), clock_,
+                                       server::ArmOptions{});
+  auto server = server::RpcServer::Start("127.0.0.1:0", *arm_, {});
+  if (!server) return server.error().message;
+  server_ = std::move(*server);
+  arm_->Start();
+  auto client = client::Client::Connect(address(), std::chrono::seconds(60));
   if (!client) return client.error().message;
   client_ = std::move(*client);
   auto reader = client_->StreamFrames({.delivery = client::Delivery::kEvery}, std::chrono::seconds(60));

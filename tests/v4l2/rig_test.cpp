@@ -1,5 +1,6 @@
-// Runs as root in the machine of run-in-vm with vhci_hcd and uvcvideo: taclinkd with the emulated cameras,
-// which show what the simulation rendered. Prints the table of docs/faults.md.
+// Runs as root in the machine of run-in-vm with vhci_hcd and uvcvideo: a server with emulated cameras under
+// the kernel's own driver. Cameras, unplugging and the server around them are tested here; markers and forces
+// are not. Prints the table of docs/faults.md.
 #include "tests/v4l2/rig.h"
 
 #include <gmock/gmock.h>
@@ -19,6 +20,7 @@
 #include "taclink/v1/tactile.grpc.pb.h"
 #include "tests/sensing/capture/pictures.h"
 #include "tests/support/paths.h"
+#include "tests/support/process.h"
 
 namespace taclink::testing {
 namespace {
@@ -26,20 +28,16 @@ namespace {
 using client::LinkStatus;
 using ::testing::HasSubstr;
 
-// Asked of a processor are 1 s and 2 s. The guest emulates one, in which a change of what is seen is computed
-// for seconds (30 ms on a processor).
-constexpr double kToStatusS = 5, kToRecoveryS = 8;
+// From a fault to the status, and from its end to `ok`, in frames of the other link, which runs on: frames
+// count the guest's time, however slowly the host computes it.
+constexpr size_t kToStatusFrames = 5 * kRigRateHz, kToRecoveryFrames = 8 * kRigRateHz;
 enum : size_t { kATop, kABottom, kBTop, kBBottom };
 
 bool Blames(const client::Frame& frame, const std::string& reason) {
   return frame.status != LinkStatus::kOk && frame.status_reason.find(reason) != std::string::npos;
 }
-/// Ok, or degraded by nothing but the linear force model, which the rig's links are told to use (rig.cpp) and
-/// which holds near rest only: the pictures are as good as the scene's.
-bool SeesTheScene(const client::Frame& frame) {
-  return frame.status == LinkStatus::kOk ||
-         (frame.status == LinkStatus::kDegraded && frame.status_reasons.size() == 1 &&
-          frame.status_reasons.front().reason == client::Reason::kForceModel);
+bool IsOk(const client::Frame& frame) {
+  return frame.status == LinkStatus::kOk;
 }
 bool NamesNoCamera(const client::Frame& frame) {
   return frame.times.exposure_ns != 0 && frame.status_reason.find("camera") == std::string::npos;
@@ -88,7 +86,7 @@ std::optional<V4l2Device> HoldOpen(const std::string& name, int seconds) {
 class RigTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    rig_ = new Rig(std::getenv("RIG_PICTURES") ? std::getenv("RIG_PICTURES") : ".");
+    rig_ = new Rig();
     std::printf(
         "| Fault | Injected by | Status | To status, s | To recovery, s | Lost on the other link |\n"
         "|---|---|---|---|---|---|\n");
@@ -113,7 +111,7 @@ class RigTest : public ::testing::Test {
     ASSERT_TRUE(noticed) << fault.what;
     const int64_t undone_ns = MonotonicNs();
     fault.undo(*rig_);
-    const auto recovered = rig_->Await("a", undone_ns, SeesTheScene);
+    const auto recovered = rig_->Await("a", undone_ns, IsOk);
     ASSERT_TRUE(recovered) << fault.what;
     const auto others = rig_->Frames("b", injected_ns, recovered->received_ns);
     const double to_status_s = Seconds(injected_ns, noticed->received_ns);
@@ -121,11 +119,11 @@ class RigTest : public ::testing::Test {
     const int lost = LostBetween(others);
     PrintRow(fault.what, fault.how, noticed->frame, to_status_s, to_recovery_s,
              std::to_string(lost) + " of " + std::to_string(others.size() + static_cast<size_t>(lost)));
-    EXPECT_LE(to_status_s, kToStatusS) << fault.what;
-    EXPECT_LE(to_recovery_s, kToRecoveryS) << fault.what;
+    EXPECT_LE(rig_->Frames("b", injected_ns, noticed->received_ns).size(), kToStatusFrames) << fault.what;
+    EXPECT_LE(rig_->Frames("b", undone_ns, recovered->received_ns).size(), kToRecoveryFrames) << fault.what;
     EXPECT_EQ(lost, 0) << fault.what;
     for (const ReceivedFrame& other : others)
-      EXPECT_TRUE(SeesTheScene(other.frame)) << fault.what << ": " << other.frame.status_reason;
+      EXPECT_TRUE(IsOk(other.frame)) << fault.what << ": " << other.frame.status_reason;
   }
 
   static Rig* rig_;
@@ -156,48 +154,25 @@ TEST_F(RigTest, AStartsWithoutCameras) {
   const auto a = rig_->Await("a", released_ns, NamesNoCamera);
   const auto b = rig_->Await("b", released_ns, NamesNoCamera);
   ASSERT_TRUE(a && b);
-  // Recovery is the first pair's exposure: the emulated processor labels its first rest pictures for seconds.
+  // Recovery is the first pair's exposure.
   PrintRow("Held by another program at the start", "another process has it open with buffers", busy->frame,
            Seconds(started_ns, busy->received_ns), Seconds(released_ns, a->frame.times.exposure_ns), "-");
   PrintRow("Absent at the start", "not plugged in", absent->frame, Seconds(started_ns, absent->received_ns),
            Seconds(released_ns, b->frame.times.exposure_ns), "-");
-  EXPECT_LE(Seconds(started_ns, busy->received_ns), kToStatusS);
-  EXPECT_LE(Seconds(started_ns, absent->received_ns), kToStatusS);
-  EXPECT_LE(Seconds(released_ns, a->frame.times.exposure_ns), kToRecoveryS);
-  EXPECT_LE(Seconds(released_ns, b->frame.times.exposure_ns), kToRecoveryS);
   for (const char* link : {"a", "b"})
-    ASSERT_TRUE(rig_->Await(link, released_ns, SeesTheScene))
+    ASSERT_TRUE(rig_->Await(link, released_ns, IsOk))
         << rig_->Frames(link, 0, MonotonicNs()).back().frame.status_reason;
 }
 
-TEST_F(RigTest, BForcesAreTheTruths) {
+TEST_F(RigTest, BNoFrameIsLost) {
+  constexpr size_t kFrames = 4 * kRigRateHz;
   const int64_t begun_ns = MonotonicNs();
-  rig_->pictures().Play(begun_ns);
-  const double round_s = static_cast<double>(rig_->pictures().count()) / kRigRateHz;
-  const auto end = rig_->Await(
-      "a", begun_ns, [&](const auto& frame) { return Seconds(begun_ns, frame.times.exposure_ns) > round_s; });
-  ASSERT_TRUE(end);
   for (const char* link : {"a", "b"}) {
+    ASSERT_TRUE(rig_->Await(link, begun_ns,
+                            [&, seen = size_t{0}](const auto&) mutable { return ++seen == kFrames; }));
     const auto frames = rig_->Frames(link, begun_ns, MonotonicNs());
-    double worst_n = 0, largest_n = 0, largest_measured_n = 0;
-    for (const ReceivedFrame& each : frames) {
-      const Vec3& truth = rig_->pictures().ForceN(each.frame.times.exposure_ns);
-      const auto force = each.frame.total_force_n.value_or(client::Vector3{});
-      const Vec3 measured(force[0], force[1], force[2]);
-      worst_n = std::max(worst_n, (measured - truth).norm());
-      largest_measured_n = std::max(largest_measured_n, measured.norm());
-      largest_n = std::max(largest_n, truth.norm());
-    }
-    std::printf(
-        "link %s: %zu frames of %zu pictures, lost %d; force up to %.4f N, measured up to %.4f N, largest "
-        "error %.4f N\n",
-        link, frames.size(), rig_->pictures().count(), LostBetween(frames), largest_n, largest_measured_n,
-        worst_n);
-    EXPECT_GE(frames.size(), rig_->pictures().count() - 3);
-    EXPECT_LE(LostBetween(frames), 2);  // see kToStatusS
-    EXPECT_GT(largest_n, 0.12);
-    EXPECT_GT(largest_measured_n, 0.12);
-    EXPECT_LE(worst_n, 0.03);
+    EXPECT_EQ(LostBetween(frames), 0) << link;
+    for (const ReceivedFrame& each : frames) EXPECT_TRUE(IsOk(each.frame)) << each.frame.status_reason;
   }
 }
 
@@ -213,22 +188,21 @@ TEST_F(RigTest, BPreviewsAreWhatTheCamerasSee) {
     ASSERT_TRUE(reader->Read(&preview));
     context.TryCancel();
     ASSERT_EQ(preview.pictures_size(), 2);
-    for (const v1::PreviewPicture& picture : preview.pictures()) {
-      EXPECT_EQ(picture.width_px(), 640u);
-      EXPECT_EQ(picture.height_px(), 480u);
+    for (const CameraId id : kBothCameras) {
+      const v1::PreviewPicture& picture = preview.pictures(static_cast<int>(Index(id)));
+      ASSERT_EQ(picture.width_px(), static_cast<uint32_t>(kRigWidthPx)) << picture.why_missing();
+      ASSERT_EQ(picture.height_px(), static_cast<uint32_t>(kRigHeightPx));
       RawImage jpeg{.format = PixelFormat::kMjpeg,
-                    .width_px = 640,
-                    .height_px = 480,
+                    .width_px = kRigWidthPx,
+                    .height_px = kRigHeightPx,
                     .bytes = {picture.jpeg().begin(), picture.jpeg().end()}};
       jpeg.valid = true;
       cv::Mat gray;
-      ASSERT_TRUE(GrayDecoder().Decode(jpeg, gray).ok()) << picture.why_missing();
-      ASSERT_GT(picture.markers_size(), 100);
-      for (int i = 0; i < picture.markers_size(); ++i) {
-        const int x = static_cast<int>(std::lround(picture.centers_px(2 * i)));
-        const int y = static_cast<int>(std::lround(picture.centers_px(2 * i + 1)));
-        EXPECT_GT(gray.at<uint8_t>(y, x), 60) << "no marker at " << x << ", " << y;
-      }
+      ASSERT_TRUE(GrayDecoder().Decode(jpeg, gray).ok());
+      int nearest = 255;
+      for (const cv::Mat& shown : rig_->pictures(id).gray())
+        nearest = std::min(nearest, LargestDifference(gray, shown));
+      EXPECT_LE(nearest, 12) << "link " << link << " shows no image of its " << Name(id) << " camera";
     }
   }
 }
@@ -261,7 +235,7 @@ TEST_F(RigTest, BSettingsGoToTheCameraAlsoWhenItComesBack) {
   EXPECT_EQ(client.SetCamera("a", "bottom", {.gain = 3}).error().code, ErrorCode::kUnavailable);
   const int64_t plugged_ns = MonotonicNs();
   ASSERT_EQ(rig_->camera(kABottom).Plug(kABottom), "");
-  ASSERT_TRUE(rig_->Await("a", plugged_ns, SeesTheScene));
+  ASSERT_TRUE(rig_->Await("a", plugged_ns, IsOk));
   EXPECT_EQ(rig_->camera(kABottom).settings(), kManual);
   EXPECT_TRUE(read_back(bottom()));
 
@@ -311,8 +285,8 @@ TEST_F(RigTest, DWhatHappenedIsCounted) {
   ASSERT_EQ(arm.links[0].cameras.size(), 2u);
   const client::Camera& top = arm.links[0].cameras[0];
   const client::Camera& bottom = arm.links[0].cameras[1];
-  EXPECT_EQ(top.format, "MJPEG 640x480");
-  EXPECT_EQ(arm.links[1].cameras[0].format, "YUYV 640x480");
+  EXPECT_EQ(top.format, "MJPEG 320x240");
+  EXPECT_EQ(arm.links[1].cameras[0].format, "YUYV 320x240");
   EXPECT_THAT(top.device, HasSubstr("serial:a-top"));
   EXPECT_THAT(bottom.device, HasSubstr("usb:"));
   EXPECT_EQ(bottom.trouble, "");
@@ -363,7 +337,7 @@ TEST_F(RigTest, FCamerasAreListed) {
   const Finished listed = RunToEnd({kTaclink, "cameras"});
   EXPECT_EQ(listed.exit_code, 0) << listed.err;
   EXPECT_THAT(listed.out, HasSubstr("'Emulated camera' usb:1-8 serial:listed"));
-  EXPECT_THAT(listed.out, HasSubstr("MJPG  320x240    120, 60, 30 per second"));
+  EXPECT_THAT(listed.out, HasSubstr("MJPG  320x240    120, 60, 30, 5 per second"));
   EXPECT_THAT(listed.out, HasSubstr("YUYV  640x480    30, 15, 10, 5, 4, 3, 2 per second"));
   std::printf("%s", listed.out.c_str());
 }

@@ -13,7 +13,7 @@ struct UvcSize {
   std::vector<int> rates_hz;
 };
 inline const std::vector<UvcSize> kUvcSizes = {{640, 480, {30, 15, 10, 5, 4, 3, 2}},
-                                               {320, 240, {120, 60, 30}}};
+                                               {320, 240, {120, 60, 30, 5}}};
 /// Format indices of the device, from 1.
 inline constexpr uint8_t kUvcMjpeg = 1, kUvcYuyv = 2;
 inline constexpr uint32_t kUvcMaxPayload = 16384;

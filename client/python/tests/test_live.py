@@ -238,7 +238,7 @@ def test_a_loop_that_is_left_leaves_no_stream(server: servers.Server, client: ta
         assert server.open_streams() == 1
     servers.until(lambda: server.open_streams() == 0, "the contacts' stream has ended")
     assert list(held) == []
-    with taclink.Client(server.address) as other:
+    with taclink.Client(server.address, timeout=servers.PATIENCE_S) as other:
         frames = other.frames()
         next(frames)
     assert list(frames) == []  # the client was closed

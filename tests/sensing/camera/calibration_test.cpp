@@ -12,6 +12,7 @@
 #include "tests/support/paths.h"
 #include "tests/support/read_jpeg.h"
 #include "tests/support/synthetic_markers.h"
+#include "tests/support/temporary_folder.h"
 
 namespace taclink {
 namespace {
@@ -105,7 +106,8 @@ TEST(Calibration, FilesKeepTheRig) {
   CalibrationSummary summary;
   summary.rig = LoadLinkModel("barrel")->nominal_rig;
   summary.rig[CameraId::kTop].lens.focal_px = 231.25;
-  const auto path = (std::filesystem::temp_directory_path() / "taclink_calibration_test.yaml").string();
+  const TemporaryFolder folder;
+  const std::string path = folder / "calibration.yaml";
   ASSERT_TRUE(SaveCalibration(path, "barrel", summary).ok());
   const auto loaded = LoadCalibration(path, LoadLinkModel("barrel").value());
   ASSERT_TRUE(loaded.ok()) << loaded.error().message;
@@ -130,10 +132,10 @@ TEST(Calibration, FilesKeepTheLensAndItsDeviations) {
       ConvertLens(model.nominal_rig[CameraId::kBottom].lens, LensKind::kKannalaBrandt, 1);
   for (const CameraId id : kBothCameras) summary.cameras[Index(id)].camera = summary.rig[id];
   summary.covariance = Eigen::MatrixXd::Identity(2 * kCameraParameters, 2 * kCameraParameters);
-  const auto path = (std::filesystem::temp_directory_path() / "taclink_calibration_lens_test.yaml").string();
+  const TemporaryFolder folder;
+  const std::string path = folder / "calibration.yaml";
   ASSERT_TRUE(SaveCalibration(path, "barrel", summary).ok());
   const auto loaded = LoadCalibration(path, model);
-  std::filesystem::remove(path);
   ASSERT_TRUE(loaded.ok()) << loaded.error().message;
   EXPECT_EQ((*loaded)[CameraId::kTop].lens.kind, LensKind::kDivision);
   EXPECT_EQ((*loaded)[CameraId::kBottom].lens.kind, LensKind::kKannalaBrandt);
@@ -144,7 +146,8 @@ TEST(Calibration, FilesKeepTheLensAndItsDeviations) {
 }
 
 TEST(Calibration, FilesOfVersionOneAreRead) {
-  const auto path = (std::filesystem::temp_directory_path() / "taclink_calibration_v1_test.yaml").string();
+  const TemporaryFolder folder;
+  const std::string path = folder / "calibration.yaml";
   const std::string camera =
       "{image_size_px: [640, 480], focal_px: 230, principal_point_px: [320, 240], k1_per_px2: 1e-6, "
       "k2_per_px4: 0, position_mm: [0, 0, -4], rotation_deg: [0, 0, 1]}\n";
@@ -152,9 +155,7 @@ TEST(Calibration, FilesOfVersionOneAreRead) {
     std::ofstream(path) << "taclink_calibration: " << version
                         << "\nmodel: barrel\nmarkers_used: 200\nrms_px: 0.3\n"
                         << "cameras:\n  top: " << camera << "  bottom: " << camera;
-    auto rig = LoadCalibration(path, LoadLinkModel("barrel").value());
-    std::filesystem::remove(path);
-    return rig;
+    return LoadCalibration(path, LoadLinkModel("barrel").value());
   };
   const auto rig = load("1");
   ASSERT_TRUE(rig.ok()) << rig.error().message;

@@ -1,7 +1,6 @@
 #include "tests/sensing/capture/pictures.h"
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
 #include <turbojpeg.h>
 
 #include <fstream>
@@ -9,17 +8,6 @@
 #include <opencv2/core.hpp>
 
 namespace taclink {
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "taclink_test_XXXXXX").string();
-  if (!mkdtemp(name.data())) ADD_FAILURE() << "no temporary folder " << name;
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
 
 cv::Mat SlopePicture(int width_px, int height_px, int seed) {
   cv::Mat picture(height_px, width_px, CV_8UC1);

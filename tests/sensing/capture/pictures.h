@@ -1,27 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
 
+#include "tests/support/temporary_folder.h"
+
 namespace taclink {
-
-/// A folder that goes with its test.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  ~TemporaryFolder();
-
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-  std::string path() const { return path_.string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// A smooth gray picture, brighter to the right and, less so, downwards; `seed` shifts it.
 cv::Mat SlopePicture(int width_px, int height_px, int seed = 0);

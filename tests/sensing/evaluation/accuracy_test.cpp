@@ -2,11 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <set>
 
 #include "sensing/evaluation/accuracy_report.h"
 #include "sensing/model/model_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace taclink {
 namespace {
@@ -173,15 +173,14 @@ TEST(AccuracyTruth, IsKeptAsItWas) {
 
 TEST(AccuracyTruth, TheFolderIsUsed) {
   const LinkModel model = Cylinder();
-  const auto folder = std::filesystem::path(::testing::TempDir()) / "accuracy_truth_test";
-  std::filesystem::remove_all(folder);
+  const TemporaryFolder made;
+  const std::string folder = made / "truth";
   const PressPath path = MakePressPath(model, PressKind::kRest, 0.0005);
-  const auto first = CachedPath(model, path, 1, folder.string());
+  const auto first = CachedPath(model, path, 1, folder);
   ASSERT_TRUE(first.ok());
-  const auto again = CachedPath(model, path, 1, folder.string());
+  const auto again = CachedPath(model, path, 1, folder);
   ASSERT_TRUE(again.ok());
   EXPECT_EQ(first->cpu_s, again->cpu_s);  // the second was not solved
-  std::filesystem::remove_all(folder);
 }
 
 TEST(AccuracyBench, NoiseIsOfTheSaidCovariance) {
