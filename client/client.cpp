@@ -29,7 +29,7 @@ Error NoServer(const std::string& address) {
               "with client_ca also --tls-certificate and --tls-key"};
 }
 
-// More than the usual time is for a server that is slow to answer, not for one that is not there.
+// A raised patience applies to a server that is slow to answer, not to one that does not exist.
 bool WaitForServer(grpc::Channel& channel, milliseconds patience) {
   const auto begin = system_clock::now();
   if (channel.WaitForConnected(begin + kConnectPatience)) return true;
@@ -123,7 +123,7 @@ const std::vector<StreamCounts>& FrameReader::counts() const {
 
 milliseconds Patience(milliseconds usual) {
   const auto patience = PatienceFromEnvironment(usual);
-  return patience ? *patience : usual;  // Connect tells what is wrong
+  return patience ? *patience : usual;  // Connect reports the error
 }
 
 Client::Client(std::shared_ptr<Connection> connection) : connection_(std::move(connection)) {}

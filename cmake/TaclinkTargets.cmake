@@ -41,8 +41,9 @@ target_compile_options(taclink_flags INTERFACE $<$<CXX_COMPILER_ID:Clang>:-Wno-e
 # itself. CMake's own unity build is not used: its files name sources by absolute path, so that no other checkout could take
 # an object from the compiler cache.
 set(TACLINK_BATCH_SIZE 1 CACHE STRING "Sources that are compiled together")
+set(CMAKE_UNITY_BUILD OFF)  # build folders from before may have it on
 
-# taclink_batches(TARGET RESULT SOURCES ...): the sources to compile instead of these, as absolute paths.
+# taclink_batches(TARGET RESULT SOURCES ...): the files to compile in place of SOURCES, as absolute paths.
 function(taclink_batches target result)
   set(paths "")
   foreach(source IN LISTS ARGN)

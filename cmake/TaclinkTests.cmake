@@ -5,10 +5,10 @@
 #   network   takes packages from a registry
 #   accuracy  compares forces and shapes with solids and measured data
 # `live`, `vm` and `network` may be repeated once if they fail (deploy/test), `unit` and `accuracy` never.
-# A test runs in one stage of deploy/test: with the address sanitizer (label `sanitized`, target sanitized_tests) if it is
+# A test runs in one stage of deploy/test, or in both: with the address sanitizer (label `sanitized`, target sanitized_tests) if it is
 # there to exercise code that parses foreign bytes or manages memory, otherwise (OPTIMIZED, target optimized_tests) as
 # users run the code, because it is about numbers, memory bounds or time. A test that checks foreign bytes and memory
-# bounds at once runs in both (BOTH_STAGES).
+# bounds at once runs in both (BOTH_STAGES), and so do the tests of numerical code that are quick with its assertions on.
 add_custom_target(sanitized_tests)
 add_custom_target(optimized_tests)
 set(TACLINK_TEST_KINDS unit live vm network accuracy)

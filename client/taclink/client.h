@@ -357,9 +357,9 @@ struct Credentials {
   std::string token = {};             ///< goes with every call; never in the clear to another machine
 };
 
-/// `usual`, or the seconds in the environment variable TACLINK_PATIENCE_S where these are more: how long
-/// calls wait at most whose timeout is not given. Slow machines need more; whoever gets an answer waits no
-/// longer. `usual` too where the variable is not a positive number, but then Client::Connect has refused it.
+/// The default time limit of a call: the larger of `usual` and the seconds in the environment variable
+/// TACLINK_PATIENCE_S, for slow machines. If the variable is not a positive number, it is `usual`;
+/// Client::Connect has then reported the error.
 std::chrono::milliseconds Patience(std::chrono::milliseconds usual);
 
 class Recordings;        // taclink/recordings.h

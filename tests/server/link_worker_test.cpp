@@ -51,6 +51,37 @@ class LinkWorkerTest : public ::testing::Test {
   std::unique_ptr<LinkWorker> worker_;
 };
 
+TEST_F(LinkWorkerTest, NothingIsSkippedOfASourceThatWaits) {
+  script_->waits_for_reader = true;
+  Gate gate;
+  Run([&gate](const StereoFrame& frame, LinkState& state) {
+    gate.Pass();  // the frames that come meanwhile would replace each other
+    Copy(frame, state);
+  });
+  for (uint64_t i = 1; i <= 10; ++i) script_->Push(i);
+  gate.WaitForArrival();
+  gate.Open();
+  for (uint64_t i = 1; i <= 10; ++i) {
+    const auto publication = NextFrame();
+    ASSERT_NE(publication, nullptr);
+    EXPECT_EQ(publication->state().sequence, i);
+  }
+  EXPECT_EQ(worker_->Statistics().frames_skipped, 0u);
+}
+
+TEST_F(LinkWorkerTest, StopsWhileASourceWaitsForItsReader) {
+  script_->waits_for_reader = true;
+  Gate gate;
+  Run([&gate](const StereoFrame& frame, LinkState& state) {
+    gate.Pass();
+    Copy(frame, state);
+  });
+  for (uint64_t i = 1; i <= 3; ++i) script_->Push(i);
+  gate.WaitForArrival();  // the first is being processed, the second waits
+  gate.Open();
+  worker_->Stop();
+}
+
 TEST_F(LinkWorkerTest, FramesBecomeStatesInOrder) {
   Run(Copy);
   for (uint64_t i = 1; i <= 10; ++i) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -60,6 +61,8 @@ class ManualClock final : public Clock {
 /// What a FakeSource does next; the test writes it, the source's thread reads it.
 class SourceScript {
  public:
+  std::atomic<bool> waits_for_reader = false;
+
   void Push(uint64_t sequence, int64_t exposure_ns = 1) {
     StereoFrame frame;
     frame.sequence = sequence;
@@ -162,6 +165,7 @@ class FakeSource final : public FrameSource {
     const std::lock_guard lock(script_->mutex_);
     script_->remembered_.emplace_back(id, settings);
   }
+  bool WaitsForReader() const override { return script_->waits_for_reader; }
   SourceInfo Info() const override { return script_->Info(); }
   SourceCounters Counters() const override { return script_->Counters(); }
 

@@ -7,7 +7,7 @@
 
 namespace taclink::testing {
 
-/// CI runs every test: what is missing there is an error, which a skipped test would hide.
+/// In CI a missing prerequisite is an error, because a skipped test would hide it.
 inline bool IsCi() {
   const char* const ci = std::getenv("CI");
   return ci != nullptr && std::string_view(ci) == "true";
@@ -15,7 +15,7 @@ inline bool IsCi() {
 
 }  // namespace taclink::testing
 
-/// Of a test, or its SetUp, that not every machine can run. `message`: what is missing and what to do.
+/// For a test, or its SetUp, that not every machine can run. `message`: what is missing and what to do.
 #define TACLINK_REQUIRE(available, message)              \
   do {                                                   \
     if (!(available)) {                                  \

@@ -9,7 +9,7 @@
 
 namespace taclink {
 
-/// A folder of a test's own, which goes with it. `name`: what people see in its path.
+/// A unique folder that is deleted with this object. `name` is part of its path.
 class TemporaryFolder {
  public:
   explicit TemporaryFolder(const std::string& name = "taclink_test") {

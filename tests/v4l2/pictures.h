@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
 #include <vector>
 
 #include "sensing/core/camera_model.h"
@@ -19,8 +19,8 @@ class Pictures {
  public:
   Pictures(CameraId id, int rate_hz) : interval_ns_(int64_t{UvcInterval100ns(rate_hz)} * 100) {
     for (int i = 0; i < kCount; ++i) {
-      const cv::Mat gray =
-          SlopePicture(kRigWidthPx, kRigHeightPx, 1 + i + kCount * static_cast<int>(Index(id)));
+      cv::Mat gray = SlopePicture(kRigWidthPx, kRigHeightPx, i);
+      if (id == CameraId::kBottom) cv::flip(gray, gray, 1);  // brighter to the left
       mjpeg_.push_back(EncodeJpeg(gray));
       std::vector<uint8_t> yuyv(2 * gray.total(), 128);
       for (size_t pixel = 0; pixel < gray.total(); ++pixel) yuyv[2 * pixel] = gray.data[pixel];

@@ -31,6 +31,7 @@ using ::testing::HasSubstr;
 // From a fault to the status, and from its end to `ok`, in frames of the other link, which runs on: frames
 // count the guest's time, however slowly the host computes it.
 constexpr size_t kToStatusFrames = 5 * kRigRateHz, kToRecoveryFrames = 8 * kRigRateHz;
+constexpr double kStartS = 10;  // of the guest
 enum : size_t { kATop, kABottom, kBTop, kBBottom };
 
 bool Blames(const client::Frame& frame, const std::string& reason) {
@@ -122,6 +123,7 @@ class RigTest : public ::testing::Test {
     EXPECT_LE(rig_->Frames("b", injected_ns, noticed->received_ns).size(), kToStatusFrames) << fault.what;
     EXPECT_LE(rig_->Frames("b", undone_ns, recovered->received_ns).size(), kToRecoveryFrames) << fault.what;
     EXPECT_EQ(lost, 0) << fault.what;
+    EXPECT_FALSE(others.empty()) << fault.what;
     for (const ReceivedFrame& other : others)
       EXPECT_TRUE(IsOk(other.frame)) << fault.what << ": " << other.frame.status_reason;
   }
@@ -159,6 +161,10 @@ TEST_F(RigTest, AStartsWithoutCameras) {
            Seconds(started_ns, busy->received_ns), Seconds(released_ns, a->frame.times.exposure_ns), "-");
   PrintRow("Absent at the start", "not plugged in", absent->frame, Seconds(started_ns, absent->received_ns),
            Seconds(released_ns, b->frame.times.exposure_ns), "-");
+  EXPECT_LE(Seconds(started_ns, busy->received_ns), kStartS);
+  EXPECT_LE(Seconds(started_ns, absent->received_ns), kStartS);
+  EXPECT_LE(Seconds(released_ns, a->frame.times.exposure_ns), kStartS);
+  EXPECT_LE(Seconds(released_ns, b->frame.times.exposure_ns), kStartS);
   for (const char* link : {"a", "b"})
     ASSERT_TRUE(rig_->Await(link, released_ns, IsOk))
         << rig_->Frames(link, 0, MonotonicNs()).back().frame.status_reason;
@@ -199,10 +205,13 @@ TEST_F(RigTest, BPreviewsAreWhatTheCamerasSee) {
       jpeg.valid = true;
       cv::Mat gray;
       ASSERT_TRUE(GrayDecoder().Decode(jpeg, gray).ok());
-      int nearest = 255;
-      for (const cv::Mat& shown : rig_->pictures(id).gray())
-        nearest = std::min(nearest, LargestDifference(gray, shown));
-      EXPECT_LE(nearest, 12) << "link " << link << " shows no image of its " << Name(id) << " camera";
+      for (const CameraId other : kBothCameras) {
+        int nearest = 255;
+        for (const cv::Mat& shown : rig_->pictures(other).gray())
+          nearest = std::min(nearest, LargestDifference(gray, shown));
+        EXPECT_EQ(nearest <= 12, other == id)
+            << "link " << link << ", " << Name(id) << " camera: " << nearest;
+      }
     }
   }
 }

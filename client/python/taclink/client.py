@@ -40,8 +40,8 @@ class Client:
     ca_file: PEM; the server's certificate must be signed by one of these. None: no TLS.
     certificate_file, key_file: PEM; this client's own, for servers that ask for one.
     timeout: s that a call, or the beginning of a stream, may take; None: 10 s. What takes longer by nature has its
-    own; None: 60 s. Where it is None, the environment variable TACLINK_PATIENCE_S, a number of seconds, is taken if
-    it is more, for slow machines; a server then also has so long, not only 5 s, to show that it still lives.
+    own; None: 60 s. For None, the environment variable TACLINK_PATIENCE_S, a number of seconds, raises the limit on
+    slow machines; it also raises the limit of 5 s for the server's answer to a keepalive ping.
 
     Errors of all methods, beside those they name (all TaclinkError): Unavailable, Timeout, Unauthenticated,
     PermissionDenied; of streams also ResourceExhausted. Errors of the constructor: InvalidArgument (also where
