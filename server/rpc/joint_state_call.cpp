@@ -20,23 +20,25 @@ JointMessage From(const v1::UpdateJointStatesRequest& request) {
 
 }  // namespace
 
-grpc::ServerReadReactor<v1::UpdateJointStatesRequest>* TakeJointStates(
-    Arm& arm, UpdateRegistry& registry, const Party& party, v1::UpdateJointStatesResponse& response) {
-  using Stream = UpdateStream<v1::UpdateJointStatesRequest>;
+grpc::ServerReadReactor<grpc::ByteBuffer>* TakeJointStates(Arm& arm, UpdateRegistry& registry,
+                                                           const Party& party, grpc::ByteBuffer& response) {
   auto intake = std::make_shared<JointStateIntake>(arm.poses(), arm.clock());
-  auto stream = std::make_shared<Stream>(
+  auto stream = std::make_shared<UpdateStream>(
       registry,
-      [intake, plays_log = arm.plays_log()](const v1::UpdateJointStatesRequest& request) {
+      [intake, plays_log = arm.plays_log()](const grpc::ByteBuffer& bytes) {
         if (plays_log) return Result<void>(PlaysLog());
-        if (const auto good = CheckRequest(request); !good)
-          return Result<void>(intake->AtNextMessage(good.error()));
-        return intake->Take(From(request));
+        const auto request = ParseRequest<v1::UpdateJointStatesRequest>(bytes);
+        if (!request) return Result<void>(intake->AtNextMessage(request.error()));
+        return intake->Take(From(*request));
       },
-      [intake, &response] {
-        response.set_accepted(intake->counts().accepted);
-        response.set_refused(intake->counts().refused);
-        response.set_first_refusal(intake->counts().first_refusal);
-      });
+      [intake] {
+        v1::UpdateJointStatesResponse out;
+        out.set_accepted(intake->counts().accepted);
+        out.set_refused(intake->counts().refused);
+        out.set_first_refusal(intake->counts().first_refusal);
+        return ToBytes(out);
+      },
+      response);
   stream->Begin(registry.Add(stream, party));
   return stream.get();  // the registry, or if refused itself, holds it until gRPC is done
 }

@@ -2,12 +2,11 @@
 
 #include "server/arm.h"
 #include "server/rpc/update_stream.h"
-#include "taclink/v1/joints.pb.h"
 
 namespace taclink::server {
 
 /// Serves one UpdateJointStates call; gRPC owns what is returned.
-grpc::ServerReadReactor<v1::UpdateJointStatesRequest>* TakeJointStates(
-    Arm& arm, UpdateRegistry& registry, const Party& party, v1::UpdateJointStatesResponse& response);
+grpc::ServerReadReactor<grpc::ByteBuffer>* TakeJointStates(Arm& arm, UpdateRegistry& registry,
+                                                           const Party& party, grpc::ByteBuffer& response);
 
 }  // namespace taclink::server

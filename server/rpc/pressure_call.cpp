@@ -16,9 +16,20 @@ class PressureIntake {
  public:
   explicit PressureIntake(Arm& arm) : arm_(arm) {}
 
-  Result<void> Take(const v1::UpdatePressureRequest& request) {
+  Result<void> Take(const grpc::ByteBuffer& bytes) {
     if (arm_.plays_log()) return PlaysLog();
-    if (auto good = CheckRequest(request); !good) return good;
+    const auto request = ParseRequest<v1::UpdatePressureRequest>(bytes);
+    return request ? Take(*request) : request.error();
+  }
+  v1::UpdatePressureResponse Response() const {
+    v1::UpdatePressureResponse response;
+    response.set_accepted(accepted_);
+    response.set_refused(refused_);
+    return response;
+  }
+
+ private:
+  Result<void> Take(const v1::UpdatePressureRequest& request) {
     if (!request.link().empty()) {
       const auto link = arm_.FindLink(request.link());
       if (!link) return link.error();
@@ -37,12 +48,7 @@ class PressureIntake {
     ++(*taken ? accepted_ : refused_);
     return {};
   }
-  void Fill(v1::UpdatePressureResponse& response) const {
-    response.set_accepted(accepted_);
-    response.set_refused(refused_);
-  }
 
- private:
   Arm& arm_;
   std::optional<size_t> link_;
   uint64_t accepted_ = 0, refused_ = 0;
@@ -50,14 +56,12 @@ class PressureIntake {
 
 }  // namespace
 
-grpc::ServerReadReactor<v1::UpdatePressureRequest>* TakePressure(Arm& arm, UpdateRegistry& registry,
-                                                                 const Party& party,
-                                                                 v1::UpdatePressureResponse& response) {
-  using Stream = UpdateStream<v1::UpdatePressureRequest>;
+grpc::ServerReadReactor<grpc::ByteBuffer>* TakePressure(Arm& arm, UpdateRegistry& registry,
+                                                        const Party& party, grpc::ByteBuffer& response) {
   auto intake = std::make_shared<PressureIntake>(arm);
-  auto stream = std::make_shared<Stream>(
-      registry, [intake](const v1::UpdatePressureRequest& request) { return intake->Take(request); },
-      [intake, &response] { intake->Fill(response); });
+  auto stream = std::make_shared<UpdateStream>(
+      registry, [intake](const grpc::ByteBuffer& bytes) { return intake->Take(bytes); },
+      [intake] { return ToBytes(intake->Response()); }, response);
   stream->Begin(registry.Add(stream, party));
   return stream.get();  // the registry, or if refused itself, holds it until gRPC is done
 }

@@ -28,4 +28,14 @@ Result<Request> ParseRequest(const grpc::ByteBuffer& bytes) {
   return request;
 }
 
+/// The response of a call whose response gRPC takes as bytes.
+template <typename Response>
+grpc::ByteBuffer ToBytes(const Response& response) {
+  grpc::ByteBuffer bytes;
+  bool owned = false;
+  // Fails only for messages of more than 2 GB.
+  static_cast<void>(grpc::SerializationTraits<Response>::Serialize(response, &bytes, &owned));
+  return bytes;
+}
+
 }  // namespace taclink::server

@@ -113,13 +113,13 @@ StreamReactor* TactileService::AddOrRefuse(const grpc::CallbackServerContext& co
   return admitted ? nullptr : RefuseStream(context, method, admitted.error());
 }
 
-grpc::ServerReadReactor<v1::UpdateJointStatesRequest>* TactileService::UpdateJointStates(
-    grpc::CallbackServerContext* context, v1::UpdateJointStatesResponse* response) {
+grpc::ServerReadReactor<grpc::ByteBuffer>* TactileService::UpdateJointStates(
+    grpc::CallbackServerContext* context, grpc::ByteBuffer* response) {
   return TakeJointStates(arm_, updates_, PartyOf(*context, *security_), *response);
 }
 
-grpc::ServerReadReactor<v1::UpdatePressureRequest>* TactileService::UpdatePressure(
-    grpc::CallbackServerContext* context, v1::UpdatePressureResponse* response) {
+grpc::ServerReadReactor<grpc::ByteBuffer>* TactileService::UpdatePressure(
+    grpc::CallbackServerContext* context, grpc::ByteBuffer* response) {
   return TakePressure(arm_, updates_, PartyOf(*context, *security_), *response);
 }
 

@@ -22,15 +22,16 @@
 
 namespace taclink::server {
 
-/// taclink.v1.TactileService over a running arm. StreamFrames is raw: its frames are encoded by the hub, once
-/// for all streams.
+/// taclink.v1.TactileService over a running arm. Raw are StreamFrames, whose frames the hub encodes once
+/// for all streams, other streams that the server encodes itself, and the calls that feed it (see
+/// UpdateStream).
 class TactileService final
     : public v1::TactileService::WithCallbackMethod_GetArm<
           v1::TactileService::WithRawCallbackMethod_StreamFrames<
               v1::TactileService::WithCallbackMethod_Calibrate<v1::TactileService::WithCallbackMethod_Tare<
                   v1::TactileService::WithRawCallbackMethod_StreamContacts<
-                      v1::TactileService::WithCallbackMethod_UpdateJointStates<
-                          v1::TactileService::WithCallbackMethod_UpdatePressure<
+                      v1::TactileService::WithRawCallbackMethod_UpdateJointStates<
+                          v1::TactileService::WithRawCallbackMethod_UpdatePressure<
                               v1::TactileService::WithRawCallbackMethod_StreamEvents<
                                   v1::TactileService::WithCallbackMethod_SetThresholds<
                                       v1::TactileService::WithRawCallbackMethod_StreamPreview<
@@ -63,10 +64,10 @@ class TactileService final
                                  v1::TareResponse* response) override;
   grpc::ServerWriteReactor<grpc::ByteBuffer>* StreamContacts(grpc::CallbackServerContext* context,
                                                              const grpc::ByteBuffer* request) override;
-  grpc::ServerReadReactor<v1::UpdateJointStatesRequest>* UpdateJointStates(
-      grpc::CallbackServerContext* context, v1::UpdateJointStatesResponse* response) override;
-  grpc::ServerReadReactor<v1::UpdatePressureRequest>* UpdatePressure(
-      grpc::CallbackServerContext* context, v1::UpdatePressureResponse* response) override;
+  grpc::ServerReadReactor<grpc::ByteBuffer>* UpdateJointStates(grpc::CallbackServerContext* context,
+                                                               grpc::ByteBuffer* response) override;
+  grpc::ServerReadReactor<grpc::ByteBuffer>* UpdatePressure(grpc::CallbackServerContext* context,
+                                                            grpc::ByteBuffer* response) override;
 
   grpc::ServerWriteReactor<grpc::ByteBuffer>* StreamEvents(grpc::CallbackServerContext* context,
                                                            const grpc::ByteBuffer* request) override;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
 
 #include <functional>
@@ -67,15 +68,17 @@ class UpdateRegistry {
 };
 
 /// Takes a client's messages one by one; the next is read when one was taken, so that a fast client waits.
-template <typename Request>
-class UpdateStream final : public grpc::ServerReadReactor<Request>,
+/// The messages arrive as bytes, because gRPC reports a message that it cannot parse like the end of the
+/// client's messages.
+class UpdateStream final : public grpc::ServerReadReactor<grpc::ByteBuffer>,
                            public UpdateCall,
-                           public std::enable_shared_from_this<UpdateStream<Request>> {
+                           public std::enable_shared_from_this<UpdateStream> {
  public:
-  /// `take`: each message; an error ends the call with it. `finish`: fills the response at the client's end.
-  UpdateStream(UpdateRegistry& registry, std::function<Result<void>(const Request&)> take,
-               std::function<void()> finish)
-      : registry_(registry), take_(std::move(take)), finish_(std::move(finish)) {}
+  /// `take`: each message; an error ends the call with it. `respond`: the response at the client's end,
+  /// written to `response`, which gRPC sends.
+  UpdateStream(UpdateRegistry& registry, std::function<Result<void>(const grpc::ByteBuffer&)> take,
+               std::function<grpc::ByteBuffer()> respond, grpc::ByteBuffer& response)
+      : registry_(registry), take_(std::move(take)), respond_(std::move(respond)), response_(response) {}
 
   /// Only once the registry was asked; `accepted`: what it said.
   void Begin(const Result<void>& accepted) {
@@ -96,9 +99,9 @@ class UpdateStream final : public grpc::ServerReadReactor<Request>,
 
  private:
   void OnReadDone(bool ok) override {
-    if (!ok) {
-      finish_();
-      return End(grpc::Status::OK);  // for a client that has gone it is of no account
+    if (!ok) {  // the client has sent all, or is gone
+      response_ = respond_();
+      return End(grpc::Status::OK);
     }
     if (const auto taken = take_(message_); !taken) return End(ToGrpc(taken.error()));
     const std::lock_guard lock(mutex_);
@@ -113,11 +116,12 @@ class UpdateStream final : public grpc::ServerReadReactor<Request>,
 
   // Constant after construction.
   UpdateRegistry& registry_;
-  const std::function<Result<void>(const Request&)> take_;
-  const std::function<void()> finish_;
+  const std::function<Result<void>(const grpc::ByteBuffer&)> take_;
+  const std::function<grpc::ByteBuffer()> respond_;
 
+  grpc::ByteBuffer& response_;          // gRPC's, until OnDone
   std::shared_ptr<UpdateStream> self_;  // of a refused call, until gRPC is done
-  Request message_;                     // being read, or taken
+  grpc::ByteBuffer message_;            // being read, or taken
   std::mutex mutex_;
   // Guarded by mutex_.
   bool finished_ = false;

@@ -159,7 +159,7 @@ class BadRequests {
 };
 
 /// Any call with one message from the client; what the server answers is read and forgotten.
-grpc::Status Call(grpc::GenericStub& stub, const MethodDescriptor& method, const Message& request) {
+grpc::Status Call(grpc::GenericStub& stub, const MethodDescriptor& method, const std::string& request) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kForever);
   grpc::CompletionQueue queue;
@@ -173,7 +173,7 @@ grpc::Status Call(grpc::GenericStub& stub, const MethodDescriptor& method, const
       stub.PrepareCall(&context, "/" + method.service()->full_name() + "/" + method.name(), &queue);
   call->StartCall(nullptr);
   if (wait()) {
-    const grpc::Slice slice(request.SerializePartialAsString());
+    const grpc::Slice slice(request);
     call->WriteLast(grpc::ByteBuffer(&slice, 1), {}, nullptr);
     wait();
     grpc::ByteBuffer answer;
@@ -236,7 +236,7 @@ TEST_F(RequestFieldsTest, WhatTheyMustNotBeIsRefusedByNameAndChangesNothing) {
     BadRequests bad(*base);
     for (const BadValue& value : bad.values()) {
       SCOPED_TRACE(method->name() + ": " + value.field + " = " + value.what);
-      const grpc::Status status = Call(stub_, *method, *value.request);
+      const grpc::Status status = Call(stub_, *method, value.request->SerializePartialAsString());
       EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << status.error_message();
       EXPECT_THAT(status.error_message(), HasSubstr(value.field.substr(value.field.find('.') + 1)));
       EXPECT_LT(status.error_message().size(), 400u);
@@ -246,6 +246,24 @@ TEST_F(RequestFieldsTest, WhatTheyMustNotBeIsRefusedByNameAndChangesNothing) {
   EXPECT_GT(tried, 150u);
   EXPECT_TRUE(State() == before) << State();
   EXPECT_FALSE(std::filesystem::exists(folder_));
+}
+
+TEST_F(RequestFieldsTest, BytesThatAreNoMessageAreRefusedAndChangeNothing) {
+  const std::string before = State();
+  for (const MethodDescriptor* method : Methods()) {
+    SCOPED_TRACE(method->name());
+    // A length-delimited field that is longer than the message, and a field number that is none.
+    for (const std::string& bytes : {std::string("\x0a\x7fup"), std::string("\x00\x00", 2)}) {
+      const grpc::Status status = Call(stub_, *method, bytes);
+      EXPECT_FALSE(status.ok());
+      EXPECT_NE(status.error_code(), grpc::StatusCode::CANCELLED) << "it was accepted";
+      if (method->client_streaming()) {
+        EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+        EXPECT_THAT(status.error_message(), ::testing::HasSubstr(method->input_type()->name()));
+      }
+    }
+  }
+  EXPECT_EQ(State(), before);
 }
 
 }  // namespace
