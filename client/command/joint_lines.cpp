@@ -1,15 +1,20 @@
 #include "client/command/joint_lines.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <utility>
 
 #include "client/command/json.h"
+#include "sensing/core/printable.h"
 
 namespace taclink::command {
 namespace {
 
 constexpr const char* kTime = "time_s";
+constexpr double kMostTime = 1e9;   // s, some 30 years; nanoseconds of it fit 64 bits
+constexpr size_t kMostQuoted = 40;  // bytes of a cell in a message
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 
 std::string Trimmed(const std::string& text) {
   const auto first = text.find_first_not_of(" \t\r");
@@ -43,10 +48,17 @@ Error JointLineReader::Wrong(const std::string& what) const {
 
 Result<std::optional<JointLine>> JointLineReader::Read(const std::string& raw) {
   ++number_;
-  const std::string line = Trimmed(raw);
+  const bool marked = number_ == 1 && raw.starts_with(kByteOrderMark);
+  const std::string line = Trimmed(marked ? raw.substr(kByteOrderMark.size()) : raw);
   if (line.empty() || line[0] == '#') return std::optional<JointLine>();
+  if (line.size() > kLongestJointLine)
+    return Wrong("longer than " + WithCommas(kLongestJointLine) + " bytes");
+  if (line.find('\0') != std::string::npos || !IsUtf8(line)) return Wrong("not UTF-8 text");
   if (!json_) json_ = line[0] == '{';
-  return *json_ ? ReadJson(line) : ReadCsv(line);
+  auto read = *json_ ? ReadJson(line) : ReadCsv(line);
+  if (read && *read && (*read)->time_s && !(std::abs(*(*read)->time_s) <= kMostTime))
+    return Wrong("time_s must be -1e9 to 1e9 s");
+  return read;
 }
 
 Result<std::optional<JointLine>> JointLineReader::ReadJson(const std::string& line) {
@@ -82,9 +94,7 @@ Result<std::optional<JointLine>> JointLineReader::ReadJson(const std::string& li
 Result<std::optional<JointLine>> JointLineReader::ReadCsv(const std::string& line) {
   const auto cells = Split(line);
   if (columns_.empty()) {
-    if (ToNumber(cells[0]))
-      return Wrong("CSV begins with a line that names the columns: time_s and the joints");
-    columns_ = cells;
+    if (const auto read = ReadColumns(cells); !read) return read.error();
     return std::optional<JointLine>();
   }
   if (cells.size() != columns_.size())
@@ -92,7 +102,9 @@ Result<std::optional<JointLine>> JointLineReader::ReadCsv(const std::string& lin
   JointLine out;
   for (size_t i = 0; i < cells.size(); ++i) {
     const auto value = ToNumber(cells[i]);
-    if (!value) return Wrong("'" + cells[i] + "' in column '" + columns_[i] + "' is not a number");
+    if (!value)
+      return Wrong("'" + Printable(cells[i], kMostQuoted) + "' in column '" + columns_[i] +
+                   "' is not a number");
     if (columns_[i] == kTime) {
       out.time_s = *value;
     } else {
@@ -101,6 +113,24 @@ Result<std::optional<JointLine>> JointLineReader::ReadCsv(const std::string& lin
     }
   }
   return std::optional(std::move(out));
+}
+
+Result<void> JointLineReader::ReadColumns(std::vector<std::string> names) {
+  for (size_t i = 0; i < names.size(); ++i) {
+    const std::string& name = names[i];
+    const std::string quoted = "'" + Printable(name, kMostQuoted) + "'";
+    // A number, or what JSON's arrays and texts begin with, is a line of data.
+    if (ToNumber(name) || name.empty() || std::string_view("[]{}\"").find(name[0]) != std::string_view::npos)
+      return Wrong(quoted +
+                   " names no column; begin with a JSON object {\"positions\": ...}, or with CSV's "
+                   "first line: time_s and the joints' names");
+    if (Printable(name) != name) return Wrong(quoted + " has control characters");
+    if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), name) !=
+        names.begin() + static_cast<std::ptrdiff_t>(i))
+      return Wrong("two columns are named " + quoted);
+  }
+  columns_ = std::move(names);
+  return {};
 }
 
 }  // namespace taclink::command

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,10 +9,12 @@
 
 namespace taclink::command {
 
+inline constexpr size_t kLongestJointLine = size_t{1} << 20;  ///< bytes
+
 /// Joint positions of one line, in rad (prismatic joints: m). `positions` has one number per name;
 /// `velocities` (rad/s, m/s) has as many or is empty.
 struct JointLine {
-  std::optional<double> time_s;  ///< since any instant; none: the line's own
+  std::optional<double> time_s;  ///< since any instant, at most 1e9 from it; none: the line's own
   std::vector<std::string> names;
   std::vector<double> positions;
   std::vector<double> velocities;
@@ -19,7 +22,7 @@ struct JointLine {
 
 /// Reads joint positions line by line: JSON objects ({"time_s": 0.1, "positions": {"elbow": 0.5}}, or
 /// "names", "positions" and "velocities" as lists), or CSV whose first line names the columns (a column
-/// time_s, if any, and the joints). Which of them the first line tells.
+/// time_s, if any, and the joints). The first line decides which. A byte order mark before it is skipped.
 class JointLineReader {
  public:
   /// None: an empty line, a comment (#), or CSV's first line. Errors: kInvalidArgument, with the line's
@@ -29,6 +32,7 @@ class JointLineReader {
  private:
   Result<std::optional<JointLine>> ReadJson(const std::string& line);
   Result<std::optional<JointLine>> ReadCsv(const std::string& line);
+  Result<void> ReadColumns(std::vector<std::string> names);
   Error Wrong(const std::string& what) const;
 
   int number_ = 0;

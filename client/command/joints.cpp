@@ -36,7 +36,7 @@ class Player {
   Result<void> Play(std::istream& in) {
     JointLineReader reader;
     begun_ = false;
-    for (std::string line; std::getline(in, line);) {
+    for (std::string line; ReadLine(in, line);) {
       const auto read = reader.Read(line);
       if (!read) return read.error();
       if (!*read) continue;
@@ -45,7 +45,19 @@ class Player {
     return {};
   }
 
+  size_t sent() const { return sent_; }
+
  private:
+  /// As std::getline, but of a line that is too long no more than the reader needs to refuse it.
+  static bool ReadLine(std::istream& in, std::string& line) {
+    line.clear();
+    for (int c = in.get(); c != std::istream::traits_type::eof(); c = in.get()) {
+      if (c == '\n') return true;
+      line.push_back(static_cast<char>(c));
+      if (line.size() > kLongestJointLine) return true;
+    }
+    return !line.empty();
+  }
   Result<void> Send(const JointLine& line) {
     auto time = system_clock::now();
     if (line.time_s) {
@@ -53,6 +65,7 @@ class Player {
       time = begin_ + Duration(*line.time_s);
       std::this_thread::sleep_until(time);
     }
+    ++sent_;
     return writer_.Write({line.names, line.positions, line.velocities, UtcNs(time)});
   }
   static system_clock::duration Duration(double seconds) {
@@ -62,6 +75,7 @@ class Player {
   client::JointStateWriter& writer_;
   system_clock::time_point begin_;  // of the lines' times, once begun_
   bool begun_ = false;
+  size_t sent_ = 0;
 };
 
 Result<void> RunJoints(const JointsOptions& options) {
@@ -78,6 +92,7 @@ Result<void> RunJoints(const JointsOptions& options) {
     }
     const auto played = player.Play(options.file == "-" ? std::cin : file);
     if (!played) return Error{played.error().code, options.file + ": " + played.error().message};
+    if (player.sent() == 0) return Error{ErrorCode::kInvalidArgument, options.file + ": no joint positions"};
   } while (options.loop && options.file != "-");
   const auto summary = writer->Finish();
   if (!summary) return summary.error();

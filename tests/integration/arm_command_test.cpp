@@ -38,6 +38,12 @@ TEST(JointLines, Csv) {
   EXPECT_FALSE(reader.Read("")->has_value());
 }
 
+TEST(JointLines, AByteOrderMarkIsSkipped) {
+  JointLineReader reader;
+  EXPECT_FALSE(reader.Read("\xef\xbb\xbftime_s,elbow")->has_value());
+  EXPECT_EQ(LineOf(reader, "1,2").time_s, 1);
+}
+
 TEST(JointLines, Json) {
   JointLineReader reader;
   auto line = LineOf(reader, R"({"positions": {"elbow": 0.5, "lift": 1}, "time_s": 2})");
@@ -51,7 +57,19 @@ TEST(JointLines, Json) {
 }
 
 TEST(JointLines, MistakesAreNamedWithTheirLine) {
-  EXPECT_THAT(Complaint({"1,2"}), HasSubstr("line 1: CSV begins with a line that names"));
+  EXPECT_THAT(Complaint({"1,2"}), HasSubstr("line 1: '1' names no column; begin with"));
+  for (const char* line : {"[1, 2]", "\"elbow\"", "a,,b", "a,{"})
+    EXPECT_THAT(Complaint({line}), HasSubstr("names no column")) << line;
+  EXPECT_THAT(Complaint({"a,b,a"}), HasSubstr("two columns are named 'a'"));
+  EXPECT_THAT(Complaint({"a,\xff"}), HasSubstr("line 1: not UTF-8"));
+  EXPECT_THAT(Complaint({"a,\x1b[2J"}), HasSubstr("control characters"));
+  EXPECT_THAT(Complaint({"a,b", std::string("1,2\0,3", 6)}), HasSubstr("line 2: not UTF-8"));
+  EXPECT_THAT(Complaint({std::string("{\"positions\": {\"a\": 1}}\0x", 26)}), HasSubstr("line 1: not UTF-8"));
+  EXPECT_THAT(Complaint({"a,time_s", "1,1e300"}), HasSubstr("line 2: time_s must be"));
+  EXPECT_THAT(Complaint({R"({"positions": {"a": 1}, "time_s": -1e10})"}), HasSubstr("time_s must be"));
+  EXPECT_THAT(Complaint({"a", std::string(kLongestJointLine + 1, '1')}),
+              HasSubstr("longer than 1,048,576 bytes"));
+  EXPECT_LT(Complaint({"a", std::string(100'000, 'x')}).size(), 200u);
   EXPECT_THAT(Complaint({"a,b", "1"}), HasSubstr("line 2: 1 cells for 2 columns"));
   EXPECT_THAT(Complaint({"a,b", "1,x"}), HasSubstr("'x' in column 'b' is not a number"));
   EXPECT_THAT(Complaint({"a", "nan"}), HasSubstr("not a number"));
