@@ -271,6 +271,7 @@ TEST_F(LogTest, TheMacrosTellTheirPlace) {
   spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", Limited({.per_site = 1})));
   for (int i = 0; i < 100; ++i) SPDLOG_WARN("{}", Letters(i));
   spdlog::set_default_logger(before);
+  spdlog::drop("test");  // from spdlog 1.15 on, a former default logger stays registered
   EXPECT_EQ(Lines().size(), 2u) << "and the count";
 }
 
