@@ -48,11 +48,12 @@ Error JointLineReader::Wrong(const std::string& what) const {
 
 Result<std::optional<JointLine>> JointLineReader::Read(const std::string& raw) {
   ++number_;
+  // Before anything is trimmed or skipped, because what follows in the file is the rest of this line.
+  if (raw.size() > kLongestJointLine)
+    return Wrong("longer than " + WithCommas(kLongestJointLine) + " bytes");
   const bool marked = number_ == 1 && raw.starts_with(kByteOrderMark);
   const std::string line = Trimmed(marked ? raw.substr(kByteOrderMark.size()) : raw);
   if (line.empty() || line[0] == '#') return std::optional<JointLine>();
-  if (line.size() > kLongestJointLine)
-    return Wrong("longer than " + WithCommas(kLongestJointLine) + " bytes");
   if (line.find('\0') != std::string::npos || !IsUtf8(line)) return Wrong("not UTF-8 text");
   if (!json_) json_ = line[0] == '{';
   auto read = *json_ ? ReadJson(line) : ReadCsv(line);

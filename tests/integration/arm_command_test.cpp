@@ -69,6 +69,7 @@ TEST(JointLines, MistakesAreNamedWithTheirLine) {
   EXPECT_THAT(Complaint({R"({"positions": {"a": 1}, "time_s": -1e10})"}), HasSubstr("time_s must be"));
   EXPECT_THAT(Complaint({"a", std::string(kLongestJointLine + 1, '1')}),
               HasSubstr("longer than 1,048,576 bytes"));
+  EXPECT_THAT(Complaint({"a", "#" + std::string(kLongestJointLine, ' ')}), HasSubstr("longer than"));
   EXPECT_LT(Complaint({"a", std::string(100'000, 'x')}).size(), 200u);
   EXPECT_THAT(Complaint({"a,b", "1"}), HasSubstr("line 2: 1 cells for 2 columns"));
   EXPECT_THAT(Complaint({"a,b", "1,x"}), HasSubstr("'x' in column 'b' is not a number"));
