@@ -1,11 +1,19 @@
 // What a user sees of the live path: simulated scenes through the server's default pipeline at the cameras'
-// rate, in real time. One process per scene, so that memory is the scene's own.
-//   taclink_live_report [--cores N] [--seconds S] [--folder SCENES] [SCENE ...]
-// Prints one line per scene:
-//   u           cost of one residual (internal forces) and one back-substitution on the default mesh, ms
-//   latency     exposure to published state, ms, of all frames and of those with a contact
-//   cpu         CPU time of all threads between two frames, ms per frame; with the rendering of the cameras'
-//   images skipped     frames that were exposed and not solved memory      resident size at the end, MiB
+// rate, in real time. One process per case, so that memory is the case's own. Run it in the repository's
+// root.
+//
+//   taclink_live_report [--cores N] [--seconds S] [--folder SCENES] [CASE ...]
+//
+// A case is a shipped scene, a scene of the folder, or `demo`: the links of deploy/config/demo.yaml at once.
+// Prints one line per case:
+//
+// - latency: exposure to published state, ms, of all frames and of those with a contact
+// - cpu: CPU time of all threads between two frames, ms, with the rendering of the cameras' images
+// - skip %: frames that were exposed and not solved; not ok: frames whose status is not `ok`, in percent
+// - MiB: resident size at the end
+//
+// Above them stands the unit that makes machines comparable: u, the cost of one residual (internal forces)
+// and one back-substitution on the default mesh, ms.
 #include <fmt/format.h>
 #include <sched.h>
 #include <spdlog/spdlog.h>
@@ -43,7 +51,7 @@ struct Options {
   int cores = 2;
   int seconds = 30;
   std::string folder = "tests/bench/scenes";
-  std::vector<std::string> scenes;
+  std::vector<std::string> cases;
 };
 
 double CpuMs() {
@@ -133,15 +141,30 @@ class States {
   std::unique_ptr<Subscription> subscription_;
 };
 
-/// The configuration of an arm with one link per scene.
-std::string ConfigText(const std::vector<std::string>& scenes) {
-  std::string text = "taclink_config: 1\narm:\n  name: bench\n  links:\n";
-  for (size_t i = 0; i < scenes.size(); ++i) {
-    const auto scene = LoadScene(scenes[i]);
-    text += fmt::format("    - {{name: link{}, model: {}, source: simulated, scene: {}, pace: clock}}\n", i,
-                        scene ? scene->model : "cylinder", scenes[i]);
+struct Case {
+  std::string name;
+  std::string scene;  // name or file; empty: the demo's configuration
+};
+
+/// The case's links, with scenes that go by the clock.
+Result<Config> CaseConfig(const Case& measured) {
+  if (measured.scene.empty()) {
+    auto demo = LoadConfig("deploy/config/demo.yaml");
+    if (demo) {
+      for (LinkConfig& link : demo->links) {
+        std::get<SimulatedSourceConfig>(link.source).pace = ScenePace::kClock;
+      }
+    }
+    return demo;
   }
-  return text;
+  const auto scene = LoadScene(measured.scene);
+  if (!scene) return scene.error();
+  return ParseConfig(
+      measured.name,
+      fmt::format("taclink_config: 1\narm:\n  name: bench\n  links:\n    - {{name: link, model: "
+                  "{}, source: simulated, scene: {}, pace: clock}}\n",
+                  scene->model, measured.scene),
+      ".");
 }
 
 /// Waits until all links are `ok`, at most three minutes.
@@ -159,25 +182,32 @@ bool WaitUntilOk(Arm& arm) {
   return false;
 }
 
-/// Runs the scenes, one link each, and prints the line of results.
-bool Report(const std::string& name, const std::vector<std::string>& scenes, const Options& options) {
-  const auto config = ParseConfig("bench", ConfigText(scenes), ".");
+/// Frames of all links that were solved and that were skipped, so far.
+struct FrameCounts {
+  explicit FrameCounts(Arm& arm) {
+    for (size_t link = 0; link < arm.links().size(); ++link) {
+      const LinkStatistics statistics = arm.worker(link).Statistics();
+      solved += statistics.frames;
+      skipped += statistics.frames_skipped;
+    }
+  }
+  uint64_t solved = 0, skipped = 0;
+};
+
+/// Runs the case and prints the line of its results.
+bool Report(const Case& measured, const Options& options) {
+  const auto config = CaseConfig(measured);
   const auto arm = config ? BuildArm(*config, SystemClock()) : config.error();
   if (!arm) {
-    fmt::print(stderr, "{}: {}\n", name, arm.error().message);
+    fmt::print(stderr, "{}: {}\n", measured.name, arm.error().message);
     return false;
   }
   (*arm)->Start();
   if (!WaitUntilOk(**arm)) {
-    fmt::print(stderr, "{}: not every link is ok after three minutes\n", name);
+    fmt::print(stderr, "{}: not every link is ok after three minutes\n", measured.name);
     return false;
   }
-  std::vector<uint64_t> solved_before, skipped_before;
-  for (size_t link = 0; link < scenes.size(); ++link) {
-    const LinkStatistics before = (*arm)->worker(link).Statistics();
-    solved_before.push_back(before.frames);
-    skipped_before.push_back(before.frames_skipped);
-  }
+  const FrameCounts before(**arm);
   std::vector<double> all_ms, touched_ms, cpu_ms;
   size_t frames = 0, not_ok = 0;
   const double cpu_begin_ms = CpuMs();
@@ -201,14 +231,10 @@ bool Report(const std::string& name, const std::vector<std::string>& scenes, con
   }
   const double wall_ms = std::chrono::duration<double, std::milli>(Steady::now() - begin).count();
   const double cores = (CpuMs() - cpu_begin_ms) / wall_ms;
-  uint64_t solved = 0, skipped = 0;
-  for (size_t link = 0; link < scenes.size(); ++link) {
-    const LinkStatistics now = (*arm)->worker(link).Statistics();
-    solved += now.frames - solved_before[link];
-    skipped += now.frames_skipped - skipped_before[link];
-  }
+  const FrameCounts after(**arm);
+  const uint64_t solved = after.solved - before.solved, skipped = after.skipped - before.skipped;
   fmt::print(
-      "{:<14} {} | {} | {} | {:5.2f} {:6.2f} {:6.2f} {:7.0f}\n", name, Distribution(all_ms).Text(),
+      "{:<14} {} | {} | {} | {:5.2f} {:6.2f} {:6.2f} {:7.0f}\n", measured.name, Distribution(all_ms).Text(),
       Distribution(touched_ms).Text(), Distribution(cpu_ms).Text(), cores,
       100.0 * static_cast<double>(skipped) / static_cast<double>(std::max<uint64_t>(1, solved + skipped)),
       100.0 * static_cast<double>(not_ok) / static_cast<double>(std::max<size_t>(1, frames)), ResidentMib());
@@ -231,19 +257,18 @@ Result<Options> Parse(int argc, char** argv) {
     else if (argument.starts_with("-"))
       return Error{
           ErrorCode::kInvalidArgument,
-          argument + ": usage: taclink_live_report [--cores N] [--seconds S] [--folder SCENES] [SCENE ...]"};
+          argument + ": usage: taclink_live_report [--cores N] [--seconds S] [--folder SCENES] [CASE ...]"};
     else
-      options.scenes.push_back(argument);
+      options.cases.push_back(argument);
   }
   if (options.cores < 1 || options.seconds < 1)
     return Error{ErrorCode::kInvalidArgument, "--cores and --seconds must be whole numbers from 1"};
   return options;
 }
 
-/// Scenes by name: shipped, of the folder, and `demo`: the links of the demo at once.
-std::vector<std::pair<std::string, std::vector<std::string>>> Cases(const Options& options) {
-  std::vector<std::pair<std::string, std::vector<std::string>>> cases;
-  for (const std::string& name : ShippedSceneNames()) cases.push_back({name, {name}});
+std::vector<Case> Cases(const Options& options) {
+  std::vector<Case> cases;
+  for (const std::string& name : ShippedSceneNames()) cases.push_back({name, name});
   std::vector<std::filesystem::path> files;
   if (std::filesystem::is_directory(options.folder)) {
     for (const auto& entry : std::filesystem::directory_iterator(options.folder))
@@ -251,11 +276,11 @@ std::vector<std::pair<std::string, std::vector<std::string>>> Cases(const Option
   }
   std::sort(files.begin(), files.end());
   for (const auto& file : files)
-    cases.push_back({file.stem().string(), {std::filesystem::absolute(file).string()}});
-  cases.push_back({"demo", {"press", "two_touches", "stroke", "inflate"}});
-  if (!options.scenes.empty()) {
-    std::erase_if(cases, [&](const auto& each) {
-      return std::find(options.scenes.begin(), options.scenes.end(), each.first) == options.scenes.end();
+    cases.push_back({file.stem().string(), std::filesystem::absolute(file).string()});
+  cases.push_back({"demo", ""});
+  if (!options.cases.empty()) {
+    std::erase_if(cases, [&](const Case& each) {
+      return std::find(options.cases.begin(), options.cases.end(), each.name) == options.cases.end();
     });
   }
   return cases;
@@ -274,7 +299,7 @@ int Main(int argc, char** argv) {
   spdlog::set_level(spdlog::level::warn);
   const auto cases = Cases(*options);
   if (cases.empty()) {
-    fmt::print(stderr, "taclink_live_report: no such scene\n");
+    fmt::print(stderr, "taclink_live_report: no such case\n");
     return 2;
   }
   fmt::print("cores {}, u = {:.3f} ms (cylinder), {:.3f} ms (barrel)\n", options->cores,
@@ -283,13 +308,13 @@ int Main(int argc, char** argv) {
   fmt::print("{:<14} {} | {} | {} | {:>5} {:>6} {:>6} {:>7}\n", "", fmt::format("{:^27}", "latency, ms"),
              fmt::format("{:^27}", "touched, ms"), fmt::format("{:^27}", "cpu per frame, ms"), "", "", "",
              "");
-  fmt::print("{:<14} {} | {} | {} | {:>5} {:>6} {:>6} {:>7}\n", "scene", columns, columns, columns, "cores",
+  fmt::print("{:<14} {} | {} | {} | {:>5} {:>6} {:>6} {:>7}\n", "case", columns, columns, columns, "cores",
              "skip %", "not ok", "MiB");
   std::fflush(stdout);
   bool is_good = true;
-  for (const auto& [name, scenes] : cases) {
+  for (const Case& measured : cases) {
     const pid_t child = fork();
-    if (child == 0) _exit(Report(name, scenes, *options) ? 0 : 1);
+    if (child == 0) _exit(Report(measured, *options) ? 0 : 1);
     int status = 0;
     is_good = child > 0 && waitpid(child, &status, 0) == child && status == 0 && is_good;
   }
