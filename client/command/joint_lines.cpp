@@ -49,8 +49,7 @@ Error JointLineReader::Wrong(const std::string& what) const {
 Result<std::optional<JointLine>> JointLineReader::Read(const std::string& raw) {
   ++number_;
   // Before anything is trimmed or skipped, because what follows in the file is the rest of this line.
-  if (raw.size() > kLongestJointLine)
-    return Wrong("longer than " + WithCommas(kLongestJointLine) + " bytes");
+  if (raw.size() > kLongestJointLine) return Wrong("longer than " + WithCommas(kLongestJointLine) + " bytes");
   const bool marked = number_ == 1 && raw.starts_with(kByteOrderMark);
   const std::string line = Trimmed(marked ? raw.substr(kByteOrderMark.size()) : raw);
   if (line.empty() || line[0] == '#') return std::optional<JointLine>();
