@@ -124,12 +124,12 @@ bool Linearization::At(const ShellState& state, double pressure_mpa) {
   if (!gradient_.allFinite() || !factor_.Factorise(hessian_)) return false;
   const MarkerMap& map = mechanics_.markers();
   map.WriteJacobian(shell, state_, jacobian_);
-  Eigen::MatrixXf dense_jacobian = Eigen::MatrixXf::Zero(jacobian_.rows(), jacobian_.cols());
+  adjoint_.setZero(jacobian_.rows(), jacobian_.cols());
   for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
     for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it)
-      dense_jacobian(row, it.col()) = static_cast<float>(it.value());
+      adjoint_(row, it.col()) = static_cast<float>(it.value());
   }
-  factor_.SolveRows(dense_jacobian, filled_, adjoint_);
+  factor_.SolveRows(filled_, adjoint_);
   if (!adjoint_.allFinite()) return false;
   map.Displacements(state_, base_mm_);
   factor_.Solve(gradient_, motion_);
@@ -140,26 +140,17 @@ bool Linearization::At(const ShellState& state, double pressure_mpa) {
   tangent_gradient_ = gradient_;
   tangent_base_mm_ = base_mm_;
   SetFrames();
-  SetColumns();
   is_made_ = true;
   return true;
 }
 
-void Linearization::SetColumns() {
-  const int sites = mechanics_.site_count();
-  for (auto& matrix : columns_) matrix.resize(adjoint_.rows(), sites);
-  for (int site = 0; site < sites; ++site) {
-    const int node = mechanics_.NodeOfSite(site), dof = mechanics_.shell().Dof(node, 0);
-    const Mat3& frame = frames_[static_cast<size_t>(site)];
-    Eigen::Matrix<float, 5, 3> loads;
-    for (int k = 0; k < 3; ++k) {
-      const Vec2 moment = k == 0 ? Vec2::Zero() : Moment(node, frame.col(k));
-      loads.col(k) << frame.col(k).cast<float>(), moment.cast<float>();
-    }
-    const auto by_node = adjoint_.middleCols<5>(dof);
-    for (int k = 0; k < 3; ++k)
-      columns_[static_cast<size_t>(k)].col(site).noalias() = by_node.lazyProduct(loads.col(k));
-  }
+Eigen::VectorXf Linearization::Column(Direction direction, int site) const {
+  const int node = mechanics_.NodeOfSite(site), dof = mechanics_.shell().Dof(node, 0);
+  const Vec3 force = frames_[static_cast<size_t>(site)].col(direction);
+  const Vec2 moment = direction == kInward ? Vec2::Zero() : Moment(node, force);
+  Eigen::Matrix<float, 5, 1> load;
+  load << force.cast<float>(), moment.cast<float>();
+  return adjoint_.middleCols<5>(dof).lazyProduct(load);
 }
 
 bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {

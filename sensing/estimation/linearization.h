@@ -11,7 +11,7 @@
 namespace taclink {
 
 /// The skin's equilibrium to first order about a state: with loads f at the sites and a pressure error dp,
-///   m = base + sum_k columns[k] f_k + by_pressure dp.
+///   m = base + sum_k sum_s Column(k, s) f_ks + by_pressure dp.
 /// Directions k of a site: inward, around, along; the last two act on the outer wall, with their moment. A
 /// state may be one that no stable equilibrium is near: the stiffness may be indefinite. One thread.
 class Linearization {
@@ -31,8 +31,10 @@ class Linearization {
   const ShellState& tangent_state() const { return tangent_state_; }
   double pressure_mpa() const { return pressure_mpa_; }
   const Eigen::VectorXd& base_mm() const { return base_mm_; }
-  /// mm/N, 3 markers x sites, of loads that act on a site's node alone.
-  const std::array<Eigen::MatrixXf, 3>& columns() const { return columns_; }
+  /// Directions of the load of a site, in its frame.
+  enum Direction { kInward, kAround, kAlong };
+  /// Displacement of the stacked markers by a load that acts on a site's node alone, mm/N.
+  Eigen::VectorXf Column(Direction direction, int site) const;
   const Eigen::VectorXd& by_pressure() const { return by_pressure_; }
   /// By site; columns inward, around, along; unit, perpendicular.
   const std::vector<Mat3>& frames() const { return frames_; }
@@ -41,7 +43,7 @@ class Linearization {
   /// shares; mm, stacked.
   Eigen::MatrixXf CoupleColumns(const Eigen::VectorXd& shares) const;
 
-  /// The transposes of columns() times forces on the markers (3 each, stacked), in one solution instead of
+  /// The transposes of all columns times forces on the markers (3 each, stacked), in one solution instead of
   /// three large products.
   std::array<Eigen::VectorXd, 3> PulledAtSites(const Eigen::VectorXd& at_markers);
 
@@ -59,7 +61,6 @@ class Linearization {
 
  private:
   void SetFrames();
-  void SetColumns();
   /// The rotations' part of a couple about an axis; of a force on the outer wall, which has one about the
   /// mid-surface.
   Vec2 Turning(int node, const Vec3& couple) const;
@@ -76,7 +77,6 @@ class Linearization {
   Eigen::VectorXd gradient_, pressure_force_, base_mm_, without_, by_pressure_, motion_;
   Eigen::MatrixXf adjoint_;                     // J K^-1: 3 markers x dofs
   std::vector<BlockTridiagonal::Rows> filled_;  // rows of J that reach that row of nodes
-  std::array<Eigen::MatrixXf, 3> columns_;
   std::vector<Mat3> frames_;
 };
 

@@ -78,7 +78,7 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
   factor_ = factor.cast<float>();
   WriteCameraCovariances();
   whitened_pressure_ = factor.triangularView<Eigen::Lower>().solve(by_pressure_);
-  SpreadColumns(skin.columns()[0]);
+  SpreadColumns(skin);
   hidden_.resize(0, 0);
   limits_.by_site_n.resize(0);
   dense::SolveLower(factor_, columns_);
@@ -103,7 +103,10 @@ void LoadEstimator::WriteCameraCovariances() {
 }
 
 // Behind the sites' columns, those of bands: of 1 N that a row of sites shares.
-void LoadEstimator::SpreadColumns(const Eigen::MatrixXf& at_nodes) {
+void LoadEstimator::SpreadColumns(const Linearization& skin) {
+  Eigen::MatrixXf at_nodes(factor_.rows(), mechanics_.site_count());
+  for (int site = 0; site < mechanics_.site_count(); ++site)
+    at_nodes.col(site) = skin.Column(Linearization::kInward, site);
   columns_.resize(at_nodes.rows(), at_nodes.cols() + mechanics_.site_rows());
   Eigen::VectorXf sum(at_nodes.rows());
   for (Eigen::Index site = 0; site < at_nodes.cols(); ++site) {

@@ -122,7 +122,7 @@ class LoadEstimator {
   using Hill = HillFinder::Hill;
 
   void WriteCameraCovariances();
-  void SpreadColumns(const Eigen::MatrixXf& at_nodes);
+  void SpreadColumns(const Linearization& skin);
   Eigen::MatrixXd Whitened(const Eigen::MatrixXd& columns) const;
   /// The sites that a column of the problem loads, and the share of each: one site, or a band's.
   template <typename Visit>

@@ -59,18 +59,19 @@ void MarkerCovariance::AddStray(const Linearization& skin, const Eigen::VectorXd
   for (auto& sigmas : stray_n_) sigmas.setZero(sites);
   Eigen::MatrixXf scaled(covariance_mm2.rows(), 2 * sites);
   Eigen::Index used = 0;
-  const auto add = [&](size_t direction, int site, double share, double of_sites) {
+  const auto add = [&](Linearization::Direction direction, int site, double share, double of_sites) {
     const double sigma_n =
         std::sqrt(of_sites) * std::hypot(share * local_n[site], kStrayN * mechanics_.force_unit());
     stray_n_[direction][site] = sigma_n;
-    scaled.col(used++) = static_cast<float>(sigma_n) * skin.columns()[direction].col(site);
+    scaled.col(used++) = static_cast<float>(sigma_n) * skin.Column(direction, site);
   };
   for (int site = 0; site < sites; ++site) {
-    add(0, site, kNormalShare, 1);
+    add(Linearization::kInward, site, kNormalShare, 1);
     // One of four neighbors stands for all (on either side of an odd seam, for three or five): along the wall
     // the skin is stiff, and they move markers alike.
     const int row = site / around, column = site % around;
-    if ((row + column) % 2 == 0) add(row % 2 == 0 ? 1 : 2, site, kTangentialShare, 4);
+    if ((row + column) % 2 == 0)
+      add(row % 2 == 0 ? Linearization::kAround : Linearization::kAlong, site, kTangentialShare, 4);
   }
   scaled.conservativeResize(Eigen::NoChange, used);
   Eigen::MatrixXf stray_mm2 = Eigen::MatrixXf::Zero(covariance_mm2.rows(), covariance_mm2.rows());

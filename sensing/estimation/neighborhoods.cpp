@@ -1,6 +1,8 @@
 #include "sensing/estimation/neighborhoods.h"
 
 #include <cmath>
+#include <mutex>
+#include <vector>
 
 namespace taclink {
 namespace {
@@ -53,6 +55,28 @@ Neighborhoods::Neighborhoods(const SkinMechanics& mechanics) {
       local_markers(site, m) =
           Bell((mechanics.RestSite(site) - mechanics.RestMarker(m)).squaredNorm(), kLocalMm * unit);
   }
+}
+
+std::shared_ptr<const Neighborhoods> Neighborhoods::SharedFor(const SkinMechanics& mechanics) {
+  struct Entry {
+    double unit = 0;
+    std::vector<Vec3> places;  // of the sites and, behind them, the markers
+    std::weak_ptr<const Neighborhoods> neighborhoods;
+  };
+  static std::mutex mutex;
+  static std::vector<Entry> entries;  // guarded by mutex
+  std::vector<Vec3> places;
+  for (int site = 0; site < mechanics.site_count(); ++site) places.push_back(mechanics.RestSite(site));
+  for (int m = 0; m < mechanics.marker_count(); ++m) places.push_back(mechanics.RestMarker(m));
+  const std::lock_guard lock(mutex);
+  std::erase_if(entries, [](const Entry& entry) { return entry.neighborhoods.expired(); });
+  for (const Entry& entry : entries) {
+    if (entry.unit != mechanics.length_unit() || entry.places != places) continue;
+    if (auto shared = entry.neighborhoods.lock()) return shared;
+  }
+  auto made = std::make_shared<const Neighborhoods>(mechanics);
+  entries.push_back({mechanics.length_unit(), std::move(places), made});
+  return made;
 }
 
 }  // namespace taclink

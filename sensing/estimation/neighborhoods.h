@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 
 #include "sensing/estimation/skin_mechanics.h"
 
@@ -10,6 +11,8 @@ namespace taclink {
 /// the lengths within which errors are alike and loads are neighbors. Constant.
 struct Neighborhoods {
   explicit Neighborhoods(const SkinMechanics& mechanics);
+  /// The same object for all skins with the same markers and sites that are in use. Any thread.
+  static std::shared_ptr<const Neighborhoods> SharedFor(const SkinMechanics& mechanics);
 
   Eigen::MatrixXd motion_near, motion_alike;  ///< markers x markers: of the error by motion
   Eigen::MatrixXd growth_alike;               ///< markers x markers: of the error by inflation

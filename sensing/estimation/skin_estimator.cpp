@@ -47,16 +47,16 @@ void Extrapolate(const ShellState& before, double times, ShellState& state) {
 
 SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions& options)
     : mechanics_(model, options.refinement),
-      near_(mechanics_),
+      near_(Neighborhoods::SharedFor(mechanics_)),
       options_(options),
       assimilation_(mechanics_),
-      still_(std::make_unique<Tangent>(mechanics_, near_, kStillReachMm)),
-      touched_(std::make_unique<Tangent>(mechanics_, near_, kTouchedReachMm)),
+      still_(std::make_unique<Tangent>(mechanics_, *near_, kStillReachMm)),
+      touched_(std::make_unique<Tangent>(mechanics_, *near_, kTouchedReachMm)),
       used_(still_.get()),
       radial_pull_(mechanics_.marker_count()),
       radial_weight_(mechanics_.marker_count()) {
   if (!IsFirstOrder())
-    maker_ = std::make_unique<TangentMaker>(std::make_unique<Tangent>(mechanics_, near_, kTouchedReachMm),
+    maker_ = std::make_unique<TangentMaker>(std::make_unique<Tangent>(mechanics_, *near_, kTouchedReachMm),
                                             options.background);
 }
 SkinEstimator::~SkinEstimator() = default;

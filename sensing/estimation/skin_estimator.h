@@ -118,7 +118,7 @@ class SkinEstimator {
   bool IsFirstOrder() const;
 
   SkinMechanics mechanics_;
-  const Neighborhoods near_;
+  const std::shared_ptr<const Neighborhoods> near_;
   const SkinEstimatorOptions options_;
   Assimilation assimilation_;
   std::unique_ptr<Tangent> still_, touched_;  // of the skin without loads, and of the touched one

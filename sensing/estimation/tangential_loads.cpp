@@ -23,12 +23,11 @@ Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, cons
   const Eigen::VectorXd spread = mechanics_.spread() * shares;
   Eigen::MatrixXf single = Eigen::MatrixXf::Zero(factor_.rows(), kTangential);
   single.rightCols<2>() = skin.CoupleColumns(spread);
-  for (int k = 0; k < 2; ++k) {
-    for (Eigen::Index site = 0; site < spread.size(); ++site) {
-      if (spread[site] != 0)
-        single.col(k) +=
-            static_cast<float>(spread[site]) * skin.columns()[static_cast<size_t>(k + 1)].col(site);
-    }
+  for (int site = 0; site < mechanics_.site_count(); ++site) {
+    if (spread[site] == 0) continue;
+    const auto share = static_cast<float>(spread[site]);
+    single.col(0) += share * skin.Column(Linearization::kAround, site);
+    single.col(1) += share * skin.Column(Linearization::kAlong, site);
   }
   dense::SolveLower(factor_, single);
   Eigen::MatrixXd columns = single.cast<double>();
@@ -139,12 +138,12 @@ Eigen::MatrixXd LoadEstimator::ShiftColumns(const Linearization& skin, const Est
       }
     }
     const Eigen::VectorXd spread = mechanics_.spread() * change;
-    for (Eigen::Index site = 0; site < spread.size(); ++site) {
+    for (int site = 0; site < mechanics_.site_count(); ++site) {
       if (spread[site] == 0) continue;
-      shift.col(axis) +=
-          spread[site] * (skin.columns()[1].col(site) * static_cast<float>(load.tangential_n.x()) +
-                          skin.columns()[2].col(site) * static_cast<float>(load.tangential_n.y()))
-                             .cast<double>();
+      const Eigen::VectorXf by_force =
+          skin.Column(Linearization::kAround, site) * static_cast<float>(load.tangential_n.x()) +
+          skin.Column(Linearization::kAlong, site) * static_cast<float>(load.tangential_n.y());
+      shift.col(axis) += spread[site] * by_force.cast<double>();
     }
   }
   shift = Whitened(shift);

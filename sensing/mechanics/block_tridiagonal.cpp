@@ -102,28 +102,30 @@ void BlockTridiagonal::Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) con
   x = all.cast<double>();
 }
 
-void BlockTridiagonal::SolveRows(Eigen::MatrixXf& rhs, std::vector<Rows> filled, Eigen::MatrixXf& x) const {
-  assert(rhs.cols() == block_ * static_cast<Eigen::Index>(inverse_.size()) &&
+void BlockTridiagonal::SolveRows(std::vector<Rows> filled, Eigen::MatrixXf& rows) const {
+  assert(rows.cols() == block_ * static_cast<Eigen::Index>(inverse_.size()) &&
          filled.size() == inverse_.size());
-  x.resize(rhs.rows(), rhs.cols());
-  const auto part = [&](Eigen::MatrixXf& all, Eigen::Index i, const Rows& rows) {
-    return all.block(rows.begin, i * block_, rows.count(), block_);
+  const auto part = [&](Eigen::Index i, const Rows& some) {
+    return rows.block(some.begin, i * block_, some.count(), block_);
   };
-  const Rows all_rows{0, rhs.rows()};
+  const Rows all{0, rows.rows()};
   ForEachInward([&](Eigen::Index i, Eigen::Index j) {
-    const Rows& rows = filled[static_cast<size_t>(i)];
-    dense::AddProduct(-1.0F, part(rhs, i, rows), carried_[static_cast<size_t>(i)], true, part(rhs, j, rows));
+    const Rows& some = filled[static_cast<size_t>(i)];
+    dense::AddProduct(-1.0F, part(i, some), carried_[static_cast<size_t>(i)], true, part(j, some));
     Rows& onto = filled[static_cast<size_t>(j)];
-    onto = onto.With(rows);
+    onto = onto.With(some);
   });
+  Eigen::MatrixXf right_side;  // of the block in work, before it is overwritten
   const auto add_own = [&](Eigen::Index i) {
-    const Rows& rows = filled[static_cast<size_t>(i)];
-    dense::AddProduct(1.0F, part(rhs, i, rows), inverse_[static_cast<size_t>(i)], false, part(x, i, rows));
+    dense::AddProduct(1.0F, right_side, inverse_[static_cast<size_t>(i)], false,
+                      part(i, filled[static_cast<size_t>(i)]));
   };
-  part(x, middle_, all_rows).setZero();
+  right_side = part(middle_, filled[static_cast<size_t>(middle_)]);
+  part(middle_, all).setZero();
   add_own(middle_);
   ForEachOutward([&](Eigen::Index i, Eigen::Index j) {
-    dense::SetProduct(-1.0F, part(x, j, all_rows), carried_[static_cast<size_t>(i)], part(x, i, all_rows));
+    right_side = part(i, filled[static_cast<size_t>(i)]);
+    dense::SetProduct(-1.0F, part(j, all), carried_[static_cast<size_t>(i)], part(i, all));
     add_own(i);
   });
 }

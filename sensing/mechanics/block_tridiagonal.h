@@ -34,9 +34,9 @@ class BlockTridiagonal {
     /// The least that has both.
     Rows With(const Rows& other) const;
   };
-  /// Rows of x are the solutions for the rows of `rhs`. `filled`: by block, those that are not zero there;
-  /// all others must be zero. `rhs` is used up.
-  void SolveRows(Eigen::MatrixXf& rhs, std::vector<Rows> filled, Eigen::MatrixXf& x) const;
+  /// Replaces each row of `rows` by the solution for it. `filled`: by block, the rows that are not zero
+  /// there; all others must be zero.
+  void SolveRows(std::vector<Rows> filled, Eigen::MatrixXf& rows) const;
 
  private:
   /// Calls visit(i, j) for each block but the middle one, from the ends to there, with the neighbor that is

@@ -78,7 +78,10 @@ TEST_F(TangentTest, TheMakersIsTheSame) {
     const Tangent& made = *maker.spare();
     EXPECT_TRUE(made.IsGoodFor(problem_, Dented(1)));
     EXPECT_EQ(made.DistanceMm(Dented(1)), 0);
-    for (size_t k = 0; k < 3; ++k) EXPECT_TRUE(made.skin.columns()[k] == own.skin.columns()[k]);
+    for (const auto direction : {Linearization::kInward, Linearization::kAround, Linearization::kAlong}) {
+      for (int site = 0; site < mechanics_.site_count(); ++site)
+        EXPECT_EQ(made.skin.Column(direction, site), own.skin.Column(direction, site)) << site;
+    }
   }
 }
 
