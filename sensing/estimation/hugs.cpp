@@ -22,10 +22,12 @@ double WidestFree(const std::vector<char>& is_loaded) {
 }  // namespace
 
 // What sites bear of loads of sites and bands.
-void LoadEstimator::ShareBands(const Eigen::VectorXd& loads, const std::vector<int>& support) {
+void LoadEstimator::ShareBands(const Eigen::VectorXd& inward_n, const std::vector<int>& loads) {
   loads_.setZero(mechanics_.site_count());
-  for (const int column : support)
-    ForSites(column, [&](int site, double share) { loads_[site] += share * loads[column]; });
+  for (size_t i = 0; i < loads.size(); ++i) {
+    ForSites(loads[i],
+             [&](int site, double share) { loads_[site] += share * inward_n[static_cast<Eigen::Index>(i)]; });
+  }
 }
 
 // Hills that have no more than a row between them may be parts of one hug; those further along the link are

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "sensing/mechanics/element_load.h"
@@ -12,6 +13,7 @@ namespace {
 // Within this of a clamp, the normal of what presses is between the skin's and that at rest: the wall turns
 // there within less than a body's width.
 constexpr double kNearClampMm = 30, kOwnNormalShare = 0.35;
+constexpr int kNodeDofs = 5;
 
 }  // namespace
 
@@ -20,6 +22,7 @@ Linearization::Linearization(const SkinMechanics& mechanics)
       hessian_(mechanics.shell().Pattern()),
       factor_(hessian_.rows() / mechanics.site_rows(), mechanics.site_rows()),
       jacobian_(mechanics.markers().MakeJacobian(mechanics.shell())),
+      place_(static_cast<size_t>(mechanics.site_count()), -1),
       frames_(static_cast<size_t>(mechanics.site_count())) {
   const Eigen::Index row_dofs = hessian_.rows() / mechanics.site_rows();
   filled_.resize(static_cast<size_t>(mechanics.site_rows()));
@@ -80,13 +83,13 @@ Vec2 Linearization::Moment(int node, const Vec3& direction) const {
 }
 
 Eigen::MatrixXf Linearization::CoupleColumns(const Eigen::VectorXd& shares) const {
-  Eigen::MatrixXf columns = Eigen::MatrixXf::Zero(adjoint_.rows(), 2);
+  Eigen::MatrixXf columns = Eigen::MatrixXf::Zero(jacobian_.rows(), 2);
   for (int site = 0; site < mechanics_.site_count(); ++site) {
     if (shares[site] == 0) continue;
-    const int node = mechanics_.NodeOfSite(site), dof = mechanics_.shell().Dof(node, 0);
+    const int node = mechanics_.NodeOfSite(site);
     for (int k = 0; k < 2; ++k) {
       const Vec2 turning = shares[site] * Turning(node, frames_[static_cast<size_t>(site)].col(k + 1));
-      columns.col(k) += adjoint_.middleCols<2>(dof + 3).lazyProduct(turning.cast<float>());
+      columns.col(k) += AtSite(site).rightCols<2>().lazyProduct(turning.cast<float>());
     }
   }
   return columns;
@@ -124,13 +127,7 @@ bool Linearization::At(const ShellState& state, double pressure_mpa) {
   if (!gradient_.allFinite() || !factor_.Factorise(hessian_)) return false;
   const MarkerMap& map = mechanics_.markers();
   map.WriteJacobian(shell, state_, jacobian_);
-  adjoint_.setZero(jacobian_.rows(), jacobian_.cols());
-  for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
-    for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it)
-      adjoint_(row, it.col()) = static_cast<float>(it.value());
-  }
-  factor_.SolveRows(filled_, adjoint_);
-  if (!adjoint_.allFinite()) return false;
+  DropColumns();
   map.Displacements(state_, base_mm_);
   factor_.Solve(gradient_, motion_);
   base_mm_.noalias() -= jacobian_ * motion_;
@@ -140,17 +137,103 @@ bool Linearization::At(const ShellState& state, double pressure_mpa) {
   tangent_gradient_ = gradient_;
   tangent_base_mm_ = base_mm_;
   SetFrames();
-  is_made_ = true;
-  return true;
+  is_made_ = base_mm_.allFinite() && by_pressure_.allFinite();
+  return is_made_;
+}
+
+void Linearization::DropColumns() {
+  place_.assign(place_.size(), -1);
+  adjoint_.resize(0, 0);
+}
+
+// From the markers' side or from the sites', whichever is less.
+void Linearization::MakeColumns(std::span<const int> sites) {
+  std::vector<int> missing;
+  for (const int site : sites) {
+    Eigen::Index& place = place_[static_cast<size_t>(site)];
+    if (place >= 0) continue;
+    place = adjoint_.cols() / kNodeDofs + static_cast<Eigen::Index>(missing.size());
+    missing.push_back(site);
+  }
+  if (missing.empty()) return;
+  if (kNodeDofs * static_cast<Eigen::Index>(missing.size()) < jacobian_.rows())
+    MakeNodeColumns(missing);
+  else
+    MakeAllColumns();
+}
+
+void Linearization::MakeAllColumns() {
+  Eigen::MatrixXf rows = Eigen::MatrixXf::Zero(jacobian_.rows(), jacobian_.cols());
+  for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
+    for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it)
+      rows(row, it.col()) = static_cast<float>(it.value());
+  }
+  factor_.SolveRows(filled_, rows);
+  adjoint_.resize(jacobian_.rows(), kNodeDofs * mechanics_.site_count());
+  for (int site = 0; site < mechanics_.site_count(); ++site) {
+    place_[static_cast<size_t>(site)] = site;
+    adjoint_.middleCols<kNodeDofs>(kNodeDofs * site) =
+        rows.middleCols<kNodeDofs>(mechanics_.shell().Dof(mechanics_.NodeOfSite(site), 0));
+  }
+}
+
+void Linearization::MakeNodeColumns(const std::vector<int>& missing) {
+  const Eigen::Index row_dofs = hessian_.rows() / mechanics_.site_rows();
+  const auto count = kNodeDofs * static_cast<Eigen::Index>(missing.size());
+  Eigen::MatrixXf loads = Eigen::MatrixXf::Zero(count, hessian_.rows());
+  std::vector<BlockTridiagonal::Rows> filled(static_cast<size_t>(mechanics_.site_rows()));
+  Eigen::Index row = 0;
+  for (const int site : missing) {
+    const int dof = mechanics_.shell().Dof(mechanics_.NodeOfSite(site), 0);
+    loads.block<kNodeDofs, kNodeDofs>(row, dof).setIdentity();
+    BlockTridiagonal::Rows& rows = filled[static_cast<size_t>(dof / row_dofs)];
+    rows = rows.With({row, row + kNodeDofs});
+    row += kNodeDofs;
+  }
+  adjoint_.conservativeResize(jacobian_.rows(), adjoint_.cols() + count);
+  adjoint_.rightCols(count) = Solved(std::move(filled), std::move(loads));
+}
+
+// What these loads displace, which are rows: J (K^-1 loads').
+Eigen::MatrixXf Linearization::Solved(std::vector<BlockTridiagonal::Rows> filled,
+                                      Eigen::MatrixXf loads) const {
+  factor_.SolveRows(std::move(filled), loads);
+  Eigen::MatrixXf moved = Eigen::MatrixXf::Zero(loads.rows(), jacobian_.rows());
+  for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
+    for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it)
+      moved.col(row) += static_cast<float>(it.value()) * loads.col(it.col());
+  }
+  return moved.transpose();
+}
+
+Eigen::MatrixXf Linearization::RingColumns() const {
+  const int around = mechanics_.columns(), rings = mechanics_.site_rows();
+  Eigen::MatrixXf loads = Eigen::MatrixXf::Zero(rings, hessian_.rows());
+  std::vector<BlockTridiagonal::Rows> filled(static_cast<size_t>(rings));
+  for (int ring = 0; ring < rings; ++ring) {
+    for (int i = 0; i < around; ++i) {
+      const int site = ring * around + i;
+      for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), site); it; ++it) {
+        const auto loaded = static_cast<int>(it.row());
+        const int dof = mechanics_.shell().Dof(mechanics_.NodeOfSite(loaded), 0);
+        const Vec3 force = it.value() / around * frames_[static_cast<size_t>(loaded)].col(kInward);
+        loads.block<1, 3>(ring, dof) += force.transpose().cast<float>();
+        BlockTridiagonal::Rows& rows = filled[static_cast<size_t>(loaded / around)];
+        rows = rows.With({ring, ring + 1});
+      }
+    }
+  }
+  return Solved(std::move(filled), std::move(loads));
 }
 
 Eigen::VectorXf Linearization::Column(Direction direction, int site) const {
-  const int node = mechanics_.NodeOfSite(site), dof = mechanics_.shell().Dof(node, 0);
+  assert(place_[static_cast<size_t>(site)] >= 0);
+  const int node = mechanics_.NodeOfSite(site);
   const Vec3 force = frames_[static_cast<size_t>(site)].col(direction);
   const Vec2 moment = direction == kInward ? Vec2::Zero() : Moment(node, force);
-  Eigen::Matrix<float, 5, 1> load;
+  Eigen::Matrix<float, kNodeDofs, 1> load;
   load << force.cast<float>(), moment.cast<float>();
-  return adjoint_.middleCols<5>(dof).lazyProduct(load);
+  return AtSite(site).lazyProduct(load);
 }
 
 bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "sensing/estimation/skin_mechanics.h"
@@ -33,14 +34,21 @@ class Linearization {
   const Eigen::VectorXd& base_mm() const { return base_mm_; }
   /// Directions of the load of a site, in its frame.
   enum Direction { kInward, kAround, kAlong };
-  /// Displacement of the stacked markers by a load that acts on a site's node alone, mm/N.
+  /// Makes the columns of these sites, where they are not made yet: one solution for all.
+  void MakeColumns(std::span<const int> sites);
+  /// Displacement of the stacked markers by a load that acts on a site's node alone, mm/N. The site's columns
+  /// must have been made.
   Eigen::VectorXf Column(Direction direction, int site) const;
+  /// Likewise, of 1 N inward that a row of sites shares, for all rows; by row. Needs no columns.
+  Eigen::MatrixXf RingColumns() const;
+  /// Gives back the columns' memory.
+  void DropColumns();
   const Eigen::VectorXd& by_pressure() const { return by_pressure_; }
   /// By site; columns inward, around, along; unit, perpendicular.
   const std::vector<Mat3>& frames() const { return frames_; }
 
   /// What couples of 1 N mm about the around and the along direction displace, that act on the sites in these
-  /// shares; mm, stacked.
+  /// shares; mm, stacked. The columns of sites with a share must have been made.
   Eigen::MatrixXf CoupleColumns(const Eigen::VectorXd& shares) const;
 
   /// The transposes of all columns times forces on the markers (3 each, stacked), in one solution instead of
@@ -61,6 +69,10 @@ class Linearization {
 
  private:
   void SetFrames();
+  void MakeAllColumns();
+  void MakeNodeColumns(const std::vector<int>& missing);
+  Eigen::MatrixXf Solved(std::vector<BlockTridiagonal::Rows> filled, Eigen::MatrixXf loads) const;
+  auto AtSite(int site) const { return adjoint_.middleCols<5>(5 * place_[static_cast<size_t>(site)]); }
   /// The rotations' part of a couple about an axis; of a force on the outer wall, which has one about the
   /// mid-surface.
   Vec2 Turning(int node, const Vec3& couple) const;
@@ -75,7 +87,8 @@ class Linearization {
   double pressure_mpa_ = 0, tangent_pressure_mpa_ = 0;
   Eigen::VectorXd tangent_gradient_, tangent_base_mm_;
   Eigen::VectorXd gradient_, pressure_force_, base_mm_, without_, by_pressure_, motion_;
-  Eigen::MatrixXf adjoint_;                     // J K^-1: 3 markers x dofs
+  Eigen::MatrixXf adjoint_;                     // J K^-1: 3 markers x the five dofs of each site in place_
+  std::vector<Eigen::Index> place_;             // by site, in adjoint_; -1: not made
   std::vector<BlockTridiagonal::Rows> filled_;  // rows of J that reach that row of nodes
   std::vector<Mat3> frames_;
 };

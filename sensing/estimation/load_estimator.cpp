@@ -21,6 +21,12 @@ constexpr size_t kMostHills = 24;  // no scene that was ever compared with the t
 constexpr double kLeastOfPeak = 0.03;
 constexpr double kRefitSparsity = 0.1, kRefitEndSparsity = 1.0;
 constexpr double kHessianRidge = 1e-9;
+// Columns are made where a tenth as much presses nearby as where most does; and, of loads that explain so
+// many standard deviations by themselves (less than a contact has to: kHillGain), of some at once with those
+// about them. After some rounds of it, of all.
+constexpr double kLikelyShare = 0.1, kLetInNorm = 3, kAbout = 0.3;
+constexpr size_t kMostLetIn = 8;
+constexpr int kMostRounds = 4;
 constexpr double kUnseenMm = 30;  // standard deviation of a direction that is not seen, in units of length
 constexpr double kSameNoise = 2;  // ratio of standard deviations
 constexpr double kSameDirection = 0.9999;  // cosine
@@ -39,30 +45,34 @@ LoadEstimator::LoadEstimator(const SkinMechanics& mechanics, const Neighborhoods
       camera_modes_(mechanics.model()),
       hills_(mechanics) {}
 
-bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& inflated,
+bool LoadEstimator::Prepare(Linearization& skin, const InflatedSkin& inflated,
                             const MarkerObservations& observed, const PressurePrior& prior,
-                            const Eigen::VectorXd& local_n) {
+                            const Eigen::VectorXd& local_n,
+                            std::shared_ptr<const Eigen::MatrixXf> untouched_stray_mm2) {
   const int markers = mechanics_.marker_count();
   pressure_sigma_ = prior.sigma_mpa;
   by_pressure_ = prior.sigma_mpa * skin.by_pressure();
-  covariance_.WriteDirect(skin, inflated, covariance_mm2_);
+  Eigen::MatrixXd covariance_mm2;
+  covariance_.SetState(skin, inflated);
+  covariance_.WriteDirect(covariance_mm2);
   baseline_sigma_ = prior.baseline_sigma_mpa;
   by_baseline_.setZero(by_pressure_.size());
   if (prior.baseline_mm_per_mpa.size() == by_pressure_.size())
     by_baseline_ = prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa;
-  AddOuter(by_baseline_, covariance_mm2_);
+  AddOuter(by_baseline_, covariance_mm2);
   camera_modes_.Write(observed, camera_modes_mm_);
-  AddOuter(camera_modes_mm_, covariance_mm2_);
-  AddOuter(covariance_.bow_mm(), covariance_mm2_);
-  direct_mm2_ = covariance_mm2_.cast<float>();
-  direct_mm2_.triangularView<Eigen::StrictlyUpper>() = direct_mm2_.transpose();
-  covariance_.AddStray(skin, local_n, covariance_mm2_);
-  AddOuter(by_pressure_, covariance_mm2_);
+  AddOuter(camera_modes_mm_, covariance_mm2);
+  AddOuter(covariance_.bow_mm(), covariance_mm2);
+  const bool is_touched = untouched_stray_mm2 != nullptr;
+  stray_mm2_ = is_touched ? std::move(untouched_stray_mm2)
+                          : std::make_shared<const Eigen::MatrixXf>(covariance_.UntouchedStray(skin));
+  covariance_.AddStray(skin, local_n, *stray_mm2_, covariance_mm2);
+  AddOuter(by_pressure_, covariance_mm2);
   noise_mm2_.resize(static_cast<size_t>(markers));
   model_covariance_.resize(noise_mm2_.size());
   for (int m = 0; m < markers; ++m) {
     const auto i = static_cast<size_t>(m);
-    auto block = covariance_mm2_.block<3, 3>(3 * m, 3 * m);
+    auto block = covariance_mm2.block<3, 3>(3 * m, 3 * m);
     model_covariance_[i] = block.selfadjointView<Eigen::Lower>();
     // All markers together tell what is alike in all; one by one they would hide a wrong marker in it.
     const auto modes_mm = camera_modes_mm_.middleRows<3>(3 * m);
@@ -72,20 +82,59 @@ bool LoadEstimator::Prepare(const Linearization& skin, const InflatedSkin& infla
     noise_mm2_[i] = NoiseOf(observed.information[i], kUnseenMm * mechanics_.length_unit());
     block += noise_mm2_[i];
   }
+  WriteRegions(covariance_mm2);
   // In double: a marker that one camera sees has variances that are a million times apart.
-  Eigen::MatrixXd factor = covariance_mm2_;
-  if (!dense::Cholesky(factor)) return false;
-  factor_ = factor.cast<float>();
+  if (!dense::Cholesky(covariance_mm2)) return false;
+  factor_ = covariance_mm2.cast<float>();
   WriteCameraCovariances();
-  whitened_pressure_ = factor.triangularView<Eigen::Lower>().solve(by_pressure_);
-  SpreadColumns(skin);
+  whitened_pressure_ = covariance_mm2.triangularView<Eigen::Lower>().solve(by_pressure_);
   hidden_.resize(0, 0);
+  free_norms_.resize(0);
   limits_.by_site_n.resize(0);
-  dense::SolveLower(factor_, columns_);
-  dense::Gram(columns_, gram_);
-  gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
-  regions_.clear();
-  return columns_.allFinite();
+  hidden_projected_ = 0;
+  columns_.Clear(mechanics_.site_count() + mechanics_.site_rows());
+  MakeColumns(skin, LikelyLoads(is_touched ? local_n : Eigen::VectorXd()));
+  if (!is_touched) skin.DropColumns();
+  return columns_.columns().allFinite();
+}
+
+// Where much presses nearby, and all bands; all, without local forces.
+std::vector<int> LoadEstimator::LikelyLoads(const Eigen::VectorXd& local_n) const {
+  std::vector<int> loads;
+  for (int load = 0; load < mechanics_.site_count() + mechanics_.site_rows(); ++load) {
+    if (local_n.size() == 0 || IsBand(load) || local_n[load] > kLikelyShare * local_n.maxCoeff())
+      loads.push_back(load);
+  }
+  return loads;
+}
+
+// Of loads that have none yet: of 1 N at a site, or that a row of sites shares.
+void LoadEstimator::MakeColumns(Linearization& skin, std::vector<int> loads) {
+  std::sort(loads.begin(), loads.end());
+  loads.erase(std::unique(loads.begin(), loads.end()), loads.end());
+  std::erase_if(loads, [&](int load) { return columns_.Has(load); });
+  if (loads.empty()) return;
+  std::vector<int> loaded;
+  for (const int load : loads) {
+    if (IsBand(load)) continue;
+    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), load); it; ++it)
+      loaded.push_back(static_cast<int>(it.row()));
+  }
+  skin.MakeColumns(loaded);
+  const Eigen::MatrixXf rings = IsBand(loads.back()) ? skin.RingColumns() : Eigen::MatrixXf();
+  Eigen::MatrixXf made = Eigen::MatrixXf::Zero(factor_.rows(), static_cast<Eigen::Index>(loads.size()));
+  for (Eigen::Index i = 0; i < made.cols(); ++i) {
+    const int load = loads[static_cast<size_t>(i)];
+    if (IsBand(load)) {
+      made.col(i) = rings.col(load - mechanics_.site_count());
+      continue;
+    }
+    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), load); it; ++it)
+      made.col(i) +=
+          static_cast<float>(it.value()) * skin.Column(Linearization::kInward, static_cast<int>(it.row()));
+  }
+  dense::SolveLower(factor_, made);
+  columns_.Append(loads, made);
 }
 
 // Of M m with independent m ~ N(0, 1): what all markers leave of it, M (I - M' covariance^-1 M) M'.
@@ -100,24 +149,6 @@ void LoadEstimator::WriteCameraCovariances() {
     const auto modes_mm = camera_modes_mm_.middleRows<3>(3 * static_cast<Eigen::Index>(m));
     camera_covariance_[m] = modes_mm * left * modes_mm.transpose();
   }
-}
-
-// Behind the sites' columns, those of bands: of 1 N that a row of sites shares.
-void LoadEstimator::SpreadColumns(const Linearization& skin) {
-  Eigen::MatrixXf at_nodes(factor_.rows(), mechanics_.site_count());
-  for (int site = 0; site < mechanics_.site_count(); ++site)
-    at_nodes.col(site) = skin.Column(Linearization::kInward, site);
-  columns_.resize(at_nodes.rows(), at_nodes.cols() + mechanics_.site_rows());
-  Eigen::VectorXf sum(at_nodes.rows());
-  for (Eigen::Index site = 0; site < at_nodes.cols(); ++site) {
-    sum.setZero();
-    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), site); it; ++it)
-      sum += static_cast<float>(it.value()) * at_nodes.col(it.row());
-    columns_.col(site) = sum;
-  }
-  const int around = mechanics_.columns();
-  for (int row = 0; row < mechanics_.site_rows(); ++row)
-    columns_.col(at_nodes.cols() + row) = columns_.middleCols(row * around, around).rowwise().mean();
 }
 
 bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const {
@@ -181,7 +212,8 @@ void LoadEstimator::Hide(const MarkerObservations& observed) {
     return;
   missing_ = missing;
   limits_.by_site_n.resize(0);
-  is_hidden_projected_ = false;
+  free_norms_.resize(0);
+  hidden_projected_ = 0;
   hidden_.setZero(factor_.rows(), static_cast<Eigen::Index>(missing.size()));
   for (size_t k = 0; k < missing.size(); ++k)
     hidden_.block<3, 1>(missing[k].first, static_cast<Eigen::Index>(k)) = missing[k].second;
@@ -197,75 +229,147 @@ void LoadEstimator::Hide(const MarkerObservations& observed) {
 
 // Frees data and Gram matrix of what is hidden.
 void LoadEstimator::ProjectOut(const Eigen::MatrixXd& tangential) {
-  Eigen::VectorXd shrink = Eigen::VectorXd::Ones(hidden_.cols() + tangential.cols());
-  Eigen::MatrixXd basis(factor_.rows(), shrink.size());
-  basis.leftCols(hidden_.cols()) = hidden_;
+  shares_.setOnes(hidden_.cols() + tangential.cols());
+  basis_.resize(factor_.rows(), shares_.size());
+  basis_.leftCols(hidden_.cols()) = hidden_;
   if (tangential.cols() > 0) {
     // A tangential force has a prior, so that its columns shrink and do not vanish.
     Eigen::MatrixXd free = tangential;
     if (hidden_.cols() > 0) free -= hidden_ * (hidden_.transpose() * free);
     free *= TangentialPrior(tangential.cols()).cwiseSqrt().cwiseInverse().asDiagonal();
     const Eigen::JacobiSVD<Eigen::MatrixXd> svd(free, Eigen::ComputeThinU);
-    basis.rightCols(tangential.cols()) = svd.matrixU();
+    basis_.rightCols(tangential.cols()) = svd.matrixU();
     const auto scaled = svd.singularValues().array().square();
-    shrink.tail(tangential.cols()) = scaled / (1 + scaled);
+    shares_.tail(tangential.cols()) = scaled / (1 + scaled);
   }
-  frame_data_ = data_;
-  frame_gram_ = &gram_;
-  if (basis.cols() == 0) return;
-  frame_data_ -= basis * (shrink.asDiagonal() * (basis.transpose() * data_));
+  frame_data_ = Free(data_);
+  WriteFrameGram();
+}
+
+Eigen::VectorXd LoadEstimator::Free(Eigen::VectorXd whitened) const {
+  if (basis_.cols() > 0) whitened -= basis_ * (shares_.asDiagonal() * (basis_.transpose() * whitened));
+  return whitened;
+}
+
+// Of all columns that there are, and what they say of the data.
+void LoadEstimator::WriteFrameGram() {
+  Eigen::VectorXf target(columns_.columns().cols());
+  dense::TransposedProduct(columns_.columns(), frame_data_.cast<float>(), target);
+  target_ = target.cast<double>();
+  frame_gram_ = &columns_.gram();
+  if (basis_.cols() == 0) return;
   frame_gram_ = &free_gram_;
-  if (is_hidden_projected_ && tangential.cols() == 0) return;
-  is_hidden_projected_ = tangential.cols() == 0;
-  dense::TransposedProduct(basis.cast<float>(), columns_, hidden_columns_);
-  const Eigen::MatrixXf scaled = shrink.cast<float>().asDiagonal() * hidden_columns_;
-  free_gram_ = gram_;
+  const bool is_of_hidden = basis_.cols() == hidden_.cols();
+  if (is_of_hidden && hidden_projected_ == columns_.gram().cols()) return;
+  hidden_projected_ = is_of_hidden ? columns_.gram().cols() : 0;
+  dense::TransposedProduct(basis_.cast<float>(), columns_.columns(), hidden_columns_);
+  const Eigen::MatrixXf scaled = shares_.cast<float>().asDiagonal() * hidden_columns_;
+  free_gram_ = columns_.gram();
   dense::AddTransposedProduct(-1, hidden_columns_, scaled, free_gram_);
 }
 
-// Loads of all sites, and of bands all around, under a penalty that fades where much acts, grouped. What a
-// band does to an inflated skin is little beside what each of its sites would do alone, so that it would not
-// pay for theirs.
-std::vector<LoadEstimator::Hill> LoadEstimator::Select(const Linearization& skin) {
-  const int sites = mechanics_.site_count(), around = mechanics_.columns();
-  const double unit = mechanics_.force_unit();
-  Eigen::VectorXf target(columns_.cols());
-  dense::TransposedProduct(columns_, frame_data_.cast<float>(), target);
-  target_ = target.cast<double>();
-  // Of a site of which hardly anything shows, what is left of its column is rounding.
-  norms_ = frame_gram_->diagonal().cwiseMax(kRounding * gram_.diagonal()).cast<double>().cwiseSqrt();
+// By load, beside what the frame does not show. Of a site of which hardly anything shows, what is left of its
+// column is rounding.
+void LoadEstimator::WriteNorms(const Eigen::VectorXd* untouched_norms) {
+  const int sites = mechanics_.site_count();
+  if (untouched_norms != nullptr)
+    norms_ = *untouched_norms;
+  else
+    norms_.resize(sites + mechanics_.site_rows());
+  for (size_t place = 0; place < columns_.loads().size(); ++place) {
+    const auto i = static_cast<Eigen::Index>(place);
+    norms_[columns_.loads()[place]] =
+        std::sqrt(std::max((*frame_gram_)(i, i), kRounding * columns_.gram()(i, i)));
+  }
   Eigen::VectorXd sorted = norms_.head(sites);
   std::nth_element(sorted.data(), sorted.data() + sites / 2, sorted.data() + sites);
   usual_norm_ = sorted[sites / 2];
   for (int site = 0; site < sites; ++site) {
     if (mechanics_.IsBeyondMarkers(site)) norms_[site] = std::max(norms_[site], kEndNorm * usual_norm_);
   }
-  Eigen::VectorXd sparsity = kSparsity * norms_;
-  sparsity.tail(mechanics_.site_rows()) *= kBandSparsity / kSparsity;
-  std::vector<int>& chosen = chosen_;
-  weights_ = sparsity;
-  const bool is_cold = chosen.empty();
-  const Eigen::VectorXd* found = &solver_.Solve(*frame_gram_, target_ - weights_, chosen);
-  // Those of the last step are a good guess. The minimum does not depend on it, but the solver may give up on
-  // the way from there.
+}
+
+// By load; they fade where much acts nearby.
+Eigen::VectorXd LoadEstimator::Penalties(const Eigen::VectorXd& near_n) const {
+  Eigen::VectorXd penalties = kSparsity * norms_;
+  penalties.tail(mechanics_.site_rows()) *= kBandSparsity / kSparsity;
+  return penalties.array() / (1 + near_n.array() / (kHillN * mechanics_.force_unit()));
+}
+
+// Loads of the columns that there are, from those of the last time, which are a good guess. The minimum does
+// not depend on it, but the solver may give up on the way from there. Sets `chosen_` and `loads_`.
+void LoadEstimator::SolveSparse(const Eigen::VectorXd& near_n) {
+  weights_ = Penalties(near_n);
+  Eigen::VectorXd linear = target_;
+  for (Eigen::Index i = 0; i < linear.size(); ++i)
+    linear[i] -= weights_[columns_.loads()[static_cast<size_t>(i)]];
+  std::erase_if(chosen_, [&](int load) { return !columns_.Has(load); });
+  std::vector<int> places = columns_.Places(chosen_);
+  const bool is_cold = places.empty();
+  const Eigen::VectorXd* found = &solver_.Solve(*frame_gram_, linear, places);
   if (!solver_.converged() && !is_cold) {
-    chosen.clear();
-    found = &solver_.Solve(*frame_gram_, target_ - weights_, chosen);
+    places.clear();
+    found = &solver_.Solve(*frame_gram_, linear, places);
   }
   is_selected_ = solver_.converged();
-  ShareBands(*found, chosen);
-  for (int pass = 0; pass < kReweightings && !chosen.empty(); ++pass) {
-    Eigen::VectorXd near = Eigen::VectorXd::Zero(norms_.size());
+  chosen_.clear();
+  for (const int place : places) chosen_.push_back(columns_.loads()[static_cast<size_t>(place)]);
+  found_ = (*found)(places);
+  ShareBands(found_, chosen_);
+}
+
+// Makes columns of loads that would explain much beside those that were found, and of those about them.
+// All loads are priced by one adjoint solution. False: there are none.
+bool LoadEstimator::LetIn(Linearization& skin, bool all) {
+  const int sites = mechanics_.site_count();
+  Eigen::VectorXf explained = Eigen::VectorXf::Zero(factor_.rows());
+  for (size_t i = 0; i < chosen_.size(); ++i)
+    explained += static_cast<float>(found_[static_cast<Eigen::Index>(i)]) * columns_.Column(chosen_[i]);
+  Eigen::MatrixXf rest = (frame_data_ - Free(explained.cast<double>())).cast<float>();
+  dense::SolveLowerTransposed(factor_, rest);
+  const Eigen::VectorXd pulls =
+      mechanics_.spread().transpose() * skin.PulledAtSites(rest.col(0).cast<double>())[0];
+  std::vector<std::pair<double, int>> paying;  // standard deviations, site
+  for (int site = 0; site < sites; ++site) {
+    const double deviations = pulls[site] / norms_[site];
+    if (!columns_.Has(site) && deviations > kLetInNorm) paying.emplace_back(deviations, site);
+  }
+  if (paying.empty()) return false;
+  std::sort(paying.rbegin(), paying.rend());
+  if (paying.size() > kMostLetIn) paying.resize(kMostLetIn);
+  std::vector<int> loads;
+  for (int site = 0; site < sites; ++site) {
+    const auto is_about = [&](const auto& each) { return near_.load_sites(site, each.second) > kAbout; };
+    if (all || std::any_of(paying.begin(), paying.end(), is_about)) loads.push_back(site);
+  }
+  MakeColumns(skin, loads);
+  WriteFrameGram();
+  return true;
+}
+
+// Loads of all sites, and of bands all around, under a penalty that fades where much acts, grouped. What a
+// band does to an inflated skin is little beside what each of its sites would do alone, so that it would not
+// pay for theirs.
+std::vector<LoadEstimator::Hill> LoadEstimator::Select(Linearization& skin,
+                                                       const Eigen::VectorXd* untouched_norms) {
+  const int sites = mechanics_.site_count(), around = mechanics_.columns();
+  const double unit = mechanics_.force_unit();
+  Eigen::VectorXd near = Eigen::VectorXd::Zero(sites + mechanics_.site_rows());
+  for (int round = 0;; ++round) {
+    WriteNorms(untouched_norms);
+    SolveSparse(near);
+    if (!is_selected_ || columns_.HasAll() || !LetIn(skin, round >= kMostRounds)) break;
+  }
+  for (int pass = 0; pass < kReweightings && is_selected_ && !chosen_.empty(); ++pass) {
+    near.setZero();
     for (int site = 0; site < sites; ++site) {
       if (loads_[site] > 0) near.head(sites) += loads_[site] * near_.load_sites.col(site);
     }
     for (Eigen::Index band = sites; band < near.size(); ++band)
       near[band] = near.segment((band - sites) * around, around).mean();
-    weights_ = sparsity.array() / (1 + near.array() / (kHillN * unit));
-    ShareBands(solver_.Solve(*frame_gram_, target_ - weights_, chosen), chosen);
-    is_selected_ = is_selected_ && solver_.converged();
+    SolveSparse(near);
   }
-  if (!is_selected_) chosen.clear();
+  if (!is_selected_) chosen_.clear();
   std::vector<int> support;
   for (int site = 0; site < sites; ++site) {
     if (loads_[site] > 0) support.push_back(site);
@@ -276,11 +380,15 @@ std::vector<LoadEstimator::Hill> LoadEstimator::Select(const Linearization& skin
     for (const int site : hill) sum += loads_[site];
     return sum < kLeastHillN * unit;
   });
+  std::vector<int> in_hills;
   for (Hill& hill : hills) {
     double peak = 0;
     for (const int site : hill) peak = std::max(peak, loads_[site]);
     std::erase_if(hill, [&](int site) { return loads_[site] <= kLeastOfPeak * peak; });
+    in_hills.insert(in_hills.end(), hill.begin(), hill.end());
   }
+  MakeColumns(skin, std::move(in_hills));  // a band's sites may have none yet
+  if (columns_.columns().cols() != target_.size()) WriteFrameGram();
   return hills;
 }
 
@@ -292,10 +400,11 @@ LoadEstimator::Explanation LoadEstimator::Explain(const std::vector<Hill>& hills
   }
   const double all = frame_data_.dot(data_);
   if (columns.empty()) return {.chi2 = all, .loads = {}};
-  const Eigen::MatrixXd exact = (*frame_gram_)(columns, columns).cast<double>();
+  const std::vector<int> places = columns_.Places(columns);
+  const Eigen::MatrixXd exact = (*frame_gram_)(places, places).cast<double>();
   Eigen::MatrixXd h = exact;
   h.diagonal().array() += kRounding * h.trace() / static_cast<double>(columns.size());
-  const Eigen::VectorXd b = target_(columns);
+  const Eigen::VectorXd b = target_(places);
   std::vector<int> support;
   const Eigen::VectorXd& x = solver_.Solve(h, b, support);
   return {.chi2 = all - 2 * b.dot(x) + x.dot(exact * x), .loads = x};
@@ -323,7 +432,7 @@ void LoadEstimator::Eliminate(std::vector<Hill>& hills) {
 LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& chosen,
                                              const Eigen::MatrixXd& tangential) {
   const auto n = static_cast<Eigen::Index>(chosen.size());
-  Eigen::MatrixXd normal = columns_(Eigen::all, chosen).cast<double>();
+  Eigen::MatrixXd normal = columns_.columns()(Eigen::all, columns_.Places(chosen)).cast<double>();
   Eigen::VectorXd data = data_;
   if (hidden_.cols() > 0) {
     normal -= hidden_ * (hidden_.transpose() * normal);
@@ -371,7 +480,8 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& chosen,
   return solution;
 }
 
-void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed, LoadEstimate& estimate) {
+void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
+                        const Eigen::VectorXd* untouched_norms, LoadEstimate& estimate) {
   estimate = {};
   Eigen::VectorXd data = Eigen::VectorXd::Zero(factor_.rows());
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
@@ -388,7 +498,7 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
   for (int stage = 0; stage < 2; ++stage) {
     ProjectOut(tangential);
     const Eigen::VectorXd loads_before = loads_;
-    std::vector<Hill> found = Select(skin);
+    std::vector<Hill> found = Select(skin, untouched_norms);
     estimate.converged = is_selected_ && found.size() <= kMostHills;
     if (!estimate.converged) return;
     Eliminate(found);

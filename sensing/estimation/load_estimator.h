@@ -3,12 +3,15 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <array>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "sensing/estimation/assimilation.h"
 #include "sensing/estimation/camera_modes.h"
 #include "sensing/estimation/hills.h"
 #include "sensing/estimation/linearization.h"
+#include "sensing/estimation/load_columns.h"
 #include "sensing/estimation/marker_covariance.h"
 #include "sensing/estimation/nonnegative.h"
 
@@ -77,23 +80,33 @@ class LoadEstimator {
 
   /// What does not change from frame to frame while the linearization, the cameras' noise and the loads'
   /// sizes stay as they are: covariance, whitened columns and their products. `local_n`: force in the
-  /// neighborhood of each site, for the model's errors. False: the covariance has no factor.
-  bool Prepare(const Linearization& skin, const InflatedSkin& inflated, const MarkerObservations& observed,
-               const PressurePrior& prior, const Eigen::VectorXd& local_n);
+  /// neighborhood of each site, for the model's errors. `untouched_stray_mm2`: stray_mm2() of the skin
+  /// without loads; columns are then made where loads are likely, and others when they are asked for. Null:
+  /// this is that skin, and all columns are made. False: the covariance has no factor.
+  bool Prepare(Linearization& skin, const InflatedSkin& inflated, const MarkerObservations& observed,
+               const PressurePrior& prior, const Eigen::VectorXd& local_n,
+               std::shared_ptr<const Eigen::MatrixXf> untouched_stray_mm2);
   /// Whether these observations are nearly as good, everywhere, as those that were prepared for, and count
   /// from the same baseline; what is missing now does not matter.
   bool IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const;
 
   /// After Prepare. The linearization may have been rebased. Covariances and what is left unexplained are not
-  /// written.
-  void Fit(Linearization& skin, const MarkerObservations& observed, LoadEstimate& estimate);
+  /// written. `untouched_norms`: FreeNorms() of the skin without loads, shown the same observations, which
+  /// stand for the norms of columns that are not made; null where all are.
+  void Fit(Linearization& skin, const MarkerObservations& observed, const Eigen::VectorXd* untouched_norms,
+           LoadEstimate& estimate);
   /// Writes these for what was fitted last.
-  void Conclude(const Linearization& skin, LoadEstimate& estimate);
+  void Conclude(Linearization& skin, LoadEstimate& estimate);
 
   /// After Prepare, instead of Fit where there is nothing to fit: which markers are not in sight now.
   void Hide(const MarkerObservations& observed);
-  /// Of what the last Fit or Hide was shown; nothing is allocated as long as that stays.
+  /// Of what the last Fit or Hide was shown, where all columns are made; nothing is allocated as long as that
+  /// stays.
   const DetectionLimits& Limits();
+  /// Likewise: norms of the loads' whitened columns beside what is hidden.
+  const Eigen::VectorXd& FreeNorms();
+  /// The covariance of stray forces where nothing presses, after Prepare. Lower half.
+  const std::shared_ptr<const Eigen::MatrixXf>& stray_mm2() const { return stray_mm2_; }
 
   /// The frames before.
   void Forget() { chosen_.clear(); }
@@ -122,7 +135,9 @@ class LoadEstimator {
   using Hill = HillFinder::Hill;
 
   void WriteCameraCovariances();
-  void SpreadColumns(const Linearization& skin);
+  void WriteRegions(const Eigen::MatrixXd& covariance_mm2);
+  void MakeColumns(Linearization& skin, std::vector<int> loads);
+  std::vector<int> LikelyLoads(const Eigen::VectorXd& local_n) const;
   Eigen::MatrixXd Whitened(const Eigen::MatrixXd& columns) const;
   /// The sites that a column of the problem loads, and the share of each: one site, or a band's.
   template <typename Visit>
@@ -132,10 +147,16 @@ class LoadEstimator {
     for (int i = 0; i < around; ++i) visit((column - sites) * around + i, 1.0 / around);
   }
   bool IsBand(int column) const { return column >= mechanics_.site_count(); }
-  void ShareBands(const Eigen::VectorXd& loads, const std::vector<int>& support);
+  void ShareBands(const Eigen::VectorXd& inward_n, const std::vector<int>& loads);
   void JoinHugs(std::vector<Hill>& hills);
   void JoinHug(std::vector<Hill>& hills, const std::vector<size_t>& group);
-  std::vector<Hill> Select(const Linearization& skin);
+  Eigen::VectorXd Penalties(const Eigen::VectorXd& near_n) const;
+  void WriteNorms(const Eigen::VectorXd* untouched_norms);
+  void SolveSparse(const Eigen::VectorXd& near_n);
+  bool LetIn(Linearization& skin, bool all);
+  Eigen::VectorXd Free(Eigen::VectorXd whitened) const;
+  void WriteFrameGram();
+  std::vector<Hill> Select(Linearization& skin, const Eigen::VectorXd* untouched_norms);
   void Eliminate(std::vector<Hill>& hills);
   struct Explanation {
     double chi2 = 0;
@@ -150,10 +171,11 @@ class LoadEstimator {
   };
   /// Forces around and along, and couples about both.
   static constexpr Eigen::Index kTangential = 4;
-  Eigen::MatrixXd TangentialColumns(const Linearization& skin, const Hill& hill);
+  void MakeColumnsWhere(Linearization& skin, const std::vector<Eigen::VectorXd>& shares) const;
+  std::vector<Eigen::MatrixXd> TangentialColumns(Linearization& skin, const std::vector<Hill>& hills);
   Eigen::VectorXd TangentialPrior(Eigen::Index columns) const;
   Solution Refit(const std::vector<int>& chosen, const Eigen::MatrixXd& tangential);
-  void LetSlip(const Linearization& skin, const std::vector<Hill>& hills, std::vector<int>& slipping,
+  void LetSlip(Linearization& skin, const std::vector<Hill>& hills, std::vector<int>& slipping,
                Eigen::MatrixXd& tangential, Solution& solution);
   /// What a hill's tangential force would be, and would explain: chi^2.
   struct TangentialGain {
@@ -171,13 +193,13 @@ class LoadEstimator {
   };
   FitColumns ColumnsOf(const std::vector<int>& acting, const Eigen::MatrixXd& tangential) const;
   Eigen::MatrixXd InformationBeside(const FitColumns& fit, const Eigen::MatrixXd& own) const;
-  Eigen::MatrixXd ShiftColumns(const Linearization& skin, const EstimatedLoad& load) const;
-  void MoveCenters(const Linearization& skin, LoadEstimate& estimate) const;
+  Eigen::MatrixXd ShiftColumns(Linearization& skin, const EstimatedLoad& load) const;
+  void MoveCenters(Linearization& skin, LoadEstimate& estimate) const;
   void ProjectOut(const Eigen::MatrixXd& tangential);
   void Finish(Linearization& skin, const std::vector<Hill>& hills, const std::vector<int>& slipping,
               LoadEstimate& estimate);
   void WriteLoad(const Linearization& skin, EstimatedLoad& load) const;
-  void WriteCovariances(const Linearization& skin, LoadEstimate& estimate);
+  void WriteCovariances(Linearization& skin, LoadEstimate& estimate);
   void WriteStray(Linearization& skin, LoadEstimate& estimate);
   double WorstRegion(const Eigen::VectorXd& by_cameras_mm);
 
@@ -190,14 +212,13 @@ class LoadEstimator {
 
   // Since Prepare. Whitened: in units of independent standard deviations.
   std::vector<Mat3> noise_mm2_, model_covariance_, camera_covariance_;
-  Eigen::MatrixXd covariance_mm2_;
   Eigen::MatrixXd camera_modes_mm_;
   Eigen::MatrixXf factor_;
-  Eigen::MatrixXf direct_mm2_;  // of it, what no force and no pressure of the estimate explains
+  std::shared_ptr<const Eigen::MatrixXf> stray_mm2_;
   Eigen::VectorXd by_pressure_, by_baseline_;  // stacked, of one standard deviation
   Eigen::VectorXd whitened_pressure_;
   double pressure_sigma_ = 0, baseline_sigma_ = 0;
-  Eigen::MatrixXf columns_, gram_;
+  LoadColumns columns_;
   struct Region {
     std::vector<int> rows;
     Eigen::LLT<Eigen::MatrixXf> factor;
@@ -210,14 +231,21 @@ class LoadEstimator {
   using Direction = std::pair<int, Vec3>;         // first row of the marker, unit vector
   std::vector<Direction> missing_, missing_now_;  // what hidden_ is of, and what this frame misses
   Eigen::MatrixXd hidden_;
+  Eigen::MatrixXd
+      basis_;  // hidden_ and tangential forces, of which shares_ are taken out of data and columns
+  Eigen::VectorXd shares_;
   Eigen::MatrixXf hidden_columns_, free_gram_;
-  bool is_hidden_projected_ = false;             // free_gram_ is without hidden_ alone
-  const Eigen::MatrixXf* frame_gram_ = nullptr;  // gram_, where nothing is hidden
-  Eigen::VectorXd data_, frame_data_, target_, norms_, weights_, loads_;
-  bool is_selected_ = false;    // by a solver that came to its end
-  std::vector<char> is_shown_;  // by row
-  DetectionLimits limits_;      // none by site: not known since Prepare, or since other markers are hidden
-  std::vector<int> chosen_;     // loads above zero of the last selection
+  Eigen::Index hidden_projected_ = 0;            // of free_gram_, the columns that are without hidden_ alone
+  const Eigen::MatrixXf* frame_gram_ = nullptr;  // the columns', where nothing is hidden
+  Eigen::VectorXd free_norms_;                   // empty: not known of what is hidden now
+  Eigen::VectorXd data_, frame_data_, loads_;
+  Eigen::VectorXd target_;           // by place of a column
+  Eigen::VectorXd norms_, weights_;  // by load
+  Eigen::VectorXd found_;            // by chosen_
+  bool is_selected_ = false;         // by a solver that came to its end
+  std::vector<char> is_shown_;       // by row
+  DetectionLimits limits_;   // none by site: not known since Prepare, or since other markers are hidden
+  std::vector<int> chosen_;  // loads above zero of the last selection
   Solution solution_;
   Eigen::VectorXd pulls_per_mm_;          // of the residual, on each marker: covariance^-1 times it
   std::vector<TangentialGain> left_out_;  // by hill: of those that were not let in

@@ -64,17 +64,17 @@ void LoadEstimator::Finish(Linearization& skin, const std::vector<Hill>& hills,
   WriteStray(skin, estimate);
 }
 
-void LoadEstimator::Conclude(const Linearization& skin, LoadEstimate& estimate) {
+void LoadEstimator::Conclude(Linearization& skin, LoadEstimate& estimate) {
   WriteCovariances(skin, estimate);
   MoveCenters(skin, estimate);
-  Eigen::VectorXf beside(pulls_per_mm_.size());
-  dense::Product(direct_mm2_, pulls_per_mm_.cast<float>(), beside);
   Eigen::VectorXd& by_cameras_mm = estimate.by_cameras_mm;
   const Eigen::VectorXd modes = camera_modes_mm_.transpose() * pulls_per_mm_;
   by_cameras_mm = camera_modes_mm_ * modes;
   for (const CameraId id : kBothCameras) estimate.by_camera_mm[Index(id)] = camera_modes_.SeenBy(id) * modes;
   estimate.camera_shift_mm = by_cameras_mm.reshaped(3, by_cameras_mm.size() / 3).colwise().norm().maxCoeff();
-  estimate.beside_mm = beside.cast<double>() - by_cameras_mm;
+  const Eigen::VectorXd& bow_mm = covariance_.bow_mm();
+  estimate.beside_mm = covariance_.Direct(pulls_per_mm_) + by_baseline_.dot(pulls_per_mm_) * by_baseline_ +
+                       bow_mm.dot(pulls_per_mm_) * bow_mm;
   estimate.chi2_per_dof =
       solution_.residual.squaredNorm() /
       std::max<double>(1, static_cast<double>(std::count(is_shown_.begin(), is_shown_.end(), 1)));
@@ -136,9 +136,24 @@ void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
 
 // Of three columns a contact for its force, two for its place, and the pressure's: the posterior of those
 // beside what was fitted. The sites' own amplitudes are not free in it: their sum and place are.
-void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& estimate) {
+void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate) {
   const auto count = static_cast<Eigen::Index>(estimate.loads.size());
   const int columns = mechanics_.columns(), rows = mechanics_.site_rows();
+  const auto site_at = [&](int row, int column) {
+    return std::clamp(row, 0, rows - 1) * columns + (column + columns) % columns;
+  };
+  std::vector<int> asked;
+  for (const EstimatedLoad& load : estimate.loads) {
+    for (const int site : load.sites) {
+      const int row = site / columns, column = site % columns;
+      for (const int by : {-1, 1}) {
+        asked.push_back(site_at(row + by, column));
+        asked.push_back(site_at(row, column + by));
+      }
+      asked.push_back(site);
+    }
+  }
+  MakeColumns(skin, std::move(asked));
   Eigen::MatrixXd design(data_.size(), 5 * count + 1);
   Eigen::VectorXd prior = Eigen::VectorXd::Constant(5 * count + 1, 1e-9);
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -151,10 +166,8 @@ void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& es
     for (size_t k = 0; k < load.sites.size(); ++k) {
       const double share = load.inward_n[k] / load.normal_force_n;
       const int site = load.sites[k], row = site / columns, column = site % columns;
-      const auto at = [&](int r, int c) {
-        return columns_.col(std::clamp(r, 0, rows - 1) * columns + (c + columns) % columns).cast<double>();
-      };
-      normal += share * columns_.col(site).cast<double>();
+      const auto at = [&](int r, int c) { return columns_.Column(site_at(r, c)).cast<double>(); };
+      normal += share * columns_.Column(site).cast<double>();
       around += 0.5 * load.inward_n[k] * (at(row, column + 1) - at(row, column - 1));
       along += 0.5 * load.inward_n[k] * (at(row + 1, column) - at(row - 1, column));
     }
@@ -207,31 +220,34 @@ void LoadEstimator::WriteCovariances(const Linearization& skin, LoadEstimate& es
   }
 }
 
-// Mahalanobis' distance of the residual over 3 x 3 markers, per number, the largest; of regions that are
-// mostly seen.
+// Factors of the covariance of 3 x 3 markers each.
 // The cameras' motion is all markers' together: a region must not have one of its own.
-double LoadEstimator::WorstRegion(const Eigen::VectorXd& by_cameras_mm) {
+void LoadEstimator::WriteRegions(const Eigen::MatrixXd& covariance_mm2) {
   const LinkModel& model = mechanics_.model();
   const int paths = model.markers.paths, rings = model.markers.rings();
-  if (regions_.empty()) {
-    covariance_mm2_.triangularView<Eigen::StrictlyUpper>() = covariance_mm2_.transpose();
-    for (int marker = 0; marker < model.markers.count(); ++marker) {
-      const int path = model.PathOf(marker), ring = model.RingOf(marker);
-      if (path % 2 != 0) continue;
-      Region region;
-      for (int r = std::max(0, ring - 1); r <= std::min(rings - 1, ring + 1); ++r) {
-        for (int p = path - 1; p <= path + 1; ++p) {
-          const int neighbor = model.MarkerIndex((p + paths) % paths, r);
-          for (int c = 0; c < 3; ++c) region.rows.push_back(3 * neighbor + c);
-        }
+  regions_.clear();
+  for (int marker = 0; marker < model.markers.count(); ++marker) {
+    const int path = model.PathOf(marker), ring = model.RingOf(marker);
+    if (path % 2 != 0) continue;
+    Region region;
+    for (int r = std::max(0, ring - 1); r <= std::min(rings - 1, ring + 1); ++r) {
+      for (int p = path - 1; p <= path + 1; ++p) {
+        const int neighbor = model.MarkerIndex((p + paths) % paths, r);
+        for (int c = 0; c < 3; ++c) region.rows.push_back(3 * neighbor + c);
       }
-      const Eigen::MatrixXd modes_mm = camera_modes_mm_(region.rows, Eigen::all);
-      const Eigen::MatrixXd own_mm2 =
-          covariance_mm2_(region.rows, region.rows) - modes_mm * modes_mm.transpose();
-      region.factor.compute(own_mm2.cast<float>());
-      regions_.push_back(std::move(region));
     }
+    std::sort(region.rows.begin(), region.rows.end());
+    const Eigen::MatrixXd modes_mm = camera_modes_mm_(region.rows, Eigen::all);
+    Eigen::MatrixXf own_mm2 = covariance_mm2(region.rows, region.rows).cast<float>();  // lower half
+    own_mm2 -= (modes_mm * modes_mm.transpose()).cast<float>();
+    region.factor.compute(own_mm2);
+    regions_.push_back(std::move(region));
   }
+}
+
+// Mahalanobis' distance of the residual over 3 x 3 markers, per number, the largest; of regions that are
+// mostly seen.
+double LoadEstimator::WorstRegion(const Eigen::VectorXd& by_cameras_mm) {
   Eigen::VectorXf left_mm = factor_.triangularView<Eigen::Lower>() * solution_.residual.cast<float>();
   left_mm -= by_cameras_mm.cast<float>();
   double worst = 0;

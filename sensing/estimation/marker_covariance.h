@@ -20,14 +20,21 @@ class MarkerCovariance {
   /// Both are referred to.
   MarkerCovariance(const SkinMechanics& mechanics, const Neighborhoods& near);
 
-  /// Of displacements that no force explains: a floor, and shares of the motion and of the inflation. Lower
-  /// half, stacked markers.
-  void WriteDirect(const Linearization& skin, const InflatedSkin& inflated,
-                   Eigen::MatrixXd& covariance_mm2) const;
-  /// Adds that of stray forces: inward at each site, around and along at a quarter of them each, which stand
-  /// for four. `local_n`: force in the neighborhood of each site. Sets the stray forces' standard deviations
-  /// by direction and site, 0 where there is none.
-  void AddStray(const Linearization& skin, const Eigen::VectorXd& local_n, Eigen::MatrixXd& covariance_mm2);
+  /// Where the skin is, by which the errors of displacements that no force explains go.
+  void SetState(const Linearization& skin, const InflatedSkin& inflated);
+  /// Of these displacements: a floor, and shares of the motion and of the inflation. Lower half, stacked
+  /// markers.
+  void WriteDirect(Eigen::MatrixXd& covariance_mm2) const;
+  /// The product of the same covariance and forces on the markers, 1/mm; stacked, mm.
+  Eigen::VectorXd Direct(const Eigen::VectorXd& pulls_per_mm) const;
+  /// Of stray forces where nothing presses: inward at each site, around and along at a quarter of them each,
+  /// which stand for four. Lower half. Makes all columns.
+  Eigen::MatrixXf UntouchedStray(Linearization& skin) const;
+  /// Adds that of stray forces: `untouched_mm2` and what is more of them where something presses. `local_n`:
+  /// force in the neighborhood of each site. Sets the stray forces' standard deviations by direction and
+  /// site, 0 where there is none. Makes the columns of the sites where more is.
+  void AddStray(Linearization& skin, const Eigen::VectorXd& local_n, const Eigen::MatrixXf& untouched_mm2,
+                Eigen::MatrixXd& covariance_mm2);
   /// Stacked markers, of one standard deviation: a bow of z along the link, of lenses and of a shell that is
   /// no solid, which cameras at both ends know worst in the middle.
   const Eigen::VectorXd& bow_mm() const { return bow_mm_; }
@@ -40,9 +47,19 @@ class MarkerCovariance {
   }
 
  private:
+  /// A stray force at a site: standard deviations where nothing presses, and of what is more of it.
+  struct Stray {
+    Linearization::Direction direction = Linearization::kInward;
+    int site = 0;
+    double untouched_n = 0, local_n = 0;
+  };
+  std::vector<Stray> Strays(const Eigen::VectorXd& local_n) const;
+
   const SkinMechanics& mechanics_;
   const Neighborhoods& near_;
   Eigen::VectorXd bow_mm_;
+  Eigen::Matrix2Xd outward_;             // by marker, unit, at rest
+  Eigen::VectorXd moved_mm_, grown_mm_;  // by marker, standard deviations
   std::array<Eigen::VectorXd, 3> stray_n_;
 };
 

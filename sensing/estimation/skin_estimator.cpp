@@ -152,7 +152,8 @@ bool SkinEstimator::StepOnce(Tangent& tangent, const SkinProblem& problem, SkinE
   used_ = &tangent;
   ++estimate.steps;
   if (!tangent.skin.Rebase(estimate.state, problem.pressure_mpa)) return false;
-  tangent.loads.Fit(tangent.skin, problem.observed, estimate.loads);
+  tangent.loads.Fit(tangent.skin, problem.observed,
+                    &tangent == still_.get() ? nullptr : &still_->loads.FreeNorms(), estimate.loads);
   if (!estimate.loads.converged) return false;
   const double longest_mm = IsFirstOrder() ? kUnlimitedMm : kLongestStepMm * mechanics_.length_unit();
   step_mm = tangent.skin.Step(estimate.loads.at_sites, estimate.loads.pressure_error_mpa, longest_mm,
@@ -310,7 +311,19 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
   return problem;
 }
 
-bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
+// What the touched skin's tangents take from the skin without loads, which may be that of a pressure nearby.
+bool SkinEstimator::PrepareUntouched(SkinProblem& problem) {
+  const bool is_good = still_->is_prepared &&
+                       still_->DistanceMm(problem.inflated.state) < touched_->reach_mm &&
+                       still_->loads.IsPreparedFor(problem.observed, problem.prior);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
+  if (!is_good && !still_->Make(problem, problem.inflated.state, none)) return false;
+  still_->loads.Hide(problem.observed);
+  problem.untouched_stray_mm2 = still_->loads.stray_mm2();
+  return true;
+}
+
+bool SkinEstimator::Solve(SkinProblem& problem, SkinEstimate& estimate) {
   estimate.loads = {};
   estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
   estimate.unsettled_mm = 0;
@@ -325,7 +338,7 @@ bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   // A small dent is nearer to where its first step has led.
   if (is_small && local_n.size() == 0 && !small.loads.loads.empty()) estimate.state = small.state;
   start_ = estimate.state;
-  return SolveLarge(problem, estimate, local_n);
+  return PrepareUntouched(problem) && SolveLarge(problem, estimate, local_n);
 }
 
 }  // namespace taclink

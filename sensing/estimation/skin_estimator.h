@@ -90,7 +90,7 @@ class SkinEstimator {
   const Linearization& linearization() const;
   const LoadEstimator& loads() const;
   /// See LoadEstimator::Limits; after an estimate that is an answer.
-  const DetectionLimits& Limits() { return used_->loads.Limits(); }
+  const DetectionLimits& Limits() { return still_->loads.Limits(); }
 
  private:
   /// In length units: from the inflated skin, whose tangent is good enough there; and of a step.
@@ -111,7 +111,8 @@ class SkinEstimator {
   bool SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
   SkinProblem MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
                           PressurePrior prior, const Eigen::VectorXd& baseline_mm) const;
-  bool Solve(const SkinProblem& problem, SkinEstimate& estimate);
+  bool PrepareUntouched(SkinProblem& problem);
+  bool Solve(SkinProblem& problem, SkinEstimate& estimate);
   bool SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& estimate);
   bool IsPossible(const SkinEstimate& estimate) const;
   /// One step from the slack or the inflated skin, whatever is asked of it.

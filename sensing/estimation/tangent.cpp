@@ -45,7 +45,8 @@ bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Ei
   local_n = local;
   // The model's errors are those at `state`, whichever state the last step was from.
   is_prepared = (is_kept ? skin.Rebase(state, problem.pressure_mpa) : skin.At(state, problem.pressure_mpa)) &&
-                loads.Prepare(skin, problem.inflated, problem.observed, problem.prior, local);
+                loads.Prepare(skin, problem.inflated, problem.observed, problem.prior, local,
+                              problem.untouched_stray_mm2);
   return is_prepared;
 }
 

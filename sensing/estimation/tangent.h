@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 
 #include "sensing/estimation/assimilation.h"
 #include "sensing/estimation/linearization.h"
@@ -15,6 +16,8 @@ struct SkinProblem {
   InflatedSkin inflated = {};
   double pressure_mpa = 0;
   PressurePrior prior = {};
+  /// Of the skin without loads (LoadEstimator::stray_mm2); null: this is asked of that skin itself.
+  std::shared_ptr<const Eigen::MatrixXf> untouched_stray_mm2 = {};
 };
 
 /// A linearized skin with all that its loads are weighed with. It is made of one frame and good for others

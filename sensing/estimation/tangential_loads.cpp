@@ -15,24 +15,44 @@ constexpr double kShiftSites = 2;  // standard deviation of where a tangential f
 
 }  // namespace
 
-// Of a force of 1 N that the hill's sites share as they share the load, around and along, and of couples.
-Eigen::MatrixXd LoadEstimator::TangentialColumns(const Linearization& skin, const Hill& hill) {
-  Eigen::VectorXd shares = Eigen::VectorXd::Zero(mechanics_.site_count());
-  for (const int column : hill) ForSites(column, [&](int site, double) { shares[site] = loads_[site]; });
-  shares /= shares.sum();
-  const Eigen::VectorXd spread = mechanics_.spread() * shares;
-  Eigen::MatrixXf single = Eigen::MatrixXf::Zero(factor_.rows(), kTangential);
-  single.rightCols<2>() = skin.CoupleColumns(spread);
-  for (int site = 0; site < mechanics_.site_count(); ++site) {
-    if (spread[site] == 0) continue;
-    const auto share = static_cast<float>(spread[site]);
-    single.col(0) += share * skin.Column(Linearization::kAround, site);
-    single.col(1) += share * skin.Column(Linearization::kAlong, site);
+// The skin's columns, of all sites that have a share in one of these.
+void LoadEstimator::MakeColumnsWhere(Linearization& skin, const std::vector<Eigen::VectorXd>& shares) const {
+  std::vector<int> sites;
+  for (const Eigen::VectorXd& each : shares) {
+    for (int site = 0; site < mechanics_.site_count(); ++site) {
+      if (each[site] != 0) sites.push_back(site);
+    }
   }
-  dense::SolveLower(factor_, single);
-  Eigen::MatrixXd columns = single.cast<double>();
-  if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
-  return columns;
+  skin.MakeColumns(sites);
+}
+
+// By hill: of a force of 1 N that the hill's sites share as they share the load, around and along, and of
+// couples.
+std::vector<Eigen::MatrixXd> LoadEstimator::TangentialColumns(Linearization& skin,
+                                                              const std::vector<Hill>& hills) {
+  std::vector<Eigen::VectorXd> spreads;
+  for (const Hill& hill : hills) {
+    Eigen::VectorXd shares = Eigen::VectorXd::Zero(mechanics_.site_count());
+    for (const int column : hill) ForSites(column, [&](int site, double) { shares[site] = loads_[site]; });
+    spreads.push_back(mechanics_.spread() * (shares / shares.sum()));
+  }
+  MakeColumnsWhere(skin, spreads);
+  std::vector<Eigen::MatrixXd> all;
+  for (const Eigen::VectorXd& spread : spreads) {
+    Eigen::MatrixXf single = Eigen::MatrixXf::Zero(factor_.rows(), kTangential);
+    single.rightCols<2>() = skin.CoupleColumns(spread);
+    for (int site = 0; site < mechanics_.site_count(); ++site) {
+      if (spread[site] == 0) continue;
+      const auto share = static_cast<float>(spread[site]);
+      single.col(0) += share * skin.Column(Linearization::kAround, site);
+      single.col(1) += share * skin.Column(Linearization::kAlong, site);
+    }
+    dense::SolveLower(factor_, single);
+    Eigen::MatrixXd columns = single.cast<double>();
+    if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
+    all.push_back(std::move(columns));
+  }
+  return all;
 }
 
 // Information that is there before the data, by column.
@@ -51,7 +71,7 @@ LoadEstimator::FitColumns LoadEstimator::ColumnsOf(const std::vector<int>& actin
   const auto loads = static_cast<Eigen::Index>(acting.size());
   FitColumns fit;
   fit.columns.resize(data_.size(), loads + tangential.cols());
-  fit.columns << columns_(Eigen::all, acting).cast<double>(), tangential;
+  fit.columns << columns_.columns()(Eigen::all, columns_.Places(acting)).cast<double>(), tangential;
   if (hidden_.cols() > 0) fit.columns -= hidden_ * (hidden_.transpose() * fit.columns);
   Eigen::MatrixXd information;
   dense::TransposedProduct(fit.columns, fit.columns, information);
@@ -93,16 +113,15 @@ std::vector<LoadEstimator::TangentialGain> LoadEstimator::TangentialGains(
 
 // One after the other, the hill first whose tangential force explains most; none that explains little: what a
 // shell gets wrong of a solid looks like a tangential force of the normal one's size.
-void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<Hill>& hills,
-                            std::vector<int>& slipping, Eigen::MatrixXd& tangential, Solution& solution) {
+void LoadEstimator::LetSlip(Linearization& skin, const std::vector<Hill>& hills, std::vector<int>& slipping,
+                            Eigen::MatrixXd& tangential, Solution& solution) {
   std::vector<int> sites;
   for (const auto& hill : hills) sites.insert(sites.end(), hill.begin(), hill.end());
   slipping.clear();
   tangential.resize(data_.size(), 0);
   solution = Refit(sites, tangential);
   std::vector<Eigen::MatrixXd>& columns = tangential_columns_;
-  columns.clear();
-  for (const auto& hill : hills) columns.push_back(TangentialColumns(skin, hill));
+  columns = TangentialColumns(skin, hills);
   left_out_.assign(hills.size(), {});
   while (slipping.size() < hills.size()) {
     left_out_ = TangentialGains(sites, columns, tangential, solution);
@@ -124,7 +143,7 @@ void LoadEstimator::LetSlip(const Linearization& skin, const std::vector<Hill>& 
 
 // What a tangential force moves by, if it acts a site farther around, or along: columns are linear in the
 // shares.
-Eigen::MatrixXd LoadEstimator::ShiftColumns(const Linearization& skin, const EstimatedLoad& load) const {
+Eigen::MatrixXd LoadEstimator::ShiftColumns(Linearization& skin, const EstimatedLoad& load) const {
   const int columns = mechanics_.columns(), rows = mechanics_.site_rows();
   Eigen::MatrixXd shift = Eigen::MatrixXd::Zero(data_.size(), 2);
   for (int axis = 0; axis < 2; ++axis) {
@@ -138,6 +157,7 @@ Eigen::MatrixXd LoadEstimator::ShiftColumns(const Linearization& skin, const Est
       }
     }
     const Eigen::VectorXd spread = mechanics_.spread() * change;
+    MakeColumnsWhere(skin, {spread});
     for (int site = 0; site < mechanics_.site_count(); ++site) {
       if (spread[site] == 0) continue;
       const Eigen::VectorXf by_force =
@@ -154,7 +174,7 @@ Eigen::MatrixXd LoadEstimator::ShiftColumns(const Linearization& skin, const Est
 // A body that drags the skin presses its front and lifts its rear: inward loads tell little of where it is,
 // and the first guess of where the tangential force acts was made from them. To first order the data tell
 // where it does; the center is that of all forces.
-void LoadEstimator::MoveCenters(const Linearization& skin, LoadEstimate& estimate) const {
+void LoadEstimator::MoveCenters(Linearization& skin, LoadEstimate& estimate) const {
   std::vector<int> acting;
   Eigen::MatrixXd tangential(data_.size(), 0);
   for (size_t i = 0; i < estimate.loads.size(); ++i) {
