@@ -62,7 +62,8 @@ SkinShape Measured(const LinkModel& model, const Markers& displacements, unsigne
   return shape;
 }
 
-enum Motion { kRest, kStanding, kMoving, kCold };
+// From nowhere: it is there in a frame and was not in the one before. Cold: in the first frame of all.
+enum Motion { kRest, kStanding, kMoving, kFromNowhere, kCold };
 
 // In and out again, or where it is.
 std::vector<SkinShape> Frames(const LinkModel& model, Motion motion) {
@@ -94,12 +95,18 @@ void Estimation(benchmark::State& state) {
     estimator.Estimate(pressure, frame, forces);
     estimator.FindContacts(finder, frame, forces, contacts);
   };
+  SkinShape untouched = Measured(model, PushedMarkers(model)[0], kNoises);
   for (SkinShape& frame : frames) estimate(frame);
   size_t next = 0;
   int unsolved = 0;
   double tangents = 0, steps = 0;
   for (auto _ : state) {
     if (motion == kCold) estimator.Restart();
+    if (motion == kFromNowhere) {
+      state.PauseTiming();
+      estimate(untouched);
+      state.ResumeTiming();
+    }
     estimate(frames[next++ % frames.size()]);
     unsolved += forces.converged ? 0 : 1;
     tangents += estimator.estimate().tangents;
@@ -169,8 +176,9 @@ BENCHMARK(Estimation)
     ->Arg(kRest)
     ->Arg(kStanding)
     ->Arg(kMoving)
+    ->Arg(kFromNowhere)
     ->Arg(kCold)
-    ->ArgName("rest_standing_moving_cold")
+    ->ArgName("rest_standing_moving_nowhere_cold")
     ->Unit(benchmark::kMicrosecond);
 
 }  // namespace

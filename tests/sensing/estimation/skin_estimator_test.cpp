@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <thread>
@@ -267,6 +268,35 @@ TEST_F(SkinEstimatorTest, ReadingsBelowZeroAreNoSuction) {
     estimator_.Estimate(observation, estimate_);
     ASSERT_EQ(estimate_.failure, EstimateFailure::kNone) << kpa;
     EXPECT_TRUE(estimate_.loads.loads.empty()) << kpa;
+  }
+}
+
+// A second body, while the first stands and its tangent, which has columns about it alone, is kept.
+TEST_F(SkinEstimatorTest, ASecondContactFarFromTheFirstIsFound) {
+  const Pushed none = Push(model_, 1.0, 1.3, 95, 0, 4), first = Push(model_, 1.0, 1.3, 95, 0.4, 4),
+               second = Push(model_, 1.0, -1.8, 150, 0.3, 4);
+  ASSERT_TRUE(none.ok && first.ok && second.ok);
+  const Eigen::VectorXd both_mm = first.markers_mm + second.markers_mm - none.markers_mm;
+  for (int frame = 0; frame < 3; ++frame)
+    estimator_.Estimate(Observe(first.markers_mm, 1.0, 0.05), estimate_);
+  ASSERT_EQ(estimate_.loads.loads.size(), 1u);
+  estimator_.Estimate(Observe(both_mm, 1.0, 0.05), estimate_);
+  ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+  ASSERT_EQ(estimate_.loads.loads.size(), 2u);
+  SkinEstimator fresh(model_);
+  SkinEstimate cold;
+  fresh.Estimate(Observe(both_mm, 1.0, 0.05), cold);
+  ASSERT_EQ(cold.loads.loads.size(), 2u);
+  for (const EstimatedLoad& load : estimate_.loads.loads) {
+    const bool is_first = load.force_n.dot(model_.OutwardNormal(1.3, 95)) < 0;
+    const Vec3 truth =
+        is_first ? -0.4 * model_.OutwardNormal(1.3, 95) : -0.3 * model_.OutwardNormal(-1.8, 150);
+    EXPECT_LT((load.force_n - truth).norm(), 0.1 * truth.norm());
+    const auto same =
+        std::min_element(cold.loads.loads.begin(), cold.loads.loads.end(), [&](const auto& a, const auto& b) {
+          return (a.force_n - load.force_n).norm() < (b.force_n - load.force_n).norm();
+        });
+    EXPECT_LT((load.force_n - same->force_n).norm(), 0.2 * std::sqrt(same->force_covariance_n2.trace()));
   }
 }
 

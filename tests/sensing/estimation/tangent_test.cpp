@@ -63,6 +63,23 @@ TEST_F(TangentTest, IsGoodForForcesOfItsSize) {
   EXPECT_FALSE(tangent.HasLocal(none_));
 }
 
+// It takes from the untouched skin what stray forces do where nothing presses.
+TEST_F(TangentTest, OfATouchedSkinWeighsAsIfItHadMadeAll) {
+  Tangent still(mechanics_, near_, kReach), touched(mechanics_, near_, kReach),
+      whole(mechanics_, near_, kReach);
+  ASSERT_TRUE(still.Make(problem_, problem_.inflated.state, none_));
+  Eigen::VectorXd local = none_;
+  local[300] = 0.5;
+  ASSERT_TRUE(whole.Make(problem_, Dented(1), local));
+  problem_.untouched_stray_mm2 = still.loads.stray_mm2();
+  ASSERT_TRUE(touched.Make(problem_, Dented(1), local));
+  EXPECT_EQ(touched.loads.stray_mm2(), still.loads.stray_mm2());
+  for (int m = 0; m < mechanics_.marker_count(); ++m) {
+    const Mat3 expected = whole.loads.ModelCovariance(m);
+    EXPECT_LT((touched.loads.ModelCovariance(m) - expected).norm(), 0.05 * expected.norm()) << m;
+  }
+}
+
 TEST_F(TangentTest, TheMakersIsTheSame) {
   Tangent own(mechanics_, near_, kReach);
   ASSERT_TRUE(own.Make(problem_, Dented(1), none_));
@@ -75,11 +92,14 @@ TEST_F(TangentTest, TheMakersIsTheSame) {
       maker.Finish();
       EXPECT_FALSE(maker.is_begun());
     }
-    const Tangent& made = *maker.spare();
+    Tangent& made = *maker.spare();
     EXPECT_TRUE(made.IsGoodFor(problem_, Dented(1)));
     EXPECT_EQ(made.DistanceMm(Dented(1)), 0);
+    const std::vector<int> sites = {3, 200};
+    made.skin.MakeColumns(sites);
+    own.skin.MakeColumns(sites);
     for (const auto direction : {Linearization::kInward, Linearization::kAround, Linearization::kAlong}) {
-      for (int site = 0; site < mechanics_.site_count(); ++site)
+      for (const int site : sites)
         EXPECT_EQ(made.skin.Column(direction, site), own.skin.Column(direction, site)) << site;
     }
   }
