@@ -61,13 +61,14 @@ DiscSkin::DiscSkin(const LinkModel& model, const std::vector<double>& disc_diame
       .spacing_mm = options.spacing_mm,
       .stiffness_n_mm3 = options.stiffness * model.material.youngs_modulus_mpa / model.thickness_mm,
       .sticks = false};
+  const RigidContact of_nothing(shell_, contact);  // its points are those of all
   if (model.tube_outer_radius_mm > 0) {
-    tube_ = std::make_unique<RigidContact>(shell_, contact);
+    tube_ = std::make_unique<RigidContact>(of_nothing);
     tube_->SetBody(RigidBar{Vec3::Zero(), Vec3::UnitZ(), model.tube_outer_radius_mm});
   }
   for (const double diameter : disc_diameters_mm) {
     radii_mm_.push_back(std::max(diameter / 2, kRimMm));
-    discs_.emplace_back(shell_, contact);
+    discs_.emplace_back(of_nothing);
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -21,7 +22,7 @@ struct RigidContactOptions {
 
 /// A rigid body that a shell can't enter: points spread over its mid-surface are held half a thickness
 /// outside the body by a stiff one-sided bedding. (Points of the touched wall would do the same, were it not
-/// that a force there turns the director over.)
+/// that a force there turns the director over.) Copies share the points, which are most of its memory.
 class RigidContact final : public ElementLoad {
  public:
   RigidContact(const NonlinearShell& shell, const RigidContactOptions& options);
@@ -52,20 +53,25 @@ class RigidContact final : public ElementLoad {
            ElementResponse& response) const override;
 
  private:
+  // Relative to the body's place when it was first set; it can't slide across the normal there.
   struct HeldPoint {
     Vec3 at_mm, normal;
   };
-  struct Sample {
+  struct Point {
     Eigen::Vector4d weights;  // of the corners
     double area_mm2 = 0;
-    // Relative to the body's place when it was first set; it can't slide across the normal there.
-    std::optional<HeldPoint> held;
   };
-  void AddPoint(const Sample& sample, const ElementState& state, DerivativeOrder order,
+  struct Points {
+    std::vector<Point> all;
+    std::vector<size_t> first;  // by element, and behind the last
+  };
+  static Points Spread(const NonlinearShell& shell, double spacing_mm);
+  void AddPoint(size_t point, const ElementState& state, DerivativeOrder order,
                 ElementResponse& response) const;
-  Vec3 SlipOf(const Sample& sample, const Vec3& point_mm) const;
-  Vec3 PointOf(const Sample& sample, const ElementState& state) const;
-  bool IsFar(int element, const ElementState& state) const;
+  bool IsHeld(size_t point) const { return !held_.empty() && held_[point]; }
+  Vec3 SlipOf(size_t point, const Vec3& at_mm) const;
+  Vec3 PlaceOf(size_t point, const ElementState& state) const;
+  bool IsFar(size_t element, const ElementState& state) const;
 
   const NonlinearShell& shell_;
   RigidContactOptions options_;
@@ -73,13 +79,14 @@ class RigidContact final : public ElementLoad {
   RigidBody grown_;               // by half the shell's thickness
   Vec3 moved_mm_ = Vec3::Zero();  // of the body since it was first set
   bool has_body_ = false;
-  std::vector<std::vector<Sample>> samples_;  // by element
-  std::vector<int> held_count_;               // by element
+  std::shared_ptr<const Points> points_;        // of all copies
+  std::vector<std::optional<HeldPoint>> held_;  // by point; empty: nothing can be held
+  std::vector<int> held_count_;                 // by element
 };
 
 struct RigidContact::Grip {
   struct Entry {
-    size_t element, sample;
+    size_t element, point;
     HeldPoint held;
   };
   std::vector<Entry> entries;
