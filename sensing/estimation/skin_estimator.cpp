@@ -105,7 +105,8 @@ double SkinEstimator::SeenMotion(const ShellState& state, const MarkerObservatio
 bool SkinEstimator::Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
                            const Eigen::VectorXd& local_n, SkinEstimate& estimate) {
   ++estimate.tangents;
-  return tangent.Make(problem, state, local_n);
+  const bool is_touched = &tangent != still_.get();
+  return tangent.Make(problem, state, local_n, is_touched ? still_->loads.stray_mm2() : nullptr);
 }
 
 // The touched skin's next tangent, if one made ahead is due and is better than the one at hand. It is due
@@ -143,7 +144,7 @@ void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& es
     return tangent.IsGoodFor(problem, ahead_) && tangent.HasLocal(ahead_n);
   };
   if (is_good(*touched_) || is_good(*maker_->spare())) return;
-  maker_->Begin(problem, ahead_, ahead_n);
+  maker_->Begin(problem, ahead_, ahead_n, still_->loads.stray_mm2());
   frames_since_begun_ = 1;
 }
 
@@ -312,18 +313,17 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
 }
 
 // What the touched skin's tangents take from the skin without loads, which may be that of a pressure nearby.
-bool SkinEstimator::PrepareUntouched(SkinProblem& problem) {
+bool SkinEstimator::PrepareUntouched(const SkinProblem& problem) {
   const bool is_good = still_->is_prepared &&
                        still_->DistanceMm(problem.inflated.state) < touched_->reach_mm &&
                        still_->loads.IsPreparedFor(problem.observed, problem.prior);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
-  if (!is_good && !still_->Make(problem, problem.inflated.state, none)) return false;
+  if (!is_good && !still_->Make(problem, problem.inflated.state, none, nullptr)) return false;
   still_->loads.Hide(problem.observed);
-  problem.untouched_stray_mm2 = still_->loads.stray_mm2();
   return true;
 }
 
-bool SkinEstimator::Solve(SkinProblem& problem, SkinEstimate& estimate) {
+bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   estimate.loads = {};
   estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
   estimate.unsettled_mm = 0;

@@ -111,8 +111,8 @@ class SkinEstimator {
   bool SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
   SkinProblem MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
                           PressurePrior prior, const Eigen::VectorXd& baseline_mm) const;
-  bool PrepareUntouched(SkinProblem& problem);
-  bool Solve(SkinProblem& problem, SkinEstimate& estimate);
+  bool PrepareUntouched(const SkinProblem& problem);
+  bool Solve(const SkinProblem& problem, SkinEstimate& estimate);
   bool SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& estimate);
   bool IsPossible(const SkinEstimate& estimate) const;
   /// One step from the slack or the inflated skin, whatever is asked of it.

@@ -40,13 +40,13 @@ bool Tangent::IsGoodFor(const SkinProblem& problem, const ShellState& state) con
   return is_prepared && IsNear(state) && loads.IsPreparedFor(problem.observed, problem.prior);
 }
 
-bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local) {
+bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local,
+                   const std::shared_ptr<const Eigen::MatrixXf>& untouched) {
   const bool is_kept = is_prepared && IsNear(state);
   local_n = local;
   // The model's errors are those at `state`, whichever state the last step was from.
   is_prepared = (is_kept ? skin.Rebase(state, problem.pressure_mpa) : skin.At(state, problem.pressure_mpa)) &&
-                loads.Prepare(skin, problem.inflated, problem.observed, problem.prior, local,
-                              problem.untouched_stray_mm2);
+                loads.Prepare(skin, problem.inflated, problem.observed, problem.prior, local, untouched);
   return is_prepared;
 }
 

@@ -16,8 +16,6 @@ struct SkinProblem {
   InflatedSkin inflated = {};
   double pressure_mpa = 0;
   PressurePrior prior = {};
-  /// Of the skin without loads (LoadEstimator::stray_mm2); null: this is asked of that skin itself.
-  std::shared_ptr<const Eigen::MatrixXf> untouched_stray_mm2 = {};
 };
 
 /// A linearized skin with all that its loads are weighed with. It is made of one frame and good for others
@@ -34,7 +32,9 @@ struct Tangent {
   /// Both, and the cameras see as much.
   bool IsGoodFor(const SkinProblem& problem, const ShellState& state) const;
   /// What is near keeps its columns: only what the loads are weighed with is made again.
-  bool Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local);
+  /// `untouched`: LoadEstimator::stray_mm2 of the skin without loads; null: this is that skin's tangent.
+  bool Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local,
+            const std::shared_ptr<const Eigen::MatrixXf>& untouched);
   void Forget();
 
   const double reach_mm, force_unit;

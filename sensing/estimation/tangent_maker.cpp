@@ -21,11 +21,12 @@ TangentMaker::~TangentMaker() {
   if (work_ && !work_->Take()) work_->done.get_future().wait();
 }
 
-void TangentMaker::Begin(const SkinProblem& problem, const ShellState& state,
-                         const Eigen::VectorXd& local_n) {
+void TangentMaker::Begin(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n,
+                         std::shared_ptr<const Eigen::MatrixXf> untouched) {
   problem_ = problem;
   state_ = state;
   local_n_ = local_n;
+  untouched_ = std::move(untouched);
   work_ = std::make_shared<Work>();
   if (!background_) return;
   background_([this, work = work_] {

@@ -24,7 +24,8 @@ class TangentMaker {
   /// Between Begin and Finish.
   bool is_begun() const { return work_ != nullptr; }
   /// With copies of these. The one before must be finished.
-  void Begin(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n);
+  void Begin(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n,
+             std::shared_ptr<const Eigen::MatrixXf> untouched);
   /// Waits for the background or, if that has not come to it, makes the tangent here.
   void Finish();
   /// What was made last, to be looked at and exchanged.
@@ -33,13 +34,14 @@ class TangentMaker {
  private:
   struct Work;
 
-  void Make() { spare_->Make(problem_, state_, local_n_); }
+  void Make() { spare_->Make(problem_, state_, local_n_, untouched_); }
 
   std::unique_ptr<Tangent> spare_;
   const BackgroundRunner background_;
   SkinProblem problem_;
   ShellState state_;
   Eigen::VectorXd local_n_;
+  std::shared_ptr<const Eigen::MatrixXf> untouched_;
   // Shared with the job: one that comes after Finish has taken its work finds neither this nor more to do.
   std::shared_ptr<Work> work_;
 };

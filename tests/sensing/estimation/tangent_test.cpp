@@ -40,7 +40,7 @@ class TangentTest : public ::testing::Test {
 TEST_F(TangentTest, IsGoodNearWhereItWasMade) {
   Tangent tangent(mechanics_, near_, kReach);
   EXPECT_FALSE(tangent.IsGoodFor(problem_, Dented(0)));
-  ASSERT_TRUE(tangent.Make(problem_, Dented(0), none_));
+  ASSERT_TRUE(tangent.Make(problem_, Dented(0), none_, nullptr));
   EXPECT_TRUE(tangent.IsGoodFor(problem_, Dented(2.4)));
   EXPECT_FALSE(tangent.IsGoodFor(problem_, Dented(2.6)));
   EXPECT_NEAR(tangent.DistanceMm(Dented(2)), 2, 1e-9);
@@ -56,7 +56,7 @@ TEST_F(TangentTest, IsGoodForForcesOfItsSize) {
   EXPECT_FALSE(tangent.HasLocal(none_));
   Eigen::VectorXd local = none_;
   local[300] = 1;
-  ASSERT_TRUE(tangent.Make(problem_, Dented(0), local));
+  ASSERT_TRUE(tangent.Make(problem_, Dented(0), local, nullptr));
   EXPECT_TRUE(tangent.HasLocal(1.5 * local));
   EXPECT_FALSE(tangent.HasLocal(1.5 * local, 0.5));
   EXPECT_FALSE(tangent.HasLocal(3 * local));
@@ -67,12 +67,11 @@ TEST_F(TangentTest, IsGoodForForcesOfItsSize) {
 TEST_F(TangentTest, OfATouchedSkinWeighsAsIfItHadMadeAll) {
   Tangent still(mechanics_, near_, kReach), touched(mechanics_, near_, kReach),
       whole(mechanics_, near_, kReach);
-  ASSERT_TRUE(still.Make(problem_, problem_.inflated.state, none_));
+  ASSERT_TRUE(still.Make(problem_, problem_.inflated.state, none_, nullptr));
   Eigen::VectorXd local = none_;
   local[300] = 0.5;
-  ASSERT_TRUE(whole.Make(problem_, Dented(1), local));
-  problem_.untouched_stray_mm2 = still.loads.stray_mm2();
-  ASSERT_TRUE(touched.Make(problem_, Dented(1), local));
+  ASSERT_TRUE(whole.Make(problem_, Dented(1), local, nullptr));
+  ASSERT_TRUE(touched.Make(problem_, Dented(1), local, still.loads.stray_mm2()));
   EXPECT_EQ(touched.loads.stray_mm2(), still.loads.stray_mm2());
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const Mat3 expected = whole.loads.ModelCovariance(m);
@@ -82,12 +81,12 @@ TEST_F(TangentTest, OfATouchedSkinWeighsAsIfItHadMadeAll) {
 
 TEST_F(TangentTest, TheMakersIsTheSame) {
   Tangent own(mechanics_, near_, kReach);
-  ASSERT_TRUE(own.Make(problem_, Dented(1), none_));
+  ASSERT_TRUE(own.Make(problem_, Dented(1), none_, nullptr));
   for (const BackgroundRunner& background : {BackgroundRunner{}, BackgroundRunner{InAThread}}) {
     TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach), background);
     EXPECT_FALSE(maker.is_begun());
     for (const double mm : {4.0, 1.0}) {
-      maker.Begin(problem_, Dented(mm), none_);
+      maker.Begin(problem_, Dented(mm), none_, nullptr);
       EXPECT_TRUE(maker.is_begun());
       maker.Finish();
       EXPECT_FALSE(maker.is_begun());
@@ -112,14 +111,14 @@ TEST_F(TangentTest, AMakerDoesNotWaitForWhatHasNotBegun) {
   {
     TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach),
                        [&](std::function<void()> job) { jobs.push_back(std::move(job)); });
-    maker.Begin(problem_, Dented(1), none_);
+    maker.Begin(problem_, Dented(1), none_, nullptr);
     maker.Finish();
     EXPECT_TRUE(maker.spare()->IsGoodFor(problem_, Dented(1)));
     maker.spare()->Forget();
     ASSERT_EQ(jobs.size(), 1u);
     jobs[0]();
     EXPECT_FALSE(maker.spare()->IsGoodFor(problem_, Dented(1)));
-    maker.Begin(problem_, Dented(1), none_);
+    maker.Begin(problem_, Dented(1), none_, nullptr);
   }
   ASSERT_EQ(jobs.size(), 2u);
   jobs[1]();
@@ -128,7 +127,7 @@ TEST_F(TangentTest, AMakerDoesNotWaitForWhatHasNotBegun) {
 // Destroyed at work: it ends first.
 TEST_F(TangentTest, AMakerEndsAtWork) {
   TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach), InAThread);
-  maker.Begin(problem_, Dented(0), none_);
+  maker.Begin(problem_, Dented(0), none_, nullptr);
 }
 
 }  // namespace
