@@ -312,11 +312,10 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
   return problem;
 }
 
-// What the touched skin's tangents take from the skin without loads, which may be that of a pressure nearby.
+// What the touched skin's tangents take from the skin without loads. One from 2 mm of inflation away would do
+// for the covariance, but not for the norms: weak loads were missed.
 bool SkinEstimator::PrepareUntouched(const SkinProblem& problem) {
-  const bool is_good = still_->is_prepared &&
-                       still_->DistanceMm(problem.inflated.state) < touched_->reach_mm &&
-                       still_->loads.IsPreparedFor(problem.observed, problem.prior);
+  const bool is_good = still_->IsGoodFor(problem, problem.inflated.state);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
   if (!is_good && !still_->Make(problem, problem.inflated.state, none, nullptr)) return false;
   still_->loads.Hide(problem.observed);
