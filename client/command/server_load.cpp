@@ -212,7 +212,7 @@ Result<LoadPictures> RenderLoadPictures(const std::string& folder) {
   if (!model) return model.error();
   const auto skin = SimulatedSkin::Make(*model, *scene);
   if (!skin) return skin.error();
-  const Renderer renderer(*model, MountedRig(model->nominal_rig, scene->camera), scene->camera, scene->seed);
+  Renderer renderer(*model, MountedRig(model->nominal_rig, scene->camera), scene->camera, scene->seed);
   LoadPictures pictures{.folder = folder, .pairs = kPairs};
   SkinTruth truth;
   cv::Mat gray;

@@ -31,8 +31,8 @@ std::string PictureName(CameraId id, uint64_t frame) {
   return name;
 }
 
-Result<void> WritePictures(const Renderer& renderer, const SkinTruth& truth,
-                           const std::filesystem::path& folder, bool rest) {
+Result<void> WritePictures(Renderer& renderer, const SkinTruth& truth, const std::filesystem::path& folder,
+                           bool rest) {
   cv::Mat gray;
   for (const CameraId id : kBothCameras) {
     renderer.Render(truth, id, gray);
@@ -43,7 +43,7 @@ Result<void> WritePictures(const Renderer& renderer, const SkinTruth& truth,
 }
 
 // The untouched, unpressurised skin, whatever the scene begins with.
-Result<void> WriteRest(const LinkModel& model, Scene scene, const Renderer& renderer,
+Result<void> WriteRest(const LinkModel& model, Scene scene, Renderer& renderer,
                        const std::filesystem::path& folder) {
   scene.contacts.clear();
   scene.pressure = {{0, 0}};
@@ -69,7 +69,7 @@ Result<void> Simulate(const SimulateOptions& options) {
   if (failed || !truth_file) {
     return Error{ErrorCode::kInvalidArgument, options.out + ": cannot be written; choose another --out"};
   }
-  const Renderer renderer(*model, MountedRig(model->nominal_rig, scene->camera), scene->camera, scene->seed);
+  Renderer renderer(*model, MountedRig(model->nominal_rig, scene->camera), scene->camera, scene->seed);
   if (auto written = WriteRest(*model, *scene, renderer, folder); !written) return written.error();
 
   const int all = static_cast<int>(std::ceil(scene->duration_s * scene->frame_rate_hz));

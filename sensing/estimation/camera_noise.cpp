@@ -14,6 +14,16 @@ Mat3 NoiseOf(const Mat3& information, double unseen_mm) {
          modes.eigenvectors().transpose();
 }
 
+SeenNoise SeenNoiseOf(const Mat3& information, double unseen_mm) {
+  const double least = 1 / (kUnseenShare * unseen_mm * unseen_mm);
+  if (!information.allFinite() || information.isZero()) return {};
+  Eigen::SelfAdjointEigenSolver<Mat3> modes;
+  modes.computeDirect(information);  // the least first
+  const auto seen = (modes.eigenvalues().array() > least).count();
+  return {.axes = modes.eigenvectors().rightCols(seen),
+          .variances_mm2 = modes.eigenvalues().tail(seen).cwiseInverse()};
+}
+
 // The least eigenvalue is no smaller than the determinant over the square of half the trace.
 bool IsSurelySeen(const Mat3& information, double least) {
   const double half = information.trace() / 2;

@@ -23,6 +23,12 @@ Vec3 OuterPoint(const SkinMechanics& mechanics, const Linearization& skin, int s
 
 }  // namespace
 
+std::vector<int> HillFinder::AllOf(const std::vector<Hill>& hills) {
+  std::vector<int> sites;
+  for (const Hill& hill : hills) sites.insert(sites.end(), hill.begin(), hill.end());
+  return sites;
+}
+
 HillFinder::HillFinder(const SkinMechanics& mechanics) : mechanics_(mechanics) {}
 
 void HillFinder::Smooth(const Eigen::VectorXd& loads_n, std::span<const int> support) {

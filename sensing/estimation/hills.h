@@ -18,6 +18,8 @@ class HillFinder {
   explicit HillFinder(const SkinMechanics& mechanics);
 
   using Hill = std::vector<int>;  ///< sites
+  /// All of their sites, in order.
+  static std::vector<int> AllOf(const std::vector<Hill>& hills);
   /// `loads_n`: inward, by site, of the sites in `support`, all above zero.
   std::vector<Hill> Find(const Linearization& skin, const Eigen::VectorXd& loads_n,
                          std::span<const int> support);

@@ -236,6 +236,13 @@ Eigen::VectorXf Linearization::Column(Direction direction, int site) const {
   return AtSite(site).lazyProduct(load);
 }
 
+void Linearization::SetPressure(double pressure_mpa) {
+  const double more_mpa = pressure_mpa - pressure_mpa_;
+  gradient_ += more_mpa * pressure_force_;
+  base_mm_ += more_mpa * by_pressure_;
+  pressure_mpa_ = pressure_mpa;
+}
+
 bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {
   const bool is_tangent_state =
       state.mids_mm == tangent_state_.mids_mm && state.directors == tangent_state_.directors;
@@ -243,9 +250,10 @@ bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {
   pressure_mpa_ = pressure_mpa;
   if (is_tangent_state) {
     // The pressure's forces are linear in the pressure.
-    const double more_mpa = pressure_mpa - tangent_pressure_mpa_;
-    gradient_ = tangent_gradient_ + more_mpa * pressure_force_;
-    base_mm_ = tangent_base_mm_ + more_mpa * by_pressure_;
+    gradient_ = tangent_gradient_;
+    base_mm_ = tangent_base_mm_;
+    pressure_mpa_ = tangent_pressure_mpa_;
+    SetPressure(pressure_mpa);
     return base_mm_.allFinite();
   }
   const FollowerPressure pressure(pressure_mpa);

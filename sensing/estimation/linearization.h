@@ -25,6 +25,8 @@ class Linearization {
   /// is that of the new state, exactly. What steps lead to is then the same equilibrium, in more of them.
   /// False: not finite.
   bool Rebase(const ShellState& state, double pressure_mpa);
+  /// The same state under another pressure, to first order.
+  void SetPressure(double pressure_mpa);
   bool is_made() const { return is_made_; }
 
   const ShellState& state() const { return state_; }

@@ -27,14 +27,7 @@ constexpr double kHessianRidge = 1e-9;
 constexpr double kLikelyShare = 0.1, kLetInNorm = 3, kAbout = 0.3;
 constexpr size_t kMostLetIn = 8;
 constexpr int kMostRounds = 4;
-constexpr double kUnseenMm = 30;  // standard deviation of a direction that is not seen, in units of length
-constexpr double kSameNoise = 2;  // ratio of standard deviations
 constexpr double kSameDirection = 0.9999;  // cosine
-
-// Lower half of c := c + a a^T, of few columns.
-void AddOuter(const Eigen::MatrixXd& a, Eigen::MatrixXd& c) {
-  c.selfadjointView<Eigen::Lower>().rankUpdate(a);
-}
 
 }  // namespace
 
@@ -48,46 +41,23 @@ LoadEstimator::LoadEstimator(const SkinMechanics& mechanics, const Neighborhoods
 bool LoadEstimator::Prepare(Linearization& skin, const InflatedSkin& inflated,
                             const MarkerObservations& observed, const PressurePrior& prior,
                             const Eigen::VectorXd& local_n,
-                            std::shared_ptr<const Eigen::MatrixXf> untouched_stray_mm2) {
-  const int markers = mechanics_.marker_count();
+                            std::shared_ptr<const UntouchedCovariance> untouched) {
+  const bool is_touched = untouched != nullptr;
+  covariance_.SetState(skin, inflated);
+  untouched_ =
+      is_touched ? std::move(untouched) : UntouchedCovariance::Make(skin, covariance_, observed, prior);
+  if (!untouched_) return false;
   pressure_sigma_ = prior.sigma_mpa;
   by_pressure_ = prior.sigma_mpa * skin.by_pressure();
-  Eigen::MatrixXd covariance_mm2;
-  covariance_.SetState(skin, inflated);
-  covariance_.WriteDirect(covariance_mm2);
-  baseline_sigma_ = prior.baseline_sigma_mpa;
-  by_baseline_.setZero(by_pressure_.size());
-  if (prior.baseline_mm_per_mpa.size() == by_pressure_.size())
-    by_baseline_ = prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa;
-  AddOuter(by_baseline_, covariance_mm2);
+  const Eigen::MatrixXf of_loads = covariance_.ColumnsOfLoads(skin, local_n),
+                        of_noise = ColumnsOfNoise(observed);
   camera_modes_.Write(observed, camera_modes_mm_);
-  AddOuter(camera_modes_mm_, covariance_mm2);
-  AddOuter(covariance_.bow_mm(), covariance_mm2);
-  const bool is_touched = untouched_stray_mm2 != nullptr;
-  stray_mm2_ = is_touched ? std::move(untouched_stray_mm2)
-                          : std::make_shared<const Eigen::MatrixXf>(covariance_.UntouchedStray(skin));
-  covariance_.AddStray(skin, local_n, *stray_mm2_, covariance_mm2);
-  AddOuter(by_pressure_, covariance_mm2);
-  noise_mm2_.resize(static_cast<size_t>(markers));
-  model_covariance_.resize(noise_mm2_.size());
-  for (int m = 0; m < markers; ++m) {
-    const auto i = static_cast<size_t>(m);
-    auto block = covariance_mm2.block<3, 3>(3 * m, 3 * m);
-    model_covariance_[i] = block.selfadjointView<Eigen::Lower>();
-    // All markers together tell what is alike in all; one by one they would hide a wrong marker in it.
-    const auto modes_mm = camera_modes_mm_.middleRows<3>(3 * m);
-    model_covariance_[i].noalias() -= modes_mm * modes_mm.transpose();
-    const auto bow_mm = covariance_.bow_mm().segment<3>(3 * m);
-    model_covariance_[i].noalias() -= bow_mm * bow_mm.transpose();
-    noise_mm2_[i] = NoiseOf(observed.information[i], kUnseenMm * mechanics_.length_unit());
-    block += noise_mm2_[i];
-  }
-  WriteRegions(covariance_mm2);
-  // In double: a marker that one camera sees has variances that are a million times apart.
-  if (!dense::Cholesky(covariance_mm2)) return false;
-  factor_ = covariance_mm2.cast<float>();
-  WriteCameraCovariances();
-  whitened_pressure_ = covariance_mm2.triangularView<Eigen::Lower>().solve(by_pressure_);
+  Eigen::MatrixXf more(of_loads.rows(), of_loads.cols() + of_noise.cols() + camera_modes_mm_.cols() + 1);
+  more << of_loads, of_noise, camera_modes_mm_.cast<float>(), by_pressure_.cast<float>();
+  model_columns_ = of_loads.cols();
+  if (!whitening_.Set({untouched_, &untouched_->factor}, std::move(more))) return false;
+  model_covariance_.clear();
+  whitened_pressure_ = whitening_.Applied(by_pressure_);
   hidden_.resize(0, 0);
   free_norms_.resize(0);
   limits_.by_site_n.resize(0);
@@ -96,6 +66,28 @@ bool LoadEstimator::Prepare(Linearization& skin, const InflatedSkin& inflated,
   MakeColumns(skin, LikelyLoads(is_touched ? local_n : Eigen::VectorXd()));
   if (!is_touched) skin.DropColumns();
   return columns_.columns().allFinite();
+}
+
+// By marker and by region, of the model's error and the cameras' motion: once for each Prepare, when the
+// first frame comes to its end.
+void LoadEstimator::WriteMarkerCovariances() {
+  if (!model_covariance_.empty()) return;
+  WriteModelCovariances();
+  WriteCameraCovariances();
+  WriteRegions();
+}
+
+// All markers together tell what is alike in all; one by one they would hide a wrong marker in it: without
+// the cameras' motion and the bow.
+void LoadEstimator::WriteModelCovariances() {
+  model_covariance_ = untouched_->marker_mm2;
+  for (size_t m = 0; m < model_covariance_.size(); ++m) {
+    const auto all = whitening_.columns().middleRows<3>(3 * static_cast<Eigen::Index>(m));
+    const auto of_loads = all.leftCols(model_columns_);
+    const auto of_pressure = all.rightCols<1>();
+    model_covariance_[m] +=
+        Mat3((of_loads * of_loads.transpose() + of_pressure * of_pressure.transpose()).cast<double>());
+  }
 }
 
 // Where much presses nearby, and all bands; all, without local forces.
@@ -122,7 +114,7 @@ void LoadEstimator::MakeColumns(Linearization& skin, std::vector<int> loads) {
   }
   skin.MakeColumns(loaded);
   const Eigen::MatrixXf rings = IsBand(loads.back()) ? skin.RingColumns() : Eigen::MatrixXf();
-  Eigen::MatrixXf made = Eigen::MatrixXf::Zero(factor_.rows(), static_cast<Eigen::Index>(loads.size()));
+  Eigen::MatrixXf made = Eigen::MatrixXf::Zero(whitening_.size(), static_cast<Eigen::Index>(loads.size()));
   for (Eigen::Index i = 0; i < made.cols(); ++i) {
     const int load = loads[static_cast<size_t>(i)];
     if (IsBand(load)) {
@@ -133,91 +125,108 @@ void LoadEstimator::MakeColumns(Linearization& skin, std::vector<int> loads) {
       made.col(i) +=
           static_cast<float>(it.value()) * skin.Column(Linearization::kInward, static_cast<int>(it.row()));
   }
-  dense::SolveLower(factor_, made);
+  whitening_.Apply(made);
   columns_.Append(loads, made);
 }
 
 // Of M m with independent m ~ N(0, 1): what all markers leave of it, M (I - M' covariance^-1 M) M'.
 void LoadEstimator::WriteCameraCovariances() {
-  Eigen::MatrixXf whitened = camera_modes_mm_.cast<float>();
-  dense::SolveLower(factor_, whitened);
-  const Eigen::Index modes = camera_modes_mm_.cols();
+  const Eigen::MatrixXd& all_mm = camera_modes_mm_;
+  const Eigen::MatrixXd whitened = whitening_.Applied(all_mm);
   const Eigen::MatrixXd left =
-      Eigen::MatrixXd::Identity(modes, modes) - (whitened.transpose() * whitened).cast<double>();
-  camera_covariance_.resize(noise_mm2_.size());
+      Eigen::MatrixXd::Identity(all_mm.cols(), all_mm.cols()) - whitened.transpose() * whitened;
+  camera_covariance_.resize(model_covariance_.size());
   for (size_t m = 0; m < camera_covariance_.size(); ++m) {
-    const auto modes_mm = camera_modes_mm_.middleRows<3>(3 * static_cast<Eigen::Index>(m));
+    const auto modes_mm = all_mm.middleRows<3>(3 * static_cast<Eigen::Index>(m));
     camera_covariance_[m] = modes_mm * left * modes_mm.transpose();
   }
 }
 
 bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const {
-  if (noise_mm2_.empty() || prior.sigma_mpa > kSameNoise * pressure_sigma_ ||
-      pressure_sigma_ > kSameNoise * prior.sigma_mpa)
+  if (!untouched_ || prior.sigma_mpa > kSameNoise * pressure_sigma_ ||
+      pressure_sigma_ > kSameNoise * prior.sigma_mpa || !untouched_->HasBaseline(prior) ||
+      !untouched_->HidesFew(observed))
     return false;
-  constexpr double kSameMm = 1e-6;
-  const Eigen::VectorXd& baseline = prior.baseline_mm_per_mpa;
-  const bool is_same_baseline = baseline.size() == by_baseline_.size()
-                                    ? (prior.baseline_sigma_mpa * baseline - by_baseline_).isZero(kSameMm)
-                                    : by_baseline_.isZero(kSameMm);
-  if (!is_same_baseline) return false;
-  const double unseen = kUnseenMm * mechanics_.length_unit(), unseen2 = unseen * unseen;
-  constexpr double kMost = kSameNoise * kSameNoise, kNewlySeenShare = 0.02;
+  const double unseen = covariance_.unseen_mm(), unseen2 = unseen * unseen;
+  constexpr double kMost = kSameNoise * kSameNoise;
   int worse = 0;
   for (size_t m = 0; m < noise_mm2_.size(); ++m) {
-    const double then = noise_mm2_[m].trace(), now = NoiseTraceOf(observed.information[m], unseen);
-    if (now > 0.3 * unseen2) continue;  // in a direction at least, which is hidden
-    if (then > 0.3 * unseen2 || now > kMost * then || then > kMost * now) ++worse;
+    double then = noise_mm2_[m].trace(), now = NoiseTraceOf(observed.information[m], unseen);
+    if (now > kUnseenShare * unseen2) {  // in a direction at least, which is hidden: by the others
+      const SeenNoise seen = SeenNoiseOf(observed.information[m], unseen);
+      then = (seen.axes.transpose() * noise_mm2_[m] * seen.axes).trace();
+      now = seen.variances_mm2.sum();
+    }
+    if (now > kMost * then || then > kMost * now) ++worse;
   }
-  return worse <= kNewlySeenShare * static_cast<double>(noise_mm2_.size());
+  return worse <= kOtherNoiseShare * static_cast<double>(noise_mm2_.size());
 }
 
-Eigen::MatrixXd LoadEstimator::Whitened(const Eigen::MatrixXd& columns) const {
-  Eigen::MatrixXf single = columns.cast<float>();
-  dense::SolveLower(factor_, single);
-  return single.cast<double>();
+// Of markers that cameras see worse now than when the untouched skin's covariance was made: the noise that is
+// more, a column for each direction in which they are seen.
+Eigen::MatrixXf LoadEstimator::ColumnsOfNoise(const MarkerObservations& observed) {
+  noise_mm2_ = untouched_->noise_mm2;
+  Eigen::MatrixXf columns(by_pressure_.size(), 0);
+  for (size_t m = 0; m < noise_mm2_.size(); ++m) {
+    const SeenNoise now = SeenNoiseOf(observed.information[m], covariance_.unseen_mm());
+    const Eigen::MatrixXd then_mm2 = now.axes.transpose() * noise_mm2_[m] * now.axes;
+    if ((now.variances_mm2.array() <= kSameNoise * kSameNoise * then_mm2.diagonal().array()).all()) continue;
+    Eigen::MatrixXd more_mm2 = -then_mm2;
+    more_mm2.diagonal() += now.variances_mm2;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> more(more_mm2);
+    const Eigen::MatrixXd root =
+        now.axes * more.eigenvectors() * more.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+    columns.conservativeResize(Eigen::NoChange, columns.cols() + root.cols());
+    columns.rightCols(root.cols()).setZero();
+    columns.block(3 * static_cast<Eigen::Index>(m), columns.cols() - root.cols(), 3, root.cols()) =
+        root.cast<float>();
+    noise_mm2_[m] += root * root.transpose();
+  }
+  return columns;
+}
+
+bool LoadEstimator::AreSame(const std::vector<Direction>& a, const std::vector<Direction>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Direction& one, const Direction& other) {
+    return one.first == other.first && std::abs(one.second.dot(other.second)) > kSameDirection;
+  });
 }
 
 // What was seen when all was prepared and is not seen now is unknown: its unit vectors, whitened, are
 // projected out of data and columns, which is the same as leaving these rows out.
 void LoadEstimator::Hide(const MarkerObservations& observed) {
-  const double unseen = kUnseenMm * mechanics_.length_unit(), unseen2 = unseen * unseen;
+  const double unseen = covariance_.unseen_mm(), unseen2 = unseen * unseen;
   std::vector<Direction>& missing = missing_now_;
   missing.clear();
   is_shown_.assign(static_cast<size_t>(3 * mechanics_.marker_count()), 1);
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const auto i = static_cast<size_t>(m);
     const Mat3& information = observed.information[i];
-    if (IsSurelySeen(information, 1 / (0.3 * unseen2))) continue;
+    if (IsSurelySeen(information, 1 / (kUnseenShare * unseen2))) continue;
     Eigen::SelfAdjointEigenSolver<Mat3> modes;
     if (!information.allFinite() || information.isZero())
       modes.computeDirect(Mat3::Zero());
     else
       modes.computeDirect(information);
     for (int a = 0; a < 3; ++a) {
-      if (modes.eigenvalues()[a] > 1 / (0.3 * unseen2)) continue;
+      if (modes.eigenvalues()[a] > 1 / (kUnseenShare * unseen2)) continue;
       const Vec3 direction = modes.eigenvectors().col(a);
       for (int c = 0; c < 3; ++c) {
         if (std::abs(direction[c]) > 0.3) is_shown_[static_cast<size_t>(3 * m + c)] = 0;
       }
-      if (direction.dot(noise_mm2_[i] * direction) < 0.3 * unseen2) missing.emplace_back(3 * m, direction);
+      if (direction.dot(noise_mm2_[i] * direction) < kUnseenShare * unseen2)
+        missing.emplace_back(3 * m, direction);
     }
   }
   // What a body hides stays hidden while it stands there.
-  const auto is_same = [](const Direction& a, const Direction& b) {
-    return a.first == b.first && std::abs(a.second.dot(b.second)) > kSameDirection;
-  };
-  if (hidden_.rows() == factor_.rows() &&
-      std::equal(missing.begin(), missing.end(), missing_.begin(), missing_.end(), is_same))
-    return;
+  if (hidden_.rows() == whitening_.size() && AreSame(missing, missing_)) return;
   missing_ = missing;
   limits_.by_site_n.resize(0);
   free_norms_.resize(0);
   hidden_projected_ = 0;
-  hidden_.setZero(factor_.rows(), static_cast<Eigen::Index>(missing.size()));
+  hidden_.setZero(whitening_.size(), static_cast<Eigen::Index>(missing.size()));
   for (size_t k = 0; k < missing.size(); ++k)
     hidden_.block<3, 1>(missing[k].first, static_cast<Eigen::Index>(k)) = missing[k].second;
-  hidden_ = Whitened(hidden_);
+  hidden_ = whitening_.Applied(hidden_);
   if (hidden_.cols() > 0) {
     // Orthonormal by Cholesky of its Gram matrix, which is well conditioned.
     Eigen::MatrixXd gram;
@@ -230,7 +239,7 @@ void LoadEstimator::Hide(const MarkerObservations& observed) {
 // Frees data and Gram matrix of what is hidden.
 void LoadEstimator::ProjectOut(const Eigen::MatrixXd& tangential) {
   shares_.setOnes(hidden_.cols() + tangential.cols());
-  basis_.resize(factor_.rows(), shares_.size());
+  basis_.resize(whitening_.size(), shares_.size());
   basis_.leftCols(hidden_.cols()) = hidden_;
   if (tangential.cols() > 0) {
     // A tangential force has a prior, so that its columns shrink and do not vanish.
@@ -318,19 +327,12 @@ void LoadEstimator::SolveSparse(const Eigen::VectorXd& near_n) {
   ShareBands(found_, chosen_);
 }
 
-// Makes columns of loads that would explain much beside those that were found, and of those about them.
-// All loads are priced by one adjoint solution. False: there are none.
+// Makes columns of loads that would explain much of what the fit has left, and of those about them, or of
+// all. Sites are priced by the adjoint solution that the stray forces come from. False: there are none.
 bool LoadEstimator::LetIn(Linearization& skin, bool all) {
-  const int sites = mechanics_.site_count();
-  Eigen::VectorXf explained = Eigen::VectorXf::Zero(factor_.rows());
-  for (size_t i = 0; i < chosen_.size(); ++i)
-    explained += static_cast<float>(found_[static_cast<Eigen::Index>(i)]) * columns_.Column(chosen_[i]);
-  Eigen::MatrixXf rest = (frame_data_ - Free(explained.cast<double>())).cast<float>();
-  dense::SolveLowerTransposed(factor_, rest);
-  const Eigen::VectorXd pulls =
-      mechanics_.spread().transpose() * skin.PulledAtSites(rest.col(0).cast<double>())[0];
   std::vector<std::pair<double, int>> paying;  // standard deviations, site
-  for (int site = 0; site < sites; ++site) {
+  const Eigen::VectorXd pulls = mechanics_.spread().transpose() * inward_pulls_;
+  for (int site = 0; site < mechanics_.site_count(); ++site) {
     const double deviations = pulls[site] / norms_[site];
     if (!columns_.Has(site) && deviations > kLetInNorm) paying.emplace_back(deviations, site);
   }
@@ -338,12 +340,11 @@ bool LoadEstimator::LetIn(Linearization& skin, bool all) {
   std::sort(paying.rbegin(), paying.rend());
   if (paying.size() > kMostLetIn) paying.resize(kMostLetIn);
   std::vector<int> loads;
-  for (int site = 0; site < sites; ++site) {
+  for (int site = 0; site < mechanics_.site_count(); ++site) {
     const auto is_about = [&](const auto& each) { return near_.load_sites(site, each.second) > kAbout; };
     if (all || std::any_of(paying.begin(), paying.end(), is_about)) loads.push_back(site);
   }
   MakeColumns(skin, loads);
-  WriteFrameGram();
   return true;
 }
 
@@ -355,11 +356,8 @@ std::vector<LoadEstimator::Hill> LoadEstimator::Select(Linearization& skin,
   const int sites = mechanics_.site_count(), around = mechanics_.columns();
   const double unit = mechanics_.force_unit();
   Eigen::VectorXd near = Eigen::VectorXd::Zero(sites + mechanics_.site_rows());
-  for (int round = 0;; ++round) {
-    WriteNorms(untouched_norms);
-    SolveSparse(near);
-    if (!is_selected_ || columns_.HasAll() || !LetIn(skin, round >= kMostRounds)) break;
-  }
+  WriteNorms(untouched_norms);
+  SolveSparse(near);
   for (int pass = 0; pass < kReweightings && is_selected_ && !chosen_.empty(); ++pass) {
     near.setZero();
     for (int site = 0; site < sites; ++site) {
@@ -480,27 +478,43 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& chosen,
   return solution;
 }
 
-void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
-                        const Eigen::VectorXd* untouched_norms, LoadEstimate& estimate) {
-  estimate = {};
-  Eigen::VectorXd data = Eigen::VectorXd::Zero(factor_.rows());
+void LoadEstimator::SetData(const Linearization& skin, const MarkerObservations& observed) {
+  Eigen::VectorXd data = Eigen::VectorXd::Zero(whitening_.size());
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const auto i = static_cast<size_t>(m);
     const bool seen = observed.information[i].trace() > 0 && observed.displacement_mm[i].allFinite();
     if (seen) data.segment<3>(3 * m) = observed.displacement_mm[i] - skin.base_mm().segment<3>(3 * m);
   }
-  data_ = Whitened(data);
+  data_ = whitening_.Applied(data);
+}
+
+void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
+                        const Eigen::VectorXd* untouched_norms, LoadEstimate& estimate) {
+  SetData(skin, observed);
   Hide(observed);
-  std::vector<Hill> hills;
-  std::vector<int> slipping;  // hills with a tangential force, in the order of their columns
-  Eigen::MatrixXd tangential(data_.size(), 0);
+  for (int round = 0;; ++round) {
+    estimate = {};
+    estimate.converged = FitColumnsAtHand(skin, untouched_norms);
+    if (!estimate.converged) {
+      fit_.hills.clear();
+      return;
+    }
+    Finish(skin, estimate);
+    if (columns_.HasAll() || !LetIn(skin, round >= kMostRounds)) return;
+  }
+}
+
+// False: a solver did not come to its end.
+bool LoadEstimator::FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd* untouched_norms) {
+  fit_.hills.clear();
+  fit_.slipping.clear();
+  fit_.tangential.resize(data_.size(), 0);
   // With tangential forces in, the selection is made once more with these taken as unknown.
   for (int stage = 0; stage < 2; ++stage) {
-    ProjectOut(tangential);
+    ProjectOut(fit_.tangential);
     const Eigen::VectorXd loads_before = loads_;
     std::vector<Hill> found = Select(skin, untouched_norms);
-    estimate.converged = is_selected_ && found.size() <= kMostHills;
-    if (!estimate.converged) return;
+    if (!is_selected_ || found.size() > kMostHills) return false;
     Eliminate(found);
     JoinHugs(found);
     if (found.empty() && stage > 0) {
@@ -508,19 +522,17 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
       loads_ = loads_before;
       break;
     }
-    hills = std::move(found);
-    if (hills.empty()) {
+    fit_.hills = std::move(found);
+    if (fit_.hills.empty()) {
       solution_ = {.loads = {}, .tangential = {}, .residual = data_, .chi2 = 0, .converged = true};
       if (hidden_.cols() > 0) solution_.residual -= hidden_ * (hidden_.transpose() * data_);
       solution_.chi2 = solution_.residual.squaredNorm();
       break;
     }
-    LetSlip(skin, hills, slipping, tangential, solution_);
-    if (slipping.empty()) break;
+    LetSlip(skin);
+    if (fit_.slipping.empty()) break;
   }
-  estimate.converged = solution_.converged;
-  if (!estimate.converged) return;
-  Finish(skin, hills, slipping, estimate);
+  return solution_.converged;
 }
 
 }  // namespace taclink

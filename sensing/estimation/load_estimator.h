@@ -14,6 +14,8 @@
 #include "sensing/estimation/load_columns.h"
 #include "sensing/estimation/marker_covariance.h"
 #include "sensing/estimation/nonnegative.h"
+#include "sensing/estimation/untouched_covariance.h"
+#include "sensing/estimation/whitening.h"
 
 namespace taclink {
 
@@ -62,14 +64,6 @@ struct LoadEstimate {
   bool converged = true;
 };
 
-/// What is known of the pressure before the skin is looked at.
-struct PressurePrior {
-  double sigma_mpa = 0;
-  double baseline_sigma_mpa = 0;  ///< of the pressure under which the baseline was taken
-  Eigen::VectorXd baseline_mm_per_mpa =
-      {};  ///< what that pressure does to the baseline's markers; empty: nothing
-};
-
 /// The loads that explain the markers, given the linearized skin: non-negative inward loads at all sites with
 /// a sparsity term that fades inside a hill, grouped into hills, those hills that explain little left out,
 /// and a tangential force for each hill that needs one. See estimation.md. One thread.
@@ -80,12 +74,12 @@ class LoadEstimator {
 
   /// What does not change from frame to frame while the linearization, the cameras' noise and the loads'
   /// sizes stay as they are: covariance, whitened columns and their products. `local_n`: force in the
-  /// neighborhood of each site, for the model's errors. `untouched_stray_mm2`: stray_mm2() of the skin
-  /// without loads; columns are then made where loads are likely, and others when they are asked for. Null:
-  /// this is that skin, and all columns are made. False: the covariance has no factor.
+  /// neighborhood of each site, for the model's errors. `untouched`: of the skin without loads; columns are
+  /// then made where loads are likely, and others when they are asked for. Null: this is that skin, and all
+  /// columns are made. False: the covariance has no factor.
   bool Prepare(Linearization& skin, const InflatedSkin& inflated, const MarkerObservations& observed,
                const PressurePrior& prior, const Eigen::VectorXd& local_n,
-               std::shared_ptr<const Eigen::MatrixXf> untouched_stray_mm2);
+               std::shared_ptr<const UntouchedCovariance> untouched);
   /// Whether these observations are nearly as good, everywhere, as those that were prepared for, and count
   /// from the same baseline; what is missing now does not matter.
   bool IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const;
@@ -98,24 +92,29 @@ class LoadEstimator {
   /// Writes these for what was fitted last.
   void Conclude(Linearization& skin, LoadEstimate& estimate);
 
-  /// After Prepare, instead of Fit where there is nothing to fit: which markers are not in sight now.
+  /// After Prepare: which markers are not in sight now.
   void Hide(const MarkerObservations& observed);
+  /// Instead of Fit and Conclude, where there is nothing to fit.
+  void ConcludeUntouched(const MarkerObservations& observed) {
+    Hide(observed);
+    WriteMarkerCovariances();
+  }
   /// Of what the last Fit or Hide was shown, where all columns are made; nothing is allocated as long as that
   /// stays.
   const DetectionLimits& Limits();
   /// Likewise: norms of the loads' whitened columns beside what is hidden.
   const Eigen::VectorXd& FreeNorms();
-  /// The covariance of stray forces where nothing presses, after Prepare. Lower half.
-  const std::shared_ptr<const Eigen::MatrixXf>& stray_mm2() const { return stray_mm2_; }
+  /// After Prepare.
+  const std::shared_ptr<const UntouchedCovariance>& untouched() const { return untouched_; }
 
   /// The frames before.
   void Forget() { chosen_.clear(); }
 
   const MarkerCovariance& covariance() const { return covariance_; }
-  /// Covariance of the model's error at a marker, after Prepare.
-  Mat3 ModelCovariance(int marker) const { return model_covariance_[static_cast<size_t>(marker)]; }
+  /// Covariance of the model's error at a marker, after Conclude.
+  Mat3 ModelCovariance(int marker) const { return model_covariance_.at(static_cast<size_t>(marker)); }
   /// Likewise, of what is not known of the cameras' motion once all markers were seen.
-  Mat3 CameraCovariance(int marker) const { return camera_covariance_[static_cast<size_t>(marker)]; }
+  Mat3 CameraCovariance(int marker) const { return camera_covariance_.at(static_cast<size_t>(marker)); }
 
  private:
   /// Standard deviation of a tangential force that was let in, N in SkinMechanics' units.
@@ -131,14 +130,18 @@ class LoadEstimator {
   static constexpr double kLeastHillN = 0.01;
   /// Of a Gram matrix in single precision.
   static constexpr float kRounding = 1e-6F;
+  using Direction = std::pair<int, Vec3>;  // first row of the marker, unit vector
+  static bool AreSame(const std::vector<Direction>& a, const std::vector<Direction>& b);
   /// Columns of the problem that are one contact: sites or, of a hug, bands.
   using Hill = HillFinder::Hill;
 
+  Eigen::MatrixXf ColumnsOfNoise(const MarkerObservations& observed);
+  void WriteMarkerCovariances();
+  void WriteModelCovariances();
   void WriteCameraCovariances();
-  void WriteRegions(const Eigen::MatrixXd& covariance_mm2);
+  void WriteRegions();
   void MakeColumns(Linearization& skin, std::vector<int> loads);
   std::vector<int> LikelyLoads(const Eigen::VectorXd& local_n) const;
-  Eigen::MatrixXd Whitened(const Eigen::MatrixXd& columns) const;
   /// The sites that a column of the problem loads, and the share of each: one site, or a band's.
   template <typename Visit>
   void ForSites(int column, Visit visit) const {
@@ -164,6 +167,8 @@ class LoadEstimator {
   };
   Explanation Explain(const std::vector<Hill>& hills, size_t without);
 
+  void SetData(const Linearization& skin, const MarkerObservations& observed);
+  bool FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd* untouched_norms);
   struct Solution {
     Eigen::VectorXd loads, tangential, residual;
     double chi2 = 0;
@@ -175,8 +180,7 @@ class LoadEstimator {
   std::vector<Eigen::MatrixXd> TangentialColumns(Linearization& skin, const std::vector<Hill>& hills);
   Eigen::VectorXd TangentialPrior(Eigen::Index columns) const;
   Solution Refit(const std::vector<int>& chosen, const Eigen::MatrixXd& tangential);
-  void LetSlip(Linearization& skin, const std::vector<Hill>& hills, std::vector<int>& slipping,
-               Eigen::MatrixXd& tangential, Solution& solution);
+  void LetSlip(Linearization& skin);
   /// What a hill's tangential force would be, and would explain: chi^2.
   struct TangentialGain {
     double chi2 = 0;
@@ -196,8 +200,7 @@ class LoadEstimator {
   Eigen::MatrixXd ShiftColumns(Linearization& skin, const EstimatedLoad& load) const;
   void MoveCenters(Linearization& skin, LoadEstimate& estimate) const;
   void ProjectOut(const Eigen::MatrixXd& tangential);
-  void Finish(Linearization& skin, const std::vector<Hill>& hills, const std::vector<int>& slipping,
-              LoadEstimate& estimate);
+  void Finish(Linearization& skin, LoadEstimate& estimate);
   void WriteLoad(const Linearization& skin, EstimatedLoad& load) const;
   void WriteCovariances(Linearization& skin, LoadEstimate& estimate);
   void WriteStray(Linearization& skin, LoadEstimate& estimate);
@@ -211,13 +214,14 @@ class LoadEstimator {
   NonNegativeSolver solver_;
 
   // Since Prepare. Whitened: in units of independent standard deviations.
-  std::vector<Mat3> noise_mm2_, model_covariance_, camera_covariance_;
+  std::shared_ptr<const UntouchedCovariance> untouched_;
+  std::vector<Mat3> noise_mm2_;  // by marker
   Eigen::MatrixXd camera_modes_mm_;
-  Eigen::MatrixXf factor_;
-  std::shared_ptr<const Eigen::MatrixXf> stray_mm2_;
-  Eigen::VectorXd by_pressure_, by_baseline_;  // stacked, of one standard deviation
-  Eigen::VectorXd whitened_pressure_;
-  double pressure_sigma_ = 0, baseline_sigma_ = 0;
+  Whitening whitening_;
+  Eigen::Index model_columns_ = 0;                          // of whitening_: that loads add
+  std::vector<Mat3> model_covariance_, camera_covariance_;  // empty: not written since Prepare
+  Eigen::VectorXd by_pressure_, whitened_pressure_;         // stacked, of one standard deviation
+  double pressure_sigma_ = 0;
   LoadColumns columns_;
   struct Region {
     std::vector<int> rows;
@@ -228,7 +232,6 @@ class LoadEstimator {
 
   // Of the frame. Hidden: an orthonormal basis of what the frame does not show, whitened, and of the
   // tangential forces that were let in; data and Gram matrix without it.
-  using Direction = std::pair<int, Vec3>;         // first row of the marker, unit vector
   std::vector<Direction> missing_, missing_now_;  // what hidden_ is of, and what this frame misses
   Eigen::MatrixXd hidden_;
   Eigen::MatrixXd
@@ -246,7 +249,13 @@ class LoadEstimator {
   std::vector<char> is_shown_;       // by row
   DetectionLimits limits_;   // none by site: not known since Prepare, or since other markers are hidden
   std::vector<int> chosen_;  // loads above zero of the last selection
+  struct {
+    std::vector<Hill> hills;
+    std::vector<int> slipping;   // hills with a tangential force, in the order of their columns
+    Eigen::MatrixXd tangential;  // columns of those, whitened, beside what is hidden
+  } fit_;
   Solution solution_;
+  Eigen::VectorXd inward_pulls_;          // by site, of the residual
   Eigen::VectorXd pulls_per_mm_;          // of the residual, on each marker: covariance^-1 times it
   std::vector<TangentialGain> left_out_;  // by hill: of those that were not let in
   std::vector<Eigen::MatrixXd> tangential_columns_;  // by hill

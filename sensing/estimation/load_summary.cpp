@@ -25,8 +25,9 @@ double ModulusShare(const LinkModel& model) {
 
 }  // namespace
 
-void LoadEstimator::Finish(Linearization& skin, const std::vector<Hill>& hills,
-                           const std::vector<int>& slipping, LoadEstimate& estimate) {
+void LoadEstimator::Finish(Linearization& skin, LoadEstimate& estimate) {
+  const std::vector<Hill>& hills = fit_.hills;
+  const std::vector<int>& slipping = fit_.slipping;
   Eigen::Index at = 0;
   hill_of_load_.clear();
   for (size_t i = 0; i < hills.size(); ++i) {
@@ -65,6 +66,7 @@ void LoadEstimator::Finish(Linearization& skin, const std::vector<Hill>& hills,
 }
 
 void LoadEstimator::Conclude(Linearization& skin, LoadEstimate& estimate) {
+  WriteMarkerCovariances();
   WriteCovariances(skin, estimate);
   MoveCenters(skin, estimate);
   Eigen::VectorXd& by_cameras_mm = estimate.by_cameras_mm;
@@ -72,9 +74,8 @@ void LoadEstimator::Conclude(Linearization& skin, LoadEstimate& estimate) {
   by_cameras_mm = camera_modes_mm_ * modes;
   for (const CameraId id : kBothCameras) estimate.by_camera_mm[Index(id)] = camera_modes_.SeenBy(id) * modes;
   estimate.camera_shift_mm = by_cameras_mm.reshaped(3, by_cameras_mm.size() / 3).colwise().norm().maxCoeff();
-  const Eigen::VectorXd& bow_mm = covariance_.bow_mm();
-  estimate.beside_mm = covariance_.Direct(pulls_per_mm_) + by_baseline_.dot(pulls_per_mm_) * by_baseline_ +
-                       bow_mm.dot(pulls_per_mm_) * bow_mm;
+  const Eigen::VectorXd& by_baseline_mm = untouched_->by_baseline_mm;
+  estimate.beside_mm = covariance_.Direct(pulls_per_mm_) + by_baseline_mm.dot(pulls_per_mm_) * by_baseline_mm;
   estimate.chi2_per_dof =
       solution_.residual.squaredNorm() /
       std::max<double>(1, static_cast<double>(std::count(is_shown_.begin(), is_shown_.end(), 1)));
@@ -104,10 +105,9 @@ void LoadEstimator::WriteLoad(const Linearization& skin, EstimatedLoad& load) co
 }
 
 void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
-  Eigen::MatrixXf pulls = solution_.residual.cast<float>();
-  dense::SolveLowerTransposed(factor_, pulls);
-  pulls_per_mm_ = pulls.col(0).cast<double>();
+  pulls_per_mm_ = whitening_.Transposed(solution_.residual);
   const std::array<Eigen::VectorXd, 3> pulled = skin.PulledAtSites(pulls_per_mm_);
+  inward_pulls_ = pulled[0];
   std::array<Eigen::VectorXd, 3> contacts;
   std::array<Eigen::VectorXd, 2> couples;
   for (auto& part : contacts) part.setZero(mechanics_.site_count());
@@ -131,7 +131,8 @@ void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
   }
   estimate.pressure_error_mpa = pressure_sigma_ * by_pressure_.dot(pulls_per_mm_);
   // Displacements count from the baseline, so that what is missing in it shows with the other sign.
-  estimate.baseline_error_mpa = -baseline_sigma_ * by_baseline_.dot(pulls_per_mm_);
+  estimate.baseline_error_mpa =
+      -untouched_->baseline_sigma_mpa * untouched_->by_baseline_mm.dot(pulls_per_mm_);
 }
 
 // Of three columns a contact for its force, two for its place, and the pressure's: the posterior of those
@@ -182,11 +183,10 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
     prior.segment<2>(5 * i + 1).setConstant(1 / (sigma * sigma));
     prior.segment<2>(5 * i + 3).setConstant(0.04);  // five sites
   }
-  // The pressure is in the covariance already: its column is that of the prior, its information the data's.
-  Eigen::VectorXd pressure = whitened_pressure_;
-  if (hidden_.cols() > 0) pressure -= hidden_ * (hidden_.transpose() * pressure);
-  const double told = pressure.squaredNorm();
-  estimate.pressure_sigma_mpa = pressure_sigma_ * std::sqrt(std::max(0.0, 1 - told));
+  // The pressure's is the whitening's last column; what is hidden does not tell of it.
+  double left = whitening_.LastPosterior();
+  if (hidden_.cols() > 0) left += (hidden_.transpose() * whitened_pressure_).squaredNorm();
+  estimate.pressure_sigma_mpa = pressure_sigma_ * std::sqrt(left);
   if (count == 0) return;
   Eigen::MatrixXd information = design.leftCols(5 * count).transpose() * design.leftCols(5 * count);
   information.diagonal() += prior.head(5 * count);
@@ -222,7 +222,11 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
 
 // Factors of the covariance of 3 x 3 markers each.
 // The cameras' motion is all markers' together: a region must not have one of its own.
-void LoadEstimator::WriteRegions(const Eigen::MatrixXd& covariance_mm2) {
+void LoadEstimator::WriteRegions() {
+  Eigen::MatrixXf covariance_mm2 = untouched_->covariance_mm2;  // lower half
+  const Eigen::MatrixXf& all = whitening_.columns();
+  dense::AddOuter(all.leftCols(all.cols() - 1 - camera_modes_mm_.cols()), covariance_mm2);
+  dense::AddOuter(all.rightCols<1>(), covariance_mm2);
   const LinkModel& model = mechanics_.model();
   const int paths = model.markers.paths, rings = model.markers.rings();
   regions_.clear();
@@ -237,10 +241,7 @@ void LoadEstimator::WriteRegions(const Eigen::MatrixXd& covariance_mm2) {
       }
     }
     std::sort(region.rows.begin(), region.rows.end());
-    const Eigen::MatrixXd modes_mm = camera_modes_mm_(region.rows, Eigen::all);
-    Eigen::MatrixXf own_mm2 = covariance_mm2(region.rows, region.rows).cast<float>();  // lower half
-    own_mm2 -= (modes_mm * modes_mm.transpose()).cast<float>();
-    region.factor.compute(own_mm2);
+    region.factor.compute(Eigen::MatrixXf(covariance_mm2(region.rows, region.rows)));
     regions_.push_back(std::move(region));
   }
 }
@@ -248,8 +249,7 @@ void LoadEstimator::WriteRegions(const Eigen::MatrixXd& covariance_mm2) {
 // Mahalanobis' distance of the residual over 3 x 3 markers, per number, the largest; of regions that are
 // mostly seen.
 double LoadEstimator::WorstRegion(const Eigen::VectorXd& by_cameras_mm) {
-  Eigen::VectorXf left_mm = factor_.triangularView<Eigen::Lower>() * solution_.residual.cast<float>();
-  left_mm -= by_cameras_mm.cast<float>();
+  const Eigen::VectorXf left_mm = (whitening_.Covariance(pulls_per_mm_) - by_cameras_mm).cast<float>();
   double worst = 0;
   for (const Region& region : regions_) {
     int shown = 0;

@@ -19,6 +19,7 @@ constexpr double kStrayN = 1e-3, kNormalShare = 0.01, kTangentialShare = 0.003;
 // Of the stray forces where nothing presses: so little more of them that it is left out, four percent of
 // the variance.
 constexpr double kNegligibleStray = 0.2;
+constexpr double kNegligibleMotion = 0.25;  // of the floor: an error by motion that is left out
 
 }  // namespace
 
@@ -49,7 +50,7 @@ void MarkerCovariance::SetState(const Linearization& skin, const InflatedSkin& i
   grown_mm_ = kByInflation * grown_mm_.cwiseMax(kLeastInflation * grown_mm_.maxCoeff());
 }
 
-void MarkerCovariance::WriteDirect(Eigen::MatrixXd& covariance_mm2) const {
+void MarkerCovariance::WriteUntouched(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const {
   const int markers = mechanics_.marker_count();
   const double floor_mm = kFloorMm * mechanics_.length_unit();
   covariance_mm2.setZero(3 * markers, 3 * markers);
@@ -57,13 +58,14 @@ void MarkerCovariance::WriteDirect(Eigen::MatrixXd& covariance_mm2) const {
     const Vec2 out_j = outward_.col(j);
     for (int i = j; i < markers; ++i) {
       const double growth = grown_mm_[i] * grown_mm_[j] * near_.growth_alike(i, j);
-      Mat3 block = moved_mm_[i] * moved_mm_[j] * near_.motion_alike(i, j) * Mat3::Identity();
-      block.topLeftCorner<2, 2>() += growth * outward_.col(i) * out_j.transpose();
-      block(2, 2) += kAxialShare * kAxialShare * growth;
+      auto block = covariance_mm2.block<3, 3>(3 * i, 3 * j);
+      block.topLeftCorner<2, 2>() = growth * outward_.col(i) * out_j.transpose();
+      block(2, 2) = kAxialShare * kAxialShare * growth;
       if (i == j) block.diagonal().array() += floor_mm * floor_mm;
-      covariance_mm2.block<3, 3>(3 * i, 3 * j) = block;
     }
   }
+  covariance_mm2.selfadjointView<Eigen::Lower>().rankUpdate(bow_mm_);
+  AddUntouchedStray(skin, covariance_mm2);
 }
 
 Eigen::VectorXd MarkerCovariance::Direct(const Eigen::VectorXd& pulls_per_mm) const {
@@ -79,7 +81,7 @@ Eigen::VectorXd MarkerCovariance::Direct(const Eigen::VectorXd& pulls_per_mm) co
   grown = ((grown * grown_mm_.asDiagonal()) * near_.growth_alike * grown_mm_.asDiagonal()).eval();
   moved.topRows<2>() += outward_ * grown.row(0).asDiagonal();
   moved.row(2) += kAxialShare * kAxialShare * grown.row(1);
-  return moved.reshaped();
+  return moved.reshaped() + bow_mm_.dot(pulls_per_mm) * bow_mm_;
 }
 
 std::vector<MarkerCovariance::Stray> MarkerCovariance::Strays(const Eigen::VectorXd& local_n) const {
@@ -98,23 +100,43 @@ std::vector<MarkerCovariance::Stray> MarkerCovariance::Strays(const Eigen::Vecto
   return strays;
 }
 
-Eigen::MatrixXf MarkerCovariance::UntouchedStray(Linearization& skin) const {
+void MarkerCovariance::AddUntouchedStray(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const {
   std::vector<int> sites(static_cast<size_t>(mechanics_.site_count()));
   std::iota(sites.begin(), sites.end(), 0);
   skin.MakeColumns(sites);
   const std::vector<Stray> strays = Strays(Eigen::VectorXd::Zero(mechanics_.site_count()));
-  const Eigen::Index rows = bow_mm_.size();
-  Eigen::MatrixXf scaled(rows, static_cast<Eigen::Index>(strays.size()));
+  Eigen::MatrixXf scaled(bow_mm_.size(), static_cast<Eigen::Index>(strays.size()));
   Eigen::Index used = 0;
   for (const Stray& stray : strays)
     scaled.col(used++) = static_cast<float>(stray.untouched_n) * skin.Column(stray.direction, stray.site);
-  Eigen::MatrixXf covariance_mm2 = Eigen::MatrixXf::Zero(rows, rows);
-  dense::AddOuter(scaled, covariance_mm2);
-  return covariance_mm2;
+  Eigen::MatrixXf stray_mm2 = Eigen::MatrixXf::Zero(bow_mm_.size(), bow_mm_.size());
+  dense::AddOuter(scaled, stray_mm2);
+  covariance_mm2.triangularView<Eigen::Lower>() += stray_mm2.cast<double>();
 }
 
-void MarkerCovariance::AddStray(Linearization& skin, const Eigen::VectorXd& local_n,
-                                const Eigen::MatrixXf& untouched_mm2, Eigen::MatrixXd& covariance_mm2) {
+// Of the markers' covariance in one direction, by Cholesky with pivots: the largest variance that is left
+// first, until what is left is little beside the floor. Markers move alike over a kernel's width, so that a
+// dent needs few columns.
+Eigen::MatrixXd MarkerCovariance::MotionColumns() const {
+  const double least_mm = kNegligibleMotion * kFloorMm * mechanics_.length_unit();
+  const Eigen::Index markers = moved_mm_.size();
+  Eigen::VectorXd left_mm2 = near_.motion_alike.diagonal().cwiseProduct(moved_mm_.cwiseAbs2());
+  Eigen::MatrixXd columns(markers, 0);
+  while (columns.cols() < markers) {
+    Eigen::Index pivot = 0;
+    const double largest_mm2 = left_mm2.maxCoeff(&pivot);
+    if (!(largest_mm2 > least_mm * least_mm)) break;
+    Eigen::VectorXd column = moved_mm_[pivot] * near_.motion_alike.col(pivot).cwiseProduct(moved_mm_);
+    column -= columns * columns.row(pivot).transpose();
+    column /= std::sqrt(largest_mm2);
+    left_mm2 -= column.cwiseAbs2();
+    columns.conservativeResize(Eigen::NoChange, columns.cols() + 1);
+    columns.rightCols<1>() = column;
+  }
+  return columns;
+}
+
+Eigen::MatrixXf MarkerCovariance::ColumnsOfLoads(Linearization& skin, const Eigen::VectorXd& local_n) {
   for (auto& sigmas : stray_n_) sigmas.setZero(mechanics_.site_count());
   std::vector<Stray> strays = Strays(local_n);
   for (const Stray& stray : strays)
@@ -124,13 +146,16 @@ void MarkerCovariance::AddStray(Linearization& skin, const Eigen::VectorXd& loca
   std::vector<int> sites;
   for (const Stray& stray : strays) sites.push_back(stray.site);
   skin.MakeColumns(sites);
-  Eigen::MatrixXf stray_mm2 = untouched_mm2;
-  Eigen::MatrixXf scaled(covariance_mm2.rows(), static_cast<Eigen::Index>(strays.size()));
-  Eigen::Index used = 0;
+  const Eigen::MatrixXf motion = MotionColumns().cast<float>();
+  const Eigen::Index directions = 3 * motion.cols();
+  Eigen::MatrixXf columns(bow_mm_.size(), directions + static_cast<Eigen::Index>(strays.size()));
+  columns.leftCols(directions).setZero();
+  for (Eigen::Index k = 0; k < directions; ++k)
+    columns.col(k)(Eigen::seq(k % 3, Eigen::last, 3)) = motion.col(k / 3);
+  Eigen::Index used = directions;
   for (const Stray& stray : strays)
-    scaled.col(used++) = static_cast<float>(stray.local_n) * skin.Column(stray.direction, stray.site);
-  dense::AddOuter(scaled, stray_mm2);
-  covariance_mm2.triangularView<Eigen::Lower>() += stray_mm2.cast<double>();
+    columns.col(used++) = static_cast<float>(stray.local_n) * skin.Column(stray.direction, stray.site);
+  return columns;
 }
 
 // Most sites bear nothing.

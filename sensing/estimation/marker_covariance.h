@@ -22,22 +22,23 @@ class MarkerCovariance {
 
   /// Where the skin is, by which the errors of displacements that no force explains go.
   void SetState(const Linearization& skin, const InflatedSkin& inflated);
-  /// Of these displacements: a floor, and shares of the motion and of the inflation. Lower half, stacked
-  /// markers.
-  void WriteDirect(Eigen::MatrixXd& covariance_mm2) const;
-  /// The product of the same covariance and forces on the markers, 1/mm; stacked, mm.
+  /// Without loads: a floor, a share of the inflation, the bow and stray forces where nothing presses: inward
+  /// at each site, around and along at a quarter of them each, which stand for four. Lower half, stacked
+  /// markers. Makes all columns.
+  void WriteUntouched(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const;
+  /// What loads add, one column for each independent error of unit variance: a share of the motion, and the
+  /// stray forces that are more where something presses. `local_n`: force in the neighborhood of each site.
+  /// Sets the stray forces' standard deviations. Makes the columns of the sites where more is.
+  Eigen::MatrixXf ColumnsOfLoads(Linearization& skin, const Eigen::VectorXd& local_n);
+  /// The product of the covariance that no force explains (floor, motion, inflation and bow) and forces on
+  /// the markers, 1/mm; stacked, mm.
   Eigen::VectorXd Direct(const Eigen::VectorXd& pulls_per_mm) const;
-  /// Of stray forces where nothing presses: inward at each site, around and along at a quarter of them each,
-  /// which stand for four. Lower half. Makes all columns.
-  Eigen::MatrixXf UntouchedStray(Linearization& skin) const;
-  /// Adds that of stray forces: `untouched_mm2` and what is more of them where something presses. `local_n`:
-  /// force in the neighborhood of each site. Sets the stray forces' standard deviations by direction and
-  /// site, 0 where there is none. Makes the columns of the sites where more is.
-  void AddStray(Linearization& skin, const Eigen::VectorXd& local_n, const Eigen::MatrixXf& untouched_mm2,
-                Eigen::MatrixXd& covariance_mm2);
   /// Stacked markers, of one standard deviation: a bow of z along the link, of lenses and of a shell that is
   /// no solid, which cameras at both ends know worst in the middle.
   const Eigen::VectorXd& bow_mm() const { return bow_mm_; }
+  /// Standard deviation of a direction in which a marker is not seen.
+  double unseen_mm() const { return kUnseenMm * mechanics_.length_unit(); }
+  /// Of the stray forces, by direction and site; 0 where there is none.
   const std::array<Eigen::VectorXd, 3>& stray_sigmas_n() const { return stray_n_; }
 
   /// Forces on sites, or on markers, smoothed over the neighborhood in which they count as local.
@@ -54,6 +55,10 @@ class MarkerCovariance {
     double untouched_n = 0, local_n = 0;
   };
   std::vector<Stray> Strays(const Eigen::VectorXd& local_n) const;
+  void AddUntouchedStray(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const;
+  Eigen::MatrixXd MotionColumns() const;
+
+  static constexpr double kUnseenMm = 30;  // in SkinMechanics' units
 
   const SkinMechanics& mechanics_;
   const Neighborhoods& near_;

@@ -8,7 +8,7 @@ namespace taclink {
 namespace {
 
 // Found on three-dimensional solids (docs/calculix.md); in SkinMechanics' units of length.
-constexpr double kMotionLengthMm = 20, kCommonShare = 0.8;
+constexpr double kMotionLengthMm = 20, kMotionShare = 0.8;
 constexpr double kSpreadMm = 12;
 constexpr double kInflationLengthMm = 15;
 constexpr double kLocalMm = 15;
@@ -44,8 +44,7 @@ Neighborhoods::Neighborhoods(const SkinMechanics& mechanics) {
     return off * off;
   };
   motion_near = Bells(markers, kSpreadMm * unit, of_markers);
-  motion_alike = kCommonShare * Bells(markers, kMotionLengthMm * unit, of_markers);
-  motion_alike.diagonal().setOnes();
+  motion_alike = kMotionShare * Bells(markers, kMotionLengthMm * unit, of_markers);
   growth_alike = Bells(markers, kInflationLengthMm * unit, along);
   local_sites = Bells(sites, kLocalMm * unit, of_sites);
   load_sites = Bells(sites, kHillMm * unit, of_sites);

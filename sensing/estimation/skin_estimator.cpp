@@ -71,11 +71,13 @@ void SkinEstimator::Restart() {
   maker_->spare()->Forget();
 }
 void SkinEstimator::BeginAgain() {
+  solved_.reset();
   past_ = past_before_;
   is_same_frame_ = true;
 }
 void SkinEstimator::Forget() {
   past_.has_last = past_.has_next = false;
+  solved_.reset();
 }
 const Linearization& SkinEstimator::linearization() const {
   return used_->skin;
@@ -106,7 +108,7 @@ bool SkinEstimator::Remake(Tangent& tangent, const SkinProblem& problem, const S
                            const Eigen::VectorXd& local_n, SkinEstimate& estimate) {
   ++estimate.tangents;
   const bool is_touched = &tangent != still_.get();
-  return tangent.Make(problem, state, local_n, is_touched ? still_->loads.stray_mm2() : nullptr);
+  return tangent.Make(problem, state, local_n, is_touched ? still_->loads.untouched() : nullptr);
 }
 
 // The touched skin's next tangent, if one made ahead is due and is better than the one at hand. It is due
@@ -144,15 +146,21 @@ void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& es
     return tangent.IsGoodFor(problem, ahead_) && tangent.HasLocal(ahead_n);
   };
   if (is_good(*touched_) || is_good(*maker_->spare())) return;
-  maker_->Begin(problem, ahead_, ahead_n, still_->loads.stray_mm2());
+  maker_->Begin(problem, ahead_, ahead_n, still_->loads.untouched());
   frames_since_begun_ = 1;
 }
 
 bool SkinEstimator::StepOnce(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate,
                              double& step_mm) {
+  return tangent.skin.Rebase(estimate.state, problem.pressure_mpa) &&
+         Step(tangent, problem, estimate, step_mm);
+}
+
+// From where the tangent was rebased last.
+bool SkinEstimator::Step(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate,
+                         double& step_mm) {
   used_ = &tangent;
   ++estimate.steps;
-  if (!tangent.skin.Rebase(estimate.state, problem.pressure_mpa)) return false;
   tangent.loads.Fit(tangent.skin, problem.observed,
                     &tangent == still_.get() ? nullptr : &still_->loads.FreeNorms(), estimate.loads);
   if (!estimate.loads.converged) return false;
@@ -230,6 +238,7 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
       return true;
     }
   }
+  is_settled_ = false;
   if (step_mm < kNearlySettledMm * unit) return true;
   // A skin that would buckle where a body hides it need not settle there.
   if (is_seen_settled) estimate.unsettled_mm = step_mm;
@@ -266,8 +275,10 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   if (IsStill(observation, *inflated, prior, estimate)) return;
 
   estimate.failure = EstimateFailure::kNotConverged;
+  const bool may_stand = is_new_frame && IsStanding(observation, *inflated, prior);
   SkinProblem problem = MakeProblem(observation, *inflated, std::move(prior), estimate.baseline_mm);
-  const bool is_solved = SolveWithoutIsolated(problem, estimate);
+  const bool stands = may_stand && SolveStanding(problem, estimate);
+  const bool is_solved = stands || SolveWithoutIsolated(problem, estimate);
   if (!is_solved) {
     Forget();
     estimate.state = start_;
@@ -299,6 +310,11 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   past_.last = estimate.state;
   past_.has_last = true;
   past_.local_n = local_n;
+  if (stands) return;
+  solved_.reset();
+  if (!is_settled_) return;
+  solved_ = Solved{observation, problem.pressure_mpa, estimate.model};
+  solved_->observation.markers.information = problem.observed.information;
 }
 
 SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
@@ -315,7 +331,8 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
 // What the touched skin's tangents take from the skin without loads. One from 2 mm of inflation away would do
 // for the covariance, but not for the norms: weak loads were missed.
 bool SkinEstimator::PrepareUntouched(const SkinProblem& problem) {
-  const bool is_good = still_->IsGoodFor(problem, problem.inflated.state);
+  const bool is_good = still_->is_prepared && still_->IsNear(problem.inflated.state) &&
+                       still_->loads.untouched()->IsGoodFor(problem.observed, problem.prior);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
   if (!is_good && !still_->Make(problem, problem.inflated.state, none, nullptr)) return false;
   still_->loads.Hide(problem.observed);
@@ -326,6 +343,7 @@ bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   estimate.loads = {};
   estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
   estimate.unsettled_mm = 0;
+  is_settled_ = true;
   start_ = problem.inflated.state;
   const bool is_small = IsFirstOrder() || FurthestOff(problem.inflated.state, problem.observed) <
                                               2 * kStillReachMm * mechanics_.length_unit();

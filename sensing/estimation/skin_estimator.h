@@ -98,7 +98,11 @@ class SkinEstimator {
 
   bool IsStill(const SkinObservation& observation, const InflatedSkin& inflated, const PressurePrior& prior,
                SkinEstimate& estimate);
+  bool AddIfNoise(int marker, const Vec3& error, const Mat3& information);
   bool AreNeighborsStill() const;
+  bool IsStanding(const SkinObservation& observation, const InflatedSkin& inflated,
+                  const PressurePrior& prior);
+  bool SolveStanding(const SkinProblem& problem, SkinEstimate& estimate);
   double FurthestOff(const ShellState& state, const MarkerObservations& observed);
   double SeenMotion(const ShellState& state, const MarkerObservations& observed);
   bool Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n);
@@ -107,6 +111,7 @@ class SkinEstimator {
   void TakeNext(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n);
   void MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate, const Eigen::VectorXd& local_n);
   bool StepOnce(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate, double& step_mm);
+  bool Step(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate, double& step_mm);
   bool SolveSmall(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate);
   bool SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
   SkinProblem MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
@@ -135,9 +140,19 @@ class SkinEstimator {
     Eigen::VectorXd local_n;  // of `last`
   };
   Past past_, past_before_;  // past_before_: when the frame began
+  // The last frame whose contacts were looked for, to a settled end. None since Forget.
+  struct Solved {
+    SkinObservation observation;  // without the markers that were left out
+    double pressure_mpa = 0;
+    ForceModel model = ForceModel::kNonlinear;
+  };
+  std::optional<Solved> solved_;
+  bool is_settled_ = false;  // of the last Solve
   bool is_same_frame_ = false;
   Eigen::VectorXd markers_mm_, markers_before_mm_;
   Eigen::VectorXd radial_pull_, radial_weight_;  // of the frame in work
+  double noise_chi2_ = 0;                        // likewise
+  int noise_markers_ = 0;
 };
 
 }  // namespace taclink

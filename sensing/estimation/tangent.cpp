@@ -41,7 +41,7 @@ bool Tangent::IsGoodFor(const SkinProblem& problem, const ShellState& state) con
 }
 
 bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local,
-                   const std::shared_ptr<const Eigen::MatrixXf>& untouched) {
+                   const std::shared_ptr<const UntouchedCovariance>& untouched) {
   const bool is_kept = is_prepared && IsNear(state);
   local_n = local;
   // The model's errors are those at `state`, whichever state the last step was from.

@@ -32,9 +32,9 @@ struct Tangent {
   /// Both, and the cameras see as much.
   bool IsGoodFor(const SkinProblem& problem, const ShellState& state) const;
   /// What is near keeps its columns: only what the loads are weighed with is made again.
-  /// `untouched`: LoadEstimator::stray_mm2 of the skin without loads; null: this is that skin's tangent.
+  /// `untouched`: of the skin without loads; null: this is that skin's tangent.
   bool Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local,
-            const std::shared_ptr<const Eigen::MatrixXf>& untouched);
+            const std::shared_ptr<const UntouchedCovariance>& untouched);
   void Forget();
 
   const double reach_mm, force_unit;

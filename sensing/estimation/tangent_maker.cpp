@@ -22,7 +22,7 @@ TangentMaker::~TangentMaker() {
 }
 
 void TangentMaker::Begin(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n,
-                         std::shared_ptr<const Eigen::MatrixXf> untouched) {
+                         std::shared_ptr<const UntouchedCovariance> untouched) {
   problem_ = problem;
   state_ = state;
   local_n_ = local_n;

@@ -25,7 +25,7 @@ class TangentMaker {
   bool is_begun() const { return work_ != nullptr; }
   /// With copies of these. The one before must be finished.
   void Begin(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n,
-             std::shared_ptr<const Eigen::MatrixXf> untouched);
+             std::shared_ptr<const UntouchedCovariance> untouched);
   /// Waits for the background or, if that has not come to it, makes the tangent here.
   void Finish();
   /// What was made last, to be looked at and exchanged.
@@ -41,7 +41,7 @@ class TangentMaker {
   SkinProblem problem_;
   ShellState state_;
   Eigen::VectorXd local_n_;
-  std::shared_ptr<const Eigen::MatrixXf> untouched_;
+  std::shared_ptr<const UntouchedCovariance> untouched_;
   // Shared with the job: one that comes after Finish has taken its work finds neither this nor more to do.
   std::shared_ptr<Work> work_;
 };

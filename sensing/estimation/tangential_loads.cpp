@@ -39,7 +39,7 @@ std::vector<Eigen::MatrixXd> LoadEstimator::TangentialColumns(Linearization& ski
   MakeColumnsWhere(skin, spreads);
   std::vector<Eigen::MatrixXd> all;
   for (const Eigen::VectorXd& spread : spreads) {
-    Eigen::MatrixXf single = Eigen::MatrixXf::Zero(factor_.rows(), kTangential);
+    Eigen::MatrixXf single = Eigen::MatrixXf::Zero(whitening_.size(), kTangential);
     single.rightCols<2>() = skin.CoupleColumns(spread);
     for (int site = 0; site < mechanics_.site_count(); ++site) {
       if (spread[site] == 0) continue;
@@ -47,7 +47,7 @@ std::vector<Eigen::MatrixXd> LoadEstimator::TangentialColumns(Linearization& ski
       single.col(0) += share * skin.Column(Linearization::kAround, site);
       single.col(1) += share * skin.Column(Linearization::kAlong, site);
     }
-    dense::SolveLower(factor_, single);
+    whitening_.Apply(single);
     Eigen::MatrixXd columns = single.cast<double>();
     if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
     all.push_back(std::move(columns));
@@ -113,31 +113,30 @@ std::vector<LoadEstimator::TangentialGain> LoadEstimator::TangentialGains(
 
 // One after the other, the hill first whose tangential force explains most; none that explains little: what a
 // shell gets wrong of a solid looks like a tangential force of the normal one's size.
-void LoadEstimator::LetSlip(Linearization& skin, const std::vector<Hill>& hills, std::vector<int>& slipping,
-                            Eigen::MatrixXd& tangential, Solution& solution) {
-  std::vector<int> sites;
-  for (const auto& hill : hills) sites.insert(sites.end(), hill.begin(), hill.end());
-  slipping.clear();
-  tangential.resize(data_.size(), 0);
-  solution = Refit(sites, tangential);
+void LoadEstimator::LetSlip(Linearization& skin) {
+  const std::vector<Hill>& hills = fit_.hills;
+  const std::vector<int> sites = HillFinder::AllOf(hills);
+  fit_.slipping.clear();
+  fit_.tangential.resize(data_.size(), 0);
+  solution_ = Refit(sites, fit_.tangential);
   std::vector<Eigen::MatrixXd>& columns = tangential_columns_;
   columns = TangentialColumns(skin, hills);
   left_out_.assign(hills.size(), {});
-  while (slipping.size() < hills.size()) {
-    left_out_ = TangentialGains(sites, columns, tangential, solution);
-    for (const int hill : slipping) left_out_[static_cast<size_t>(hill)] = {};
+  while (fit_.slipping.size() < hills.size()) {
+    left_out_ = TangentialGains(sites, columns, fit_.tangential, solution_);
+    for (const int hill : fit_.slipping) left_out_[static_cast<size_t>(hill)] = {};
     const auto best = std::max_element(left_out_.begin(), left_out_.end(),
                                        [](const auto& a, const auto& b) { return a.chi2 < b.chi2; }) -
                       left_out_.begin();
     if (!(left_out_[static_cast<size_t>(best)].chi2 > kTangentialGain)) return;
-    Eigen::MatrixXd more(data_.size(), tangential.cols() + kTangential);
-    more << tangential, columns[static_cast<size_t>(best)];
+    Eigen::MatrixXd more(data_.size(), fit_.tangential.cols() + kTangential);
+    more << fit_.tangential, columns[static_cast<size_t>(best)];
     Solution with = Refit(sites, more);
-    if (!(solution.chi2 - with.chi2 > kTangentialGain)) return;
-    slipping.push_back(static_cast<int>(best));
+    if (!(solution_.chi2 - with.chi2 > kTangentialGain)) return;
+    fit_.slipping.push_back(static_cast<int>(best));
     left_out_[static_cast<size_t>(best)] = {};
-    tangential = std::move(more);
-    solution = std::move(with);
+    fit_.tangential = std::move(more);
+    solution_ = std::move(with);
   }
 }
 
@@ -166,7 +165,7 @@ Eigen::MatrixXd LoadEstimator::ShiftColumns(Linearization& skin, const Estimated
       shift.col(axis) += spread[site] * by_force.cast<double>();
     }
   }
-  shift = Whitened(shift);
+  shift = whitening_.Applied(shift);
   if (hidden_.cols() > 0) shift -= hidden_ * (hidden_.transpose() * shift);
   return shift;
 }

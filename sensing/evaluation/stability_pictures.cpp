@@ -92,7 +92,7 @@ class PictureRun {
 
   void Play(SimulatedSkin& simulated) {
     const StereoRig rig = MountedRig(skin_.model.nominal_rig, scene_.camera);
-    const Renderer renderer(skin_.model, rig, scene_.camera, scene_.seed);
+    Renderer renderer(skin_.model, rig, scene_.camera, scene_.seed);
     StereoFrame pictures;
     cv::Mat gray;
     VisionResult result;

@@ -41,7 +41,7 @@ Result<SceneOutcome> Play(const Link& link, const EvaluationScene& scene, const 
   auto skin = LinearSkin::Make(model, scene.scene, link.shell);
   if (!skin) return skin.error();
   const StereoRig rig = MountedRig(model.nominal_rig, scene.scene.camera);
-  const Renderer renderer(model, rig, scene.scene.camera, scene.scene.seed);
+  Renderer renderer(model, rig, scene.scene.camera, scene.scene.seed);
   auto& methods = pool[model.name];
   std::vector<VisionScorer> scorers;
   for (size_t i = 0; i < options.methods.size(); ++i) {

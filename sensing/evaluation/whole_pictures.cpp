@@ -77,7 +77,7 @@ WholePictures::WholePictures(const LinkModel& model, const WholeScene& whole, Si
       renderer_(MakeRenderer(model, whole, whole.scene.camera)),
       moved_(MakeRenderer(model, whole, Moved(whole))) {}
 
-void WholePictures::Draw(const Renderer& renderer, int frame, const SkinTruth& truth, CameraId id) {
+void WholePictures::Draw(Renderer& renderer, int frame, const SkinTruth& truth, CameraId id) {
   cv::Mat& gray = gray_[Index(id)];
   SkinTruth seen = truth;
   seen.frame = static_cast<uint64_t>(frame);  // which picks the noise: a late picture has its own

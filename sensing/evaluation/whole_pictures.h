@@ -24,7 +24,7 @@ class WholePictures {
   void Take(int frame, StereoFrame& pictures, SkinTruth& truth);
 
  private:
-  void Draw(const Renderer& renderer, int frame, const SkinTruth& truth, CameraId id);
+  void Draw(Renderer& renderer, int frame, const SkinTruth& truth, CameraId id);
   void Spoil(int frame, CameraId id, cv::Mat& gray);
 
   const WholeScene& whole_;

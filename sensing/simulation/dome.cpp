@@ -41,6 +41,22 @@ bool Look(const Projector& camera, const Dome& dome, DomeSight& sight) {
   return std::abs(sight.px_from_mm.determinant()) > 1e-9;
 }
 
+double HalfWidth(double blur_px) {
+  return kSmoothstepHalfWidth * std::sqrt(blur_px * blur_px + kPixelVariance);
+}
+
+cv::Rect PlaceOf(const DomeSight& sight, double radius_mm, double half_width, cv::Size size) {
+  const Vec2 extent = radius_mm * sight.px_from_mm.rowwise().norm() + Vec2::Constant(half_width + 1);
+  if (!extent.allFinite() || !sight.foot_px.allFinite()) return {};
+  const auto clip = [](double v, int most) {
+    return static_cast<int>(std::clamp(std::ceil(v), 0.0, static_cast<double>(most)));
+  };
+  const cv::Point from(clip(sight.foot_px.x() - extent.x(), size.width),
+                       clip(sight.foot_px.y() - extent.y(), size.height)),
+      to(clip(sight.foot_px.x() + extent.x(), size.width), clip(sight.foot_px.y() + extent.y(), size.height));
+  return {from, to};
+}
+
 }  // namespace
 
 std::optional<Vec2> SilhouetteCentroid(const Projector& camera, const Dome& dome) {
@@ -50,19 +66,18 @@ std::optional<Vec2> SilhouetteCentroid(const Projector& camera, const Dome& dome
   return sight.foot_px - dome.shift_px + rise * sight.px_from_mm.col(0);
 }
 
-void DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat& gray) {
+cv::Rect DomePlace(const Projector& camera, const Dome& dome, double blur_px, cv::Size size) {
   DomeSight sight;
-  if (!Look(camera, dome, sight)) return;
-  const double half_width = kSmoothstepHalfWidth * std::sqrt(blur_px * blur_px + kPixelVariance);
-  const Vec2 extent = dome.radius_mm * sight.px_from_mm.rowwise().norm() + Vec2::Constant(half_width + 1);
-  if (!extent.allFinite() || !sight.foot_px.allFinite()) return;
-  const auto clip = [](double v, int size) {
-    return static_cast<int>(std::clamp(std::ceil(v), 0.0, static_cast<double>(size)));
-  };
-  const int x0 = clip(sight.foot_px.x() - extent.x(), gray.cols),
-            x1 = clip(sight.foot_px.x() + extent.x(), gray.cols);
-  const int y0 = clip(sight.foot_px.y() - extent.y(), gray.rows),
-            y1 = clip(sight.foot_px.y() + extent.y(), gray.rows);
+  if (!Look(camera, dome, sight)) return {};
+  return PlaceOf(sight, dome.radius_mm, HalfWidth(blur_px), size);
+}
+
+cv::Rect DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat& gray) {
+  DomeSight sight;
+  if (!Look(camera, dome, sight)) return {};
+  const double half_width = HalfWidth(blur_px);
+  const cv::Rect place = PlaceOf(sight, dome.radius_mm, half_width, gray.size());
+  const int x0 = place.x, x1 = place.x + place.width, y0 = place.y, y1 = place.y + place.height;
 
   // In units of the radius from here on; floats, as this is most of a picture's cost.
   const Eigen::Matrix2f m = (sight.px_from_mm.inverse() / dome.radius_mm).cast<float>();
@@ -96,6 +111,7 @@ void DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat
       row[x] = static_cast<uint8_t>(std::clamp(value + 0.5F, 0.0F, 255.0F));
     }
   }
+  return place;
 }
 
 }  // namespace taclink

@@ -15,15 +15,20 @@ struct Dome {
   double radius_mm = 0;
   double level = 255;            ///< brightness where it faces the light
   Vec2 shift_px = Vec2::Zero();  ///< added to where it is seen
+
+  bool operator==(const Dome&) const = default;
 };
 
 /// Where the centroid of the dome's silhouette is seen, without the shift. None: it turns its back, or is
 /// beyond the lens.
 std::optional<Vec2> SilhouetteCentroid(const Projector& camera, const Dome& dome);
 
+/// The part of a picture of that size in which DrawDome may change something.
+cv::Rect DomePlace(const Projector& camera, const Dome& dome, double blur_px, cv::Size size);
+
 /// Draws the dome over an 8-bit picture: the affine image of half a ball at its place, lit from beside the
 /// camera, with edges as soft as a Gaussian blur makes them. What lies outside the picture or turns its back
-/// is not drawn.
-void DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat& gray);
+/// is not drawn. Returns DomePlace.
+cv::Rect DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat& gray);
 
 }  // namespace taclink

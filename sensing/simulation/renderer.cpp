@@ -59,9 +59,14 @@ Renderer::Renderer(const LinkModel& model, const StereoRig& rig, const CameraEff
   size_t pixels = 0;
   for (const CameraId id : kBothCameras) {
     const Projector projector(rig[id]);
-    Eye eye{projector, MakeBackground(model, rig[id], id, effects, MixBits(seed)),
-            FarToNear(markers, projector.center_in_link()), false,
-            Dirt(rig[id].width_px, rig[id].height_px, effects.dirt_specks, MixBits(seed + 17) + Index(id))};
+    Eye eye{projector,
+            MakeBackground(model, rig[id], id, effects, MixBits(seed)),
+            FarToNear(markers, projector.center_in_link()),
+            false,
+            Dirt(rig[id].width_px, rig[id].height_px, effects.dirt_specks, MixBits(seed + 17) + Index(id)),
+            {},
+            std::vector<Eye::Drawn>(markers.size())};
+    eye.background.gray.copyTo(eye.markers);
     for (const Vec3& p : markers)
       eye.hides_at_rest = eye.hides_at_rest || IsHidden(wall, p, projector.center_in_link(), kGrazeMm);
     pixels = std::max(pixels, eye.background.gray.total());
@@ -115,13 +120,50 @@ double Renderer::Gain(const SkinTruth& truth, CameraId id) const {
   return std::clamp(1 + effects_.flicker * normal, 0.2, 3.0);
 }
 
-void Renderer::Render(const SkinTruth& truth, CameraId id, cv::Mat& gray) const {
-  const Eye& eye = eyes_[Index(id)];
-  eye.background.gray.copyTo(gray);
-  for (const int marker : eye.far_to_near) {
-    if (Sees(truth, id, marker))
-      DrawDome(eye.projector, MarkerDome(truth, id, marker), effects_.blur_px, gray);
+// A dome that has changed, and whatever overlaps with one that is to be drawn again: edges are blended.
+void Renderer::MarkStale(const SkinTruth& truth, CameraId id) {
+  Eye& eye = eyes_[Index(id)];
+  std::vector<Eye::Drawn>& all = eye.drawn;
+  for (size_t m = 0; m < all.size(); ++m) {
+    const auto marker = static_cast<int>(m);
+    std::optional<Dome> dome;
+    if (Sees(truth, id, marker)) dome = MarkerDome(truth, id, marker);
+    all[m].is_stale = dome != all[m].dome;
+    all[m].dome = dome;
+    if (!all[m].is_stale) continue;
+    // Where it will be is not drawn yet; what it covers there overlaps with it.
+    if (dome) all[m].place |= DomePlace(eye.projector, *dome, effects_.blur_px, eye.markers.size());
   }
+  for (bool is_more = true; is_more;) {
+    is_more = false;
+    for (const Eye::Drawn& stale : all) {
+      if (!stale.is_stale || stale.place.empty()) continue;
+      for (Eye::Drawn& other : all) {
+        if (other.is_stale || (other.place & stale.place).empty()) continue;
+        other.is_stale = is_more = true;
+      }
+    }
+  }
+}
+
+void Renderer::DrawMarkers(const SkinTruth& truth, CameraId id) {
+  Eye& eye = eyes_[Index(id)];
+  MarkStale(truth, id);
+  for (const Eye::Drawn& each : eye.drawn) {
+    if (each.is_stale && !each.place.empty()) eye.background.gray(each.place).copyTo(eye.markers(each.place));
+  }
+  for (const int marker : eye.far_to_near) {
+    Eye::Drawn& each = eye.drawn[static_cast<size_t>(marker)];
+    if (!each.is_stale) continue;
+    each.place = {};
+    if (each.dome) each.place = DrawDome(eye.projector, *each.dome, effects_.blur_px, eye.markers);
+  }
+}
+
+void Renderer::Render(const SkinTruth& truth, CameraId id, cv::Mat& gray) {
+  const Eye& eye = eyes_[Index(id)];
+  DrawMarkers(truth, id);
+  eye.markers.copyTo(gray);
   eye.dirt.CoverLens(gray);
   if (effects_.flicker > 0) gray.convertTo(gray, CV_8U, Gain(truth, id));
   if (noise_above_.empty()) return;

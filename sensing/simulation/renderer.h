@@ -18,14 +18,17 @@
 namespace taclink {
 
 /// Makes the pictures that a link's cameras take of a skin. A picture depends on the truth (its frame number
-/// picks the noise) and the seed alone. Constant after construction; allocates nothing once its pictures are
-/// made.
+/// picks the noise) and the seed alone. Markers are drawn again only where something has changed since the
+/// last picture. Allocates nothing once its pictures are made. One thread.
 class Renderer {
  public:
   Renderer(const LinkModel& model, const StereoRig& rig, const CameraEffects& effects, uint64_t seed);
+  // A copy would share the pictures.
+  Renderer(Renderer&&) = default;
+  Renderer& operator=(Renderer&&) = default;
 
   /// 8-bit brightness as the sensor delivers it.
-  void Render(const SkinTruth& truth, CameraId id, cv::Mat& gray) const;
+  void Render(const SkinTruth& truth, CameraId id, cv::Mat& gray);
 
   /// Whether the camera can see the marker at all: not behind the skin, in front of the lens.
   bool Sees(const SkinTruth& truth, CameraId id, int marker) const;
@@ -47,8 +50,18 @@ class Renderer {
     std::vector<int> far_to_near;  // marker indices in drawing order
     bool hides_at_rest = false;    // the undeformed wall already hides a marker
     Dirt dirt;
+    // The last picture before dirt, flicker and noise, and what is drawn in it; by marker.
+    struct Drawn {
+      std::optional<Dome> dome;  // none: hidden
+      cv::Rect place;            // empty: nowhere in the picture
+      bool is_stale = false;     // to be drawn again
+    };
+    cv::Mat markers;
+    std::vector<Drawn> drawn;
   };
 
+  void MarkStale(const SkinTruth& truth, CameraId id);
+  void DrawMarkers(const SkinTruth& truth, CameraId id);
   Dome MarkerDome(const SkinTruth& truth, CameraId id, int marker) const;
 
   double dome_radius_mm_;

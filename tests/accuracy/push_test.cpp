@@ -51,7 +51,7 @@ class PushTest : public ::testing::TestWithParam<std::string> {
   Solved Solve(const Scene& scene, double touched_s = kTouchedS,
                std::optional<ForceModel> force_model = ForceModel::kLinear) const {
     auto skin = SimulatedSkin::Make(model_, scene);
-    const Renderer renderer(model_, model_.nominal_rig, scene.camera, scene.seed);
+    Renderer renderer(model_, model_.nominal_rig, scene.camera, scene.seed);
     PipelineOptions options;
     options.rest_frames = kRestFrames;
     options.force.model = force_model;

@@ -139,7 +139,7 @@ class SolidLink {
 
   const LinkModel model_ = SolidSkin();
   const CameraEffects effects_ = OtherCameras();
-  const Renderer renderer_{model_, MountedRig(model_.nominal_rig, effects_), effects_, 7};
+  Renderer renderer_{model_, MountedRig(model_.nominal_rig, effects_), effects_, 7};
   SolidWriter writer_{model_};
   std::unique_ptr<LinkPipeline> pipeline_;
   SkinTruth truth_;

@@ -45,7 +45,7 @@ class Studio {
   }
 
   PicturePair Take(const StereoRig& rig, const SkinTruth& truth, uint64_t seed = 1) const {
-    const Renderer renderer(model_, rig, CameraEffects{}, seed);
+    Renderer renderer(model_, rig, CameraEffects{}, seed);
     PicturePair pictures;
     for (const CameraId id : kBothCameras) renderer.Render(truth, id, pictures[Index(id)]);
     return pictures;

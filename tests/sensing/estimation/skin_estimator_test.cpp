@@ -302,6 +302,59 @@ TEST_F(SkinEstimatorTest, ASecondContactFarFromTheFirstIsFound) {
 
 // In and out, while tangents are made ahead: each frame's answer is that of an estimator that saw only it,
 // and to the last bit that of one that has no second thread.
+// Between them a force along the wall would explain much of what both do.
+TEST_F(SkinEstimatorTest, AWeakContactBesideAStrongOneIsFound) {
+  const double strong_n = 0.8, weak_n = 0.12;
+  const Pushed none = Push(model_, 1, 1.3, 95, 0, 4), strong = Push(model_, 1, 1.3, 95, strong_n, 4);
+  ASSERT_TRUE(none.ok && strong.ok);
+  for (const double off_mm : {42.0, 50.0}) {
+    for (const bool is_along : {false, true}) {
+      const double angle = is_along ? 1.3 : 1.3 + off_mm / model_.PointAtDepth(1.3, 95, 0).head<2>().norm();
+      const double z = is_along ? 95 + off_mm : 95;
+      const Pushed weak = Push(model_, 1, angle, z, weak_n, 4);
+      ASSERT_TRUE(weak.ok);
+      SkinEstimator estimator(model_);
+      estimator.Estimate(Observe(none.markers_mm, 1, 0.05), estimate_);
+      estimator.Estimate(Observe(strong.markers_mm + weak.markers_mm - none.markers_mm, 1, 0.05), estimate_);
+      ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+      ASSERT_EQ(estimate_.loads.loads.size(), 2u) << off_mm << is_along;
+      for (const EstimatedLoad& load : estimate_.loads.loads) {
+        const bool is_strong = load.normal_force_n > 0.4;
+        const Vec3 truth =
+            is_strong ? -strong_n * model_.OutwardNormal(1.3, 95) : -weak_n * model_.OutwardNormal(angle, z);
+        EXPECT_LT((load.force_n - truth).norm(), 0.1 * strong_n) << off_mm << is_along << load.force_n;
+      }
+    }
+  }
+}
+
+// A body hides markers from one camera and the other sees them badly, of which the skin without loads knew
+// nothing.
+TEST_F(SkinEstimatorTest, MarkersThatOneCameraSeesWorseSayLess) {
+  const double far_mm = 0.3;
+  const Pushed none = Push(model_, 1, 1.3, 95, 0, 4), pushed = Push(model_, 1, 1.3, 95, 0.4, 4);
+  ASSERT_TRUE(none.ok && pushed.ok);
+  SkinObservation seen = Observe(pushed.markers_mm, 1, 0.05);
+  const Vec3 hidden = model_.PointAtDepth(1.3, 95, 0);
+  for (int m = 0; m < model_.markers.count(); ++m) {
+    const Vec3 at = model_.RestMarker(m), sight = (at - Vec3(0, 0, -10)).normalized();
+    if ((at - hidden).norm() < 25)
+      seen.markers.information[static_cast<size_t>(m)] =
+          (Mat3::Identity() - sight * sight.transpose()) / (far_mm * far_mm);
+  }
+  estimator_.Estimate(Observe(none.markers_mm, 1, 0.05), estimate_);
+  estimator_.Estimate(seen, estimate_);
+  ASSERT_EQ(estimate_.loads.loads.size(), 1u);
+  const double sigma_n = std::sqrt(estimate_.loads.loads[0].force_covariance_n2.trace());
+  SkinEstimator fresh(model_);
+  SkinEstimate cold;
+  fresh.Estimate(seen, cold);
+  ASSERT_EQ(cold.loads.loads.size(), 1u);
+  const double cold_n = std::sqrt(cold.loads.loads[0].force_covariance_n2.trace());
+  EXPECT_NEAR(sigma_n / cold_n, 1, 0.1) << sigma_n << " " << cold_n;
+  EXPECT_NEAR(estimate_.loads.region_chi2_per_dof, cold.loads.region_chi2_per_dof, 0.1);
+}
+
 TEST_F(SkinEstimatorTest, WhatIsMadeAheadChangesNoAnswer) {
   std::vector<SkinObservation> stages;
   for (const double force_n : {0.1, 0.25, 0.4, 0.5, 0.6}) {

@@ -71,8 +71,9 @@ TEST_F(TangentTest, OfATouchedSkinWeighsAsIfItHadMadeAll) {
   Eigen::VectorXd local = none_;
   local[300] = 0.5;
   ASSERT_TRUE(whole.Make(problem_, Dented(1), local, nullptr));
-  ASSERT_TRUE(touched.Make(problem_, Dented(1), local, still.loads.stray_mm2()));
-  EXPECT_EQ(touched.loads.stray_mm2(), still.loads.stray_mm2());
+  ASSERT_TRUE(touched.Make(problem_, Dented(1), local, still.loads.untouched()));
+  EXPECT_EQ(touched.loads.untouched(), still.loads.untouched());
+  for (Tangent* tangent : {&whole, &touched}) tangent->loads.ConcludeUntouched(problem_.observed);
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const Mat3 expected = whole.loads.ModelCovariance(m);
     EXPECT_LT((touched.loads.ModelCovariance(m) - expected).norm(), 0.05 * expected.norm()) << m;

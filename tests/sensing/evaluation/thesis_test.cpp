@@ -72,7 +72,7 @@ TEST_P(ThesisTest, WorksOnIdealPictures) {
   scene.pressure = {{0.9, 0}, {1.5, 0.5}};
   auto skin = SimulatedSkin::Make(model_, scene);
   ASSERT_TRUE(skin.ok()) << skin.error().message;
-  const Renderer renderer(model_, model_.nominal_rig, scene.camera, 1);
+  Renderer renderer(model_, model_.nominal_rig, scene.camera, 1);
   const auto method = MakeThesisMethod(model_);
   VisionScorer scorer(model_);
   StereoFrame frame;

@@ -78,7 +78,7 @@ TEST_P(RestLabelsTest, MisalignedCameras) {
       pose.rotation = turn * pose.rotation;
       pose.translation = turn * pose.translation + shift;
     }
-    const Renderer renderer(model_, rig, {}, 5);
+    Renderer renderer(model_, rig, {}, 5);
     const SkinTruth truth = RestTruth(model_);
     for (const CameraId id : kBothCameras) {
       cv::Mat gray;
@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(ShippedModels, RestLabelsTest, ::testing::Values("cylin
 // their own markers.
 TEST(RestLabels, ConeWhoseFarRingsRunTogether) {
   const LinkModel model = LoadLinkModel("cone").value();
-  const Renderer renderer(model, model.nominal_rig, {}, 5);
+  Renderer renderer(model, model.nominal_rig, {}, 5);
   const SkinTruth truth = RestTruth(model);
   MarkerDetector detector;
   for (const CameraId id : kBothCameras) {

@@ -10,7 +10,7 @@ namespace taclink {
 namespace {
 
 cv::Mat Picture(const LinkModel& model, const CameraEffects& effects, const SkinTruth& truth) {
-  const Renderer renderer(model, MountedRig(model.nominal_rig, effects), effects, 3);
+  Renderer renderer(model, MountedRig(model.nominal_rig, effects), effects, 3);
   cv::Mat gray;
   renderer.Render(truth, CameraId::kTop, gray);
   return gray;
@@ -53,7 +53,7 @@ TEST(CameraEffects, FlickerScalesWholePicturesAndChangesFromFrameToFrame) {
   SkinTruth truth = TruthAt(model, SceneWith(""), 0);
   const double steady = cv::mean(Picture(model, effects, truth))[0];
   effects.flicker = 0.2;
-  const Renderer renderer(model, model.nominal_rig, effects, 3);
+  Renderer renderer(model, model.nominal_rig, effects, 3);
   double sum = 0, squares = 0;
   constexpr int kFrames = 400;
   for (int i = 0; i < kFrames; ++i) {
@@ -92,7 +92,7 @@ TEST(CameraEffects, CentroidIsThatOfTheDrawnMarker) {
     effects.sensor_noise_levels = 0;
     effects.marker_jitter_px = 2;
     const SkinTruth all = TruthAt(model, SceneWith(""), 0);
-    const Renderer renderer(model, model.nominal_rig, effects, 3);
+    Renderer renderer(model, model.nominal_rig, effects, 3);
     for (int marker = 5; marker < model.markers.count(); marker += 23) {
       SkinTruth without = all, alone = all;
       for (size_t i = 0; i < all.marker_wall_mm.size(); ++i) {

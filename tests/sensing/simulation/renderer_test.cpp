@@ -49,7 +49,7 @@ Blob Difference(const cv::Mat& with, const cv::Mat& without) {
 
 class RendererTest : public ::testing::TestWithParam<std::string> {
  protected:
-  cv::Mat Picture(const Renderer& renderer, const SkinTruth& truth, CameraId id) const {
+  cv::Mat Picture(Renderer& renderer, const SkinTruth& truth, CameraId id) const {
     cv::Mat gray;
     renderer.Render(truth, id, gray);
     return gray;
@@ -68,7 +68,7 @@ Vec3 SilhouetteCentroid(const SkinTruth& truth, int marker, double radius_mm, co
 }
 
 TEST_P(RendererTest, MarkersAreWhereTheirCentresProject) {
-  const Renderer renderer(model_, model_.nominal_rig, Quiet(), 1);
+  Renderer renderer(model_, model_.nominal_rig, Quiet(), 1);
   const double radius_mm = model_.markers.diameter_mm / 2;
   for (const CameraId id : kBothCameras) {
     const Projector camera(model_.nominal_rig[id]);
@@ -104,8 +104,22 @@ TEST_P(RendererTest, MarkersAreWhereTheirCentresProject) {
   }
 }
 
+// Whatever was drawn before: a dent that comes and goes, hides markers and shows them again.
+TEST_P(RendererTest, DrawsAgainWhatHasChangedAndNothingElse) {
+  Renderer renderer(model_, model_.nominal_rig, CameraEffects(), 1);
+  const Scene scene = SceneWith(
+      "contacts:\n  - {at: {path: 3, ring: 4}, force_n: 0.5, begin_s: 0.5, end_s: 2.5, ramp_s: 0.5}\n");
+  for (const double s : {0.0, 0.0, 0.4, 0.9, 0.9, 1.0, 1.7, 3.0, 0.9}) {
+    const SkinTruth truth = TruthAt(model_, scene, s);
+    for (const CameraId id : kBothCameras) {
+      Renderer fresh(model_, model_.nominal_rig, CameraEffects(), 1);
+      EXPECT_EQ(cv::norm(Picture(renderer, truth, id), Picture(fresh, truth, id), cv::NORM_INF), 0) << s;
+    }
+  }
+}
+
 TEST_P(RendererTest, ZeroLoadLooksLikeRestButForNoise) {
-  const Renderer noisy(model_, model_.nominal_rig, CameraEffects(), 1);
+  Renderer noisy(model_, model_.nominal_rig, CameraEffects(), 1);
   const SkinTruth later = TruthAt(model_, SceneWith("pressure_kpa: 0\n"), 1);
   const cv::Mat a = Picture(noisy, rest_, CameraId::kTop), b = Picture(noisy, later, CameraId::kTop);
   cv::Mat difference, mean, deviation;
@@ -118,8 +132,8 @@ TEST_P(RendererTest, ZeroLoadLooksLikeRestButForNoise) {
 TEST_P(RendererTest, SameSeedSameBytes) {
   CameraEffects effects;
   effects.marker_jitter_px = 0.3;
-  const Renderer one(model_, model_.nominal_rig, effects, 5), same(model_, model_.nominal_rig, effects, 5);
-  const Renderer other(model_, model_.nominal_rig, effects, 6);
+  Renderer one(model_, model_.nominal_rig, effects, 5), same(model_, model_.nominal_rig, effects, 5);
+  Renderer other(model_, model_.nominal_rig, effects, 6);
   SkinTruth next = rest_;
   next.frame = rest_.frame + 1;
   const auto differ = [](const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) > 0; };
@@ -134,8 +148,7 @@ TEST_P(RendererTest, SameSeedSameBytes) {
 TEST_P(RendererTest, JitterShiftsEachMarker) {
   CameraEffects effects = Quiet();
   effects.marker_jitter_px = 0.3;
-  const Renderer steady(model_, model_.nominal_rig, Quiet(), 1),
-      shaky(model_, model_.nominal_rig, effects, 1);
+  Renderer steady(model_, model_.nominal_rig, Quiet(), 1), shaky(model_, model_.nominal_rig, effects, 1);
   const cv::Mat empty = Picture(steady, Alone(rest_, -1), CameraId::kTop);
   double sum = 0;
   int count = 0;
@@ -151,7 +164,7 @@ TEST_P(RendererTest, JitterShiftsEachMarker) {
 }
 
 TEST_P(RendererTest, ADeepDentHidesMarkersBehindIt) {
-  const Renderer renderer(model_, model_.nominal_rig, Quiet(), 1);
+  Renderer renderer(model_, model_.nominal_rig, Quiet(), 1);
   const std::string depth =
       GetParam() == "barrel" ? "28" : "15";  // the barrel's ends hide its bulge until then
   const Scene scene = SceneWith("contacts:\n  - {at: {path: 3, ring: 5}, depth_mm: " + depth +
@@ -174,7 +187,7 @@ TEST_P(RendererTest, ADeepDentHidesMarkersBehindIt) {
 }
 
 TEST_P(RendererTest, LooksLikeARealPicture) {
-  const Renderer renderer(model_, model_.nominal_rig, Quiet(), 1);
+  Renderer renderer(model_, model_.nominal_rig, Quiet(), 1);
   for (const CameraId id : kBothCameras) {
     const cv::Mat picture = Picture(renderer, rest_, id);
     EXPECT_EQ(picture.cols, 640);

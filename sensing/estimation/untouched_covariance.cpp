@@ -1,0 +1,94 @@
+#include "sensing/estimation/untouched_covariance.h"
+
+#include "sensing/core/median.h"
+#include "sensing/estimation/camera_noise.h"
+#include "sensing/mechanics/dense.h"
+
+namespace taclink {
+namespace {
+
+constexpr double kMostHidden = 0.25;  // of the markers: so many may be taken out of the problem
+
+bool IsMany(size_t hidden, size_t markers) {
+  return static_cast<double>(hidden) > kMostHidden * static_cast<double>(markers);
+}
+
+// Of a direction that is not seen, the usual one of those that are: a frame in which it is seen then needs no
+// other covariance, and what is not seen is taken out of the problem (LoadEstimator::Hide). Not if there are
+// many: what that leaves of a column would be rounding.
+std::vector<Mat3> NoiseOfAll(const MarkerObservations& observed, double unseen_mm) {
+  const double least = 1 / (kUnseenShare * unseen_mm * unseen_mm);
+  std::vector<double> variances_mm2;
+  for (const Mat3& information : observed.information) {
+    if (information.allFinite() && IsSurelySeen(information, least))
+      variances_mm2.push_back(NoiseTraceOf(information, unseen_mm) / 3);
+  }
+  const size_t unseen = observed.information.size() - variances_mm2.size();
+  const double usual_mm2 =
+      IsMany(unseen, observed.information.size()) ? unseen_mm * unseen_mm : Median(variances_mm2);
+  std::vector<Mat3> noise_mm2;
+  for (const Mat3& information : observed.information) {
+    const SeenNoise seen = SeenNoiseOf(information, unseen_mm);
+    noise_mm2.emplace_back(usual_mm2 * (Mat3::Identity() - seen.axes * seen.axes.transpose()) +
+                           seen.axes * seen.variances_mm2.asDiagonal() * seen.axes.transpose());
+  }
+  return noise_mm2;
+}
+
+}  // namespace
+
+std::shared_ptr<const UntouchedCovariance> UntouchedCovariance::Make(Linearization& skin,
+                                                                     const MarkerCovariance& model,
+                                                                     const MarkerObservations& observed,
+                                                                     const PressurePrior& prior) {
+  auto made = std::make_shared<UntouchedCovariance>();
+  Eigen::MatrixXd all_mm2;
+  model.WriteUntouched(skin, all_mm2);
+  made->unseen_mm = model.unseen_mm();
+  made->noise_mm2 = NoiseOfAll(observed, made->unseen_mm);
+  made->baseline_sigma_mpa = prior.baseline_sigma_mpa;
+  made->by_baseline_mm.setZero(all_mm2.rows());
+  if (prior.baseline_mm_per_mpa.size() == all_mm2.rows())
+    made->by_baseline_mm = prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa;
+  all_mm2.selfadjointView<Eigen::Lower>().rankUpdate(made->by_baseline_mm);
+  for (size_t m = 0; m < observed.information.size(); ++m) {
+    const auto at = 3 * static_cast<Eigen::Index>(m);
+    auto block = all_mm2.block<3, 3>(at, at);
+    const auto bow_mm = model.bow_mm().segment<3>(at);
+    made->marker_mm2.emplace_back(Mat3(block.selfadjointView<Eigen::Lower>()) - bow_mm * bow_mm.transpose());
+    block += made->noise_mm2[m];
+  }
+  made->covariance_mm2 = all_mm2.cast<float>();
+  if (!dense::Cholesky(all_mm2)) return nullptr;
+  made->factor = all_mm2.cast<float>();
+  return made;
+}
+
+bool UntouchedCovariance::HasBaseline(const PressurePrior& prior) const {
+  constexpr double kSameMm = 1e-6;
+  const Eigen::VectorXd& baseline = prior.baseline_mm_per_mpa;
+  if (baseline.size() != by_baseline_mm.size()) return by_baseline_mm.isZero(kSameMm);
+  return (prior.baseline_sigma_mpa * baseline - by_baseline_mm).isZero(kSameMm);
+}
+
+bool UntouchedCovariance::HidesFew(const MarkerObservations& observed) const {
+  const double unseen_mm2 = kUnseenShare * unseen_mm * unseen_mm;
+  size_t hidden = 0;
+  for (size_t m = 0; m < noise_mm2.size(); ++m) {
+    if (noise_mm2[m].trace() < unseen_mm2 && NoiseTraceOf(observed.information[m], unseen_mm) > unseen_mm2)
+      ++hidden;
+  }
+  return !IsMany(hidden, noise_mm2.size());
+}
+
+bool UntouchedCovariance::IsGoodFor(const MarkerObservations& observed, const PressurePrior& prior) const {
+  int better = 0;
+  for (size_t m = 0; m < noise_mm2.size(); ++m) {
+    const double now = NoiseTraceOf(observed.information[m], unseen_mm);
+    if (noise_mm2[m].trace() > kSameNoise * kSameNoise * now) ++better;
+  }
+  return better <= kOtherNoiseShare * static_cast<double>(noise_mm2.size()) && HidesFew(observed) &&
+         HasBaseline(prior);
+}
+
+}  // namespace taclink

@@ -1,0 +1,82 @@
+#include "sensing/estimation/whitening.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+
+namespace taclink {
+namespace {
+
+constexpr Eigen::Index kRows = 40;
+
+class WhiteningTest : public ::testing::Test {
+ protected:
+  WhiteningTest() {
+    std::srand(5);  // of Eigen's Random
+    const Eigen::MatrixXd random = Eigen::MatrixXd::Random(kRows, kRows);
+    shared_ = random * random.transpose() + 0.5 * Eigen::MatrixXd::Identity(kRows, kRows);
+    factor_ = std::make_shared<const Eigen::MatrixXf>(Eigen::MatrixXd(shared_.llt().matrixL()).cast<float>());
+  }
+  // M' C M = I, M M' = C^-1 and products with C, by products in double.
+  void Check(const Eigen::MatrixXd& random_columns) {
+    const Eigen::MatrixXf single = random_columns.cast<float>();
+    ASSERT_TRUE(whitening_.Set(factor_, single));
+    const Eigen::MatrixXd columns = single.cast<double>();
+    const Eigen::MatrixXd covariance = shared_ + columns * columns.transpose();
+    const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(kRows, kRows);
+    const Eigen::MatrixXd m = whitening_.Applied(identity);
+    EXPECT_LT((m * covariance * m.transpose() - identity).cwiseAbs().maxCoeff(), 1e-3);
+    const Eigen::VectorXd x = Eigen::VectorXd::Random(kRows);
+    EXPECT_LT((whitening_.Applied(x) - m * x).norm(), 1e-5 * x.norm());
+    const Eigen::VectorXd by_inverse = covariance.llt().solve(x);
+    EXPECT_LT((whitening_.Transposed(m * x) - by_inverse).norm(), 1e-3 * by_inverse.norm());
+    // Single precision, of what the largest column may make of it.
+    EXPECT_LT((whitening_.Covariance(x) - covariance * x).norm(), 1e-5 * covariance.norm() * x.norm());
+  }
+
+  Eigen::MatrixXd shared_;
+  std::shared_ptr<const Eigen::MatrixXf> factor_;
+  Whitening whitening_;
+};
+
+TEST_F(WhiteningTest, IsOfTheSharedPartAlone) {
+  Check(Eigen::MatrixXd(kRows, 0));
+}
+
+TEST_F(WhiteningTest, IsOfBothParts) {
+  Check(Eigen::MatrixXd::Random(kRows, 7));
+}
+
+// As of the pressure, which is far larger than all else, and of stray forces side by side, which are nearly
+// the same.
+TEST_F(WhiteningTest, BearsLargeAndDependentColumns) {
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Random(kRows, 50);
+  columns.col(0) *= 100;
+  columns.col(2) = columns.col(1);
+  Check(columns);
+}
+
+// Of a share whose column is all but told: where 1 - |M' u|^2 would be rounding.
+TEST_F(WhiteningTest, KnowsWhatIsLeftOfTheLastShare) {
+  for (const double size : {1.0, 1e2, 1e4}) {
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Random(kRows, 9);
+    columns.rightCols<1>() *= size;
+    Check(columns);
+    const Eigen::MatrixXd single = columns.cast<float>().cast<double>(), others = single.leftCols(8);
+    const Eigen::VectorXd last = single.rightCols<1>();
+    const double told = last.dot((shared_ + others * others.transpose()).llt().solve(last));
+    EXPECT_NEAR(whitening_.LastPosterior() * (1 + told), 1, 1e-2) << size;
+  }
+}
+
+TEST_F(WhiteningTest, RefusesWhatIsNotFinite) {
+  Eigen::MatrixXf columns = Eigen::MatrixXf::Ones(kRows, 1);
+  columns(3, 0) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_FALSE(whitening_.Set(factor_, columns));
+}
+
+}  // namespace
+}  // namespace taclink
