@@ -27,6 +27,7 @@ constexpr double kHessianRidge = 1e-9;
 constexpr double kLikelyShare = 0.1, kLetInNorm = 3, kAbout = 0.3;
 constexpr size_t kMostLetIn = 8;
 constexpr int kMostRounds = 4;
+constexpr int kMostTrials = 1500;          // of a fit: the most that a right answer ever took is 1,137
 constexpr double kSameDirection = 0.9999;  // cosine
 
 }  // namespace
@@ -392,6 +393,7 @@ std::vector<LoadEstimator::Hill> LoadEstimator::Select(Linearization& skin,
 
 // What all hills but one explain, without penalty.
 LoadEstimator::Explanation LoadEstimator::Explain(const std::vector<Hill>& hills, size_t without) {
+  ++trials_;
   std::vector<int> columns;
   for (size_t i = 0; i < hills.size(); ++i) {
     if (i != without) columns.insert(columns.end(), hills[i].begin(), hills[i].end());
@@ -492,9 +494,11 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
                         const Eigen::VectorXd* untouched_norms, LoadEstimate& estimate) {
   SetData(skin, observed);
   Hide(observed);
+  trials_ = 0;
   for (int round = 0;; ++round) {
     estimate = {};
-    estimate.converged = FitColumnsAtHand(skin, untouched_norms);
+    estimate.converged = FitColumnsAtHand(skin, untouched_norms) && trials_ < kMostTrials;
+    estimate.trials = trials_;
     if (!estimate.converged) {
       fit_.hills.clear();
       return;

@@ -62,6 +62,7 @@ struct LoadEstimate {
   double chi2_per_dof = 0;
   double region_chi2_per_dof = 0;  ///< the largest of 3 x 3 markers
   bool converged = true;
+  int trials = 0;  ///< answers to which contacts there are, and which of them pull along the wall, tried
 };
 
 /// The loads that explain the markers, given the linearized skin: non-negative inward loads at all sites with
@@ -165,6 +166,7 @@ class LoadEstimator {
     double chi2 = 0;
     Eigen::VectorXd loads;  // by column, in the hills' order
   };
+  /// Also counts it as a trial.
   Explanation Explain(const std::vector<Hill>& hills, size_t without);
 
   void SetData(const Linearization& skin, const MarkerObservations& observed);
@@ -247,6 +249,7 @@ class LoadEstimator {
   Eigen::VectorXd found_;            // by chosen_
   bool is_selected_ = false;         // by a solver that came to its end
   std::vector<char> is_shown_;       // by row
+  int trials_ = 0;                   // of the fit
   DetectionLimits limits_;   // none by site: not known since Prepare, or since other markers are hidden
   std::vector<int> chosen_;  // loads above zero of the last selection
   struct {

@@ -75,6 +75,20 @@ void SkinEstimator::BeginAgain() {
   past_ = past_before_;
   is_same_frame_ = true;
 }
+void SkinEstimator::Skip() {
+  past_before_ = past_;
+  KeepBefore();
+}
+// Of a frame without an answer nothing is kept: the next one begins where this one did. After two of them,
+// where an untouched skin does.
+void SkinEstimator::KeepBefore() {
+  const bool is_first = past_before_.has_last && !past_before_.is_skipped;
+  Forget();
+  if (!is_first) return;
+  past_ = past_before_;
+  past_.has_next = false;
+  past_.is_skipped = true;
+}
 void SkinEstimator::Forget() {
   past_.has_last = past_.has_next = false;
   solved_.reset();
@@ -106,7 +120,7 @@ double SkinEstimator::SeenMotion(const ShellState& state, const MarkerObservatio
 
 bool SkinEstimator::Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
                            const Eigen::VectorXd& local_n, SkinEstimate& estimate) {
-  ++estimate.tangents;
+  ++estimate.work.tangents;
   const bool is_touched = &tangent != still_.get();
   return tangent.Make(problem, state, local_n, is_touched ? still_->loads.untouched() : nullptr);
 }
@@ -160,9 +174,10 @@ bool SkinEstimator::StepOnce(Tangent& tangent, const SkinProblem& problem, SkinE
 bool SkinEstimator::Step(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate,
                          double& step_mm) {
   used_ = &tangent;
-  ++estimate.steps;
+  ++estimate.work.steps;
   tangent.loads.Fit(tangent.skin, problem.observed,
                     &tangent == still_.get() ? nullptr : &still_->loads.FreeNorms(), estimate.loads);
+  estimate.work.trials += estimate.loads.trials;
   if (!estimate.loads.converged) return false;
   const double longest_mm = IsFirstOrder() ? kUnlimitedMm : kLongestStepMm * mechanics_.length_unit();
   step_mm = tangent.skin.Step(estimate.loads.at_sites, estimate.loads.pressure_error_mpa, longest_mm,
@@ -210,12 +225,13 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
     else
       local_n = Eigen::VectorXd::Zero(mechanics_.site_count());
   }
-  if (!touched_->IsGoodFor(problem, estimate.state) &&
-      !Remake(*touched_, problem, estimate.state, local_n, estimate))
-    return false;
+  const bool is_remade = !touched_->IsGoodFor(problem, estimate.state);
+  if (is_remade && !Remake(*touched_, problem, estimate.state, local_n, estimate)) return false;
   double before_mm = 1e9, step_mm = 0;
   bool is_seen_settled = false;
+  const int most_tangents = estimate.work.tangents + kMostTangents - (is_remade ? 1 : 0);
   for (int step = 0; step < kMostSteps; ++step) {
+    if (IsSpent(estimate)) return false;
     if (!StepOnce(*touched_, problem, estimate, step_mm)) return false;
     const Eigen::VectorXd local_before_n = local_n;
     local_n = touched_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
@@ -228,7 +244,8 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
         step_mm * std::min(1.0, kTangentErrorPerMm * distance_mm / unit) < kNextStepMm * unit;
     if (is_settled && !is_off) return true;
     before_mm = step_mm;
-    if (step + kStepsOfTangent < kMostSteps && (is_off || is_slow) && estimate.tangents < kMostTangents) {
+    if (step + kStepsOfTangent < kMostSteps && (is_off || is_slow) &&
+        estimate.work.tangents < most_tangents) {
       if (is_slow) touched_->is_prepared = false;
       TakeNext(problem, estimate.state, local_n);
       const bool is_good = touched_->IsGoodFor(problem, estimate.state) && touched_->HasLocal(local_n);
@@ -252,7 +269,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   else if (is_new_frame)
     past_before_.has_last = past_before_.has_next = false;
   estimate.failure = EstimateFailure::kNoEquilibrium;
-  estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
+  if (is_new_frame) estimate.work = {};
   estimate.first_order_mm = estimate.unsettled_mm = 0;
   estimate.has_shape = false;
   PressurePrior prior;
@@ -280,7 +297,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   const bool stands = may_stand && SolveStanding(problem, estimate);
   const bool is_solved = stands || SolveWithoutIsolated(problem, estimate);
   if (!is_solved) {
-    Forget();
+    KeepBefore();
     estimate.state = start_;
     mechanics_.markers().Displacements(start_, estimate.displacements_mm);
     estimate.has_shape = IsPossible(estimate);
@@ -296,10 +313,8 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
                      : estimate.loads.converged ? EstimateFailure::kNone
                                                 : EstimateFailure::kNotConverged;
-  if (estimate.loads.loads.empty() || estimate.failure != EstimateFailure::kNone) {
-    Forget();
-    return;
-  }
+  if (estimate.failure != EstimateFailure::kNone) return KeepBefore();
+  if (estimate.loads.loads.empty()) return Forget();
   const Eigen::VectorXd local_n = used_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
   if (maker_ && is_new_frame) MakeAhead(problem, estimate, local_n);
   past_.has_next = past_before_.has_last;
@@ -309,6 +324,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   }
   past_.last = estimate.state;
   past_.has_last = true;
+  past_.is_skipped = false;
   past_.local_n = local_n;
   if (stands) return;
   solved_.reset();
@@ -341,7 +357,6 @@ bool SkinEstimator::PrepareUntouched(const SkinProblem& problem) {
 
 bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   estimate.loads = {};
-  estimate.assimilation_steps = estimate.tangents = estimate.steps = 0;
   estimate.unsettled_mm = 0;
   is_settled_ = true;
   start_ = problem.inflated.state;

@@ -6,6 +6,7 @@
 
 #include "sensing/core/contact.h"
 #include "sensing/estimation/assimilation.h"
+#include "sensing/estimation/frame_work.h"
 #include "sensing/estimation/load_estimator.h"
 #include "sensing/estimation/skin_mechanics.h"
 #include "sensing/estimation/tangent_maker.h"
@@ -28,7 +29,7 @@ struct SkinObservation {
 enum class EstimateFailure : uint8_t {
   kNone,
   kNoEquilibrium,  ///< no stable skin under that pressure
-  kNotConverged,   ///< no equilibrium that fits the markers was reached
+  kNotConverged,   ///< no equilibrium that fits the markers was reached, or not by the work of a frame
   kImpossible,     ///< a marker beyond twice the radius, or a number that is none
 };
 
@@ -53,13 +54,15 @@ struct SkinEstimate {
   /// How far the last step still moved the skin somewhere that no camera sees, where loads and seen markers
   /// had settled; else 0.
   double unsettled_mm = 0;
-  int assimilation_steps = 0, tangents = 0, steps = 0;
+  FrameWork work;
 };
 
 struct SkinEstimatorOptions {
   /// None: the cheapest whose error is small enough, frame by frame. kLiteral is no model of this estimator.
-  std::optional<ForceModel> model;
+  std::optional<ForceModel> model = {};
   int refinement = 0;  ///< elements per interval of the marker grid; 0: as many as the skin's dents ask for
+  /// A frame that has cost so many FrameWork::Units ends without an answer.
+  int most_work = FrameWork::kUnlimited;
   /// Where tangents are made ahead, so that a moving contact's frames need not wait for them. None: in the
   /// caller's thread, when they are due. The answers are the same.
   BackgroundRunner background = {};
@@ -77,6 +80,8 @@ class SkinEstimator {
   void Estimate(const SkinObservation& observation, SkinEstimate& estimate);
   /// Forgets the frames before: where the next one begins.
   void Forget();
+  /// Instead of Estimate, of a frame that is no observation.
+  void Skip();
   /// And the tangents that were made in them.
   void Restart();
   /// The next call is of the same frame, looked at more closely: it begins from the last call's answer.
@@ -108,6 +113,8 @@ class SkinEstimator {
   bool Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n);
   bool Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
               const Eigen::VectorXd& local_n, SkinEstimate& estimate);
+  void KeepBefore();
+  bool IsSpent(const SkinEstimate& estimate) const { return estimate.work.Units() > options_.most_work; }
   void TakeNext(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n);
   void MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate, const Eigen::VectorXd& local_n);
   bool StepOnce(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate, double& step_mm);
@@ -136,6 +143,7 @@ class SkinEstimator {
   // Where a frame may begin: the state of the frame before and, after two, where their motion leads to.
   struct Past {
     bool has_last = false, has_next = false;
+    bool is_skipped = false;  // a frame without an answer lies between
     ShellState last, next;
     Eigen::VectorXd local_n;  // of `last`
   };

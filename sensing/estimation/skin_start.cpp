@@ -45,12 +45,16 @@ bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Ei
   local_n.resize(0);
   if (off_mm < kAssimilateMm * unit) return true;
   Eigen::VectorXd pulls;
-  AssimilationSummary done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
-  if (!done.converged && past_.has_last) {
+  const auto assimilate = [&] {
+    const AssimilationSummary done =
+        assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
+    estimate.work.assimilation_steps += done.iterations;
+    return done.converged;
+  };
+  if (!assimilate() && past_.has_last) {
     estimate.state = problem.inflated.state;
-    done = assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
+    assimilate();
   }
-  estimate.assimilation_steps = done.iterations;
   const int markers = mechanics_.marker_count();
   Eigen::VectorXd sizes(markers);
   for (int m = 0; m < markers; ++m) {
@@ -69,7 +73,7 @@ bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Ei
 bool SkinEstimator::SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& estimate) {
   bool is_solved = Solve(problem, estimate);
   for (const double most : {kSurelyIsolated, kPerhapsIsolated}) {
-    if (is_solved && estimate.unsettled_mm == 0) return true;
+    if ((is_solved && estimate.unsettled_mm == 0) || IsSpent(estimate)) return is_solved;
     SkinProblem without = problem;
     const int hidden = HideIsolated(mechanics_.model(), problem.inflated.markers_mm, most,
                                     mechanics_.length_unit(), without.observed);

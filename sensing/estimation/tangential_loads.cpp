@@ -124,6 +124,7 @@ void LoadEstimator::LetSlip(Linearization& skin) {
   left_out_.assign(hills.size(), {});
   while (fit_.slipping.size() < hills.size()) {
     left_out_ = TangentialGains(sites, columns, fit_.tangential, solution_);
+    trials_ += static_cast<int>(hills.size());
     for (const int hill : fit_.slipping) left_out_[static_cast<size_t>(hill)] = {};
     const auto best = std::max_element(left_out_.begin(), left_out_.end(),
                                        [](const auto& a, const auto& b) { return a.chi2 < b.chi2; }) -

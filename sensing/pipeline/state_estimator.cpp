@@ -25,6 +25,7 @@ SkinEstimatorOptions SkinOptions(const ForceOptions& options) {
   SkinEstimatorOptions skin;
   if (options.model != ForceModel::kLiteral) skin.model = options.model;
   skin.refinement = options.refinement;
+  skin.most_work = options.most_work;
   if (options.model != ForceModel::kLiteral) skin.background = options.background;
   return skin;
 }
@@ -175,7 +176,7 @@ void StateEstimator::Estimate(const PressurePair& pressure, SkinShape& shape, No
 
 void StateEstimator::GiveUp(const PressurePair& pressure, SkinShape& shape, NodalForces& forces) {
   const ForceModel model = forces.model;
-  skin_.Forget();
+  skin_.Skip();
   estimate_.failure = EstimateFailure::kNotConverged;
   estimate_.has_shape = false;
   if (const auto baseline = InflationAt(pressure.baseline.mpa)) estimate_.baseline_mm = *baseline;

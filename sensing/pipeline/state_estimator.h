@@ -15,9 +15,10 @@ namespace taclink {
 
 struct ForceOptions {
   /// None: the cheapest whose estimated error is small enough, frame by frame.
-  std::optional<ForceModel> model;
+  std::optional<ForceModel> model = {};
   /// Elements per interval of the marker grid; 0: as many as the skin's dents ask for.
   int refinement = 0;
+  int most_work = FrameWork::kUnlimited;  ///< of a frame (SkinEstimatorOptions)
   /// Where to work ahead while a contact moves (SkinEstimatorOptions).
   BackgroundRunner background = {};
 };

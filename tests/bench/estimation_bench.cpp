@@ -109,8 +109,8 @@ void Estimation(benchmark::State& state) {
     }
     estimate(frames[next++ % frames.size()]);
     unsolved += forces.converged ? 0 : 1;
-    tangents += estimator.estimate().tangents;
-    steps += estimator.estimate().steps;
+    tangents += estimator.estimate().work.tangents;
+    steps += estimator.estimate().work.steps;
   }
   Vec3 total = Vec3::Zero();
   for (const Vec3& f : forces.forces_n) total += f;
@@ -155,7 +155,7 @@ void LiveEstimation(benchmark::State& state) {
     const double s = take();
     state.SetIterationTime(s);
     times_ms.push_back(1e3 * s);
-    tangents += estimator.estimate().tangents;
+    tangents += estimator.estimate().work.tangents;
   }
   std::sort(times_ms.begin(), times_ms.end());
   const auto at = [&](size_t percent) { return times_ms[(times_ms.size() - 1) * percent / 100]; };

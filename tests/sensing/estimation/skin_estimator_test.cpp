@@ -248,6 +248,40 @@ TEST_F(SkinEstimatorTest, NonsenseIsRefusedAndForgotten) {
   EXPECT_LT((estimate_.loads.loads[0].force_n - warm).norm(), 0.2 * sigma);
 }
 
+// What is torn, shifted or seen in a mirror ends soon, and the next frame is answered as if there had been
+// none of it.
+TEST_F(SkinEstimatorTest, ABadFrameCostsLittleAndOnlyItself) {
+  const Pushed first = Push(model_, 1, 1.3, 95, 0.8, 4), second = Push(model_, 1, -0.5, 60, 0.8, 4);
+  ASSERT_TRUE(first.ok && second.ok);
+  const SkinObservation good = Observe(first.markers_mm, 1, 0.05);
+  std::vector<Eigen::VectorXd> bad(4, first.markers_mm);
+  for (int m = 0; m < model_.markers.count(); ++m) {
+    const auto part = Eigen::seqN(3 * m, 3);
+    if (m % 2 == 0) bad[0](part) = second.markers_mm(part) + Vec3(0, 6, 0);
+    if (model_.RestMarker(m).x() > 0) bad[1](part) += Vec3(9, -9, 4);
+    bad[2](part) = -2 * first.markers_mm(part);
+    bad[3](part) = Vec3(8, 5, -7) * std::sin(0.37 * m);
+  }
+  constexpr int kLastStepUnits = 15 * 16 + 2 * 40 + 10 + 1500;  // assimilation, tangents and a fit
+  SkinEstimator estimator(model_, {.most_work = FrameWork::kLiveUnits});
+  for (const Eigen::VectorXd& markers_mm : bad) {
+    for (int frame = 0; frame < 3; ++frame) estimator.Estimate(good, estimate_);
+    ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+    estimator.Estimate(Observe(markers_mm, 1, 0.05), estimate_);
+    EXPECT_NE(estimate_.failure, EstimateFailure::kNone);
+    EXPECT_LE(estimate_.work.Units(), FrameWork::kLiveUnits + kLastStepUnits);
+    estimator.Estimate(good, estimate_);
+    ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
+    EXPECT_EQ(estimate_.work.assimilation_steps, 0);
+    SkinEstimator fresh(model_);
+    SkinEstimate cold;
+    fresh.Estimate(good, cold);
+    ASSERT_EQ(estimate_.loads.loads.size(), cold.loads.loads.size());
+    const double sigma_n = std::sqrt(cold.loads.loads[0].force_covariance_n2.trace());
+    EXPECT_LT((estimate_.loads.loads[0].force_n - cold.loads.loads[0].force_n).norm(), 0.2 * sigma_n);
+  }
+}
+
 // A sensor scatters about zero, and a little suction buckles this skin: no reading that is true within its
 // deviation costs the frame, and what is told beyond what the skin stands does not change the force.
 TEST_F(SkinEstimatorTest, ReadingsBelowZeroAreNoSuction) {

@@ -47,7 +47,7 @@ TEST_F(StandingSkinTest, AnswersAsIfEachFrameWereTheFirst) {
     for (int frame = 0; frame < 8; ++frame) {
       const SkinObservation seen = Noisy(pushed.markers_mm);
       estimator_.Estimate(seen, estimate_);
-      steps += estimate_.steps;
+      steps += estimate_.work.steps;
       ExpectColdAnswer(seen);
     }
     EXPECT_LT(steps, 8 * 2);
