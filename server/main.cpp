@@ -21,6 +21,7 @@
 #include "server/config.h"
 #include "server/gateway/setup.h"
 #include "server/gateway/static_files.h"
+#include "server/heap.h"
 #include "server/log.h"
 #include "server/publish/nats_connection.h"
 #include "server/publish/publisher.h"
@@ -274,6 +275,7 @@ int Main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   taclink::KeepFilesFromOthers();
+  taclink::server::ReturnLargeBlocks();
   try {
     return taclink::server::Main(argc, argv);
   } catch (const std::exception& e) {

@@ -39,6 +39,7 @@
 #include "sensing/simulation/scene.h"
 #include "server/assembly/arm_builder.h"
 #include "server/config.h"
+#include "server/heap.h"
 
 namespace taclink::server {
 namespace {
@@ -297,6 +298,7 @@ int Main(int argc, char** argv) {
     return 1;
   }
   spdlog::set_level(spdlog::level::warn);
+  ReturnLargeBlocks();
   const auto cases = Cases(*options);
   if (cases.empty()) {
     fmt::print(stderr, "taclink_live_report: no such case\n");
