@@ -13,7 +13,7 @@ constexpr double kSpringNMm = 3;  // of a marker that is seen well; times E t
 constexpr double kWorthMm = 0.3;  // an observation as uncertain as this has half of it
 constexpr double kLongestStepMm = 4;
 constexpr double kSettledMm = 0.05;  // it is a place to linearize at
-constexpr int kMostIterations = 8, kMostHalvings = 12;
+constexpr int kMostIterations = 20, kMostHalvings = 12;
 constexpr double kFirstShift = 1e-4, kLargestShift = 1e3, kShiftGrowth = 8;  // of the rest Hessian's diagonal
 
 // Slot of the lower pattern's entry (row, column).

@@ -75,19 +75,18 @@ void SkinEstimator::BeginAgain() {
   past_ = past_before_;
   is_same_frame_ = true;
 }
-void SkinEstimator::Skip() {
-  past_before_ = past_;
-  KeepBefore();
-}
-// Of a frame without an answer nothing is kept: the next one begins where this one did. After two of them,
-// where an untouched skin does.
-void SkinEstimator::KeepBefore() {
+// After a frame without an answer the next one begins where this one did; after two of them, where an
+// untouched skin does. What was on the way to an answer is another place to begin at. Where a frame begins is
+// the nearest of them to its markers, so that one that nothing explains leaves nothing behind.
+void SkinEstimator::KeepBefore(const SkinEstimate& estimate) {
   const bool is_first = past_before_.has_last && !past_before_.is_skipped;
   Forget();
-  if (!is_first) return;
-  past_ = past_before_;
-  past_.has_next = false;
-  past_.is_skipped = true;
+  if (is_first) {
+    past_ = past_before_;
+    past_.is_skipped = true;
+  }
+  past_.has_next = IsSpent(estimate);
+  if (past_.has_next) past_.next = estimate.state;
 }
 void SkinEstimator::Forget() {
   past_.has_last = past_.has_next = false;
@@ -297,7 +296,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   const bool stands = may_stand && SolveStanding(problem, estimate);
   const bool is_solved = stands || SolveWithoutIsolated(problem, estimate);
   if (!is_solved) {
-    KeepBefore();
+    KeepBefore(estimate);
     estimate.state = start_;
     mechanics_.markers().Displacements(start_, estimate.displacements_mm);
     estimate.has_shape = IsPossible(estimate);
@@ -313,7 +312,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
                      : estimate.loads.converged ? EstimateFailure::kNone
                                                 : EstimateFailure::kNotConverged;
-  if (estimate.failure != EstimateFailure::kNone) return KeepBefore();
+  if (estimate.failure != EstimateFailure::kNone) return KeepBefore(estimate);
   if (estimate.loads.loads.empty()) return Forget();
   const Eigen::VectorXd local_n = used_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
   if (maker_ && is_new_frame) MakeAhead(problem, estimate, local_n);

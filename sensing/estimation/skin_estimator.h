@@ -61,7 +61,8 @@ struct SkinEstimatorOptions {
   /// None: the cheapest whose error is small enough, frame by frame. kLiteral is no model of this estimator.
   std::optional<ForceModel> model = {};
   int refinement = 0;  ///< elements per interval of the marker grid; 0: as many as the skin's dents ask for
-  /// A frame that has cost so many FrameWork::Units ends without an answer.
+  /// A frame that has cost so many FrameWork::Units ends without an answer; the next one may begin where it
+  /// has come to.
   int most_work = FrameWork::kUnlimited;
   /// Where tangents are made ahead, so that a moving contact's frames need not wait for them. None: in the
   /// caller's thread, when they are due. The answers are the same.
@@ -81,7 +82,10 @@ class SkinEstimator {
   /// Forgets the frames before: where the next one begins.
   void Forget();
   /// Instead of Estimate, of a frame that is no observation.
-  void Skip();
+  void Skip() {
+    past_before_ = past_;
+    KeepBefore({});
+  }
   /// And the tangents that were made in them.
   void Restart();
   /// The next call is of the same frame, looked at more closely: it begins from the last call's answer.
@@ -113,7 +117,7 @@ class SkinEstimator {
   bool Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n);
   bool Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
               const Eigen::VectorXd& local_n, SkinEstimate& estimate);
-  void KeepBefore();
+  void KeepBefore(const SkinEstimate& estimate);
   bool IsSpent(const SkinEstimate& estimate) const { return estimate.work.Units() > options_.most_work; }
   void TakeNext(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n);
   void MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate, const Eigen::VectorXd& local_n);

@@ -32,7 +32,7 @@ struct PipelineOptions {
   /// Search the full pictures in every frame instead of following the markers.
   bool always_acquire = false;
   MarkerTrackerOptions tracking;
-  ForceOptions force = {.most_work = FrameWork::kLiveUnits};
+  ForceOptions force;
   ContactOptions contact;
   /// How the baseline follows a skin that creeps; none: it stays as it was taken.
   std::optional<DriftOptions> drift;

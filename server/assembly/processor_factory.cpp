@@ -97,6 +97,7 @@ PipelineOptions ToPipelineOptions(const LinkConfig& link) {
   PipelineOptions options;
   options.force.model = link.force_model;
   options.force.refinement = link.force_refinement;
+  options.force.most_work = FrameWork::kLiveUnits;
   options.drift = link.drift;
   options.pictures_may_repeat = !std::holds_alternative<V4l2SourceConfig>(link.source);
   if (link.pressure) {
