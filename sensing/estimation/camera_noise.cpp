@@ -30,6 +30,14 @@ bool IsSurelySeen(const Mat3& information, double least) {
   return half > 0 && information.determinant() > least * half * half;
 }
 
+// By traces where all is seen.
+NoiseChange ChangeOf(const Mat3& then_mm2, const Mat3& information, double unseen_mm) {
+  if (IsSurelySeen(information, 1 / (kUnseenShare * unseen_mm * unseen_mm)))
+    return {then_mm2.trace(), NoiseTraceOf(information, unseen_mm)};
+  const SeenNoise seen = SeenNoiseOf(information, unseen_mm);
+  return {(seen.axes.transpose() * then_mm2 * seen.axes).trace(), seen.variances_mm2.sum()};
+}
+
 // Without the eigenvalues where all is seen: of the adjugate over the determinant.
 double NoiseTraceOf(const Mat3& information, double unseen_mm) {
   const Mat3& a = information;

@@ -17,6 +17,12 @@ struct SeenNoise {
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 3, 1> variances_mm2;
 };
 SeenNoise SeenNoiseOf(const Mat3& information, double unseen_mm);
+/// The variances that two covariances have in the directions in which a marker is seen now, summed: `then` of
+/// `then_mm2`, `now` by `information`.
+struct NoiseChange {
+  double then_mm2 = 0, now_mm2 = 0;
+};
+NoiseChange ChangeOf(const Mat3& then_mm2, const Mat3& information, double unseen_mm);
 /// The trace of NoiseOf.
 double NoiseTraceOf(const Mat3& information, double unseen_mm);
 /// Whether no direction has less than `least` of the information, 1/mm^2. Quick: false may be wrong.

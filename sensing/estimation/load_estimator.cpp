@@ -143,21 +143,18 @@ void LoadEstimator::WriteCameraCovariances() {
   }
 }
 
+bool LoadEstimator::HasPressure(const PressurePrior& prior) const {
+  return untouched_ && prior.sigma_mpa <= kSameNoise * pressure_sigma_ &&
+         pressure_sigma_ <= kSameNoise * prior.sigma_mpa;
+}
+
 bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const {
-  if (!untouched_ || prior.sigma_mpa > kSameNoise * pressure_sigma_ ||
-      pressure_sigma_ > kSameNoise * prior.sigma_mpa || !untouched_->HasBaseline(prior) ||
-      !untouched_->HidesFew(observed))
-    return false;
-  const double unseen = covariance_.unseen_mm(), unseen2 = unseen * unseen;
+  if (!HasPressure(prior) || !untouched_->HasBaseline(prior) || !untouched_->LosesFew(observed)) return false;
   constexpr double kMost = kSameNoise * kSameNoise;
   int worse = 0;
   for (size_t m = 0; m < noise_mm2_.size(); ++m) {
-    double then = noise_mm2_[m].trace(), now = NoiseTraceOf(observed.information[m], unseen);
-    if (now > kUnseenShare * unseen2) {  // in a direction at least, which is hidden: by the others
-      const SeenNoise seen = SeenNoiseOf(observed.information[m], unseen);
-      then = (seen.axes.transpose() * noise_mm2_[m] * seen.axes).trace();
-      now = seen.variances_mm2.sum();
-    }
+    // What is hidden now does not matter.
+    const auto [then, now] = ChangeOf(noise_mm2_[m], observed.information[m], covariance_.unseen_mm());
     if (now > kMost * then || then > kMost * now) ++worse;
   }
   return worse <= kOtherNoiseShare * static_cast<double>(noise_mm2_.size());

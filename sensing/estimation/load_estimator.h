@@ -84,6 +84,8 @@ class LoadEstimator {
   /// Whether these observations are nearly as good, everywhere, as those that were prepared for, and count
   /// from the same baseline; what is missing now does not matter.
   bool IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const;
+  /// Whether it was prepared for a pressure that is known about as well.
+  bool HasPressure(const PressurePrior& prior) const;
 
   /// After Prepare. The linearization may have been rebased. Covariances and what is left unexplained are not
   /// written. `untouched_norms`: FreeNorms() of the skin without loads, shown the same observations, which

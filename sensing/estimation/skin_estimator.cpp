@@ -78,15 +78,15 @@ void SkinEstimator::BeginAgain() {
 // After a frame without an answer the next one begins where this one did; after two of them, where an
 // untouched skin does. What was on the way to an answer is another place to begin at. Where a frame begins is
 // the nearest of them to its markers, so that one that nothing explains leaves nothing behind.
-void SkinEstimator::KeepBefore(const SkinEstimate& estimate) {
+void SkinEstimator::KeepBefore(const ShellState* reached) {
   const bool is_first = past_before_.has_last && !past_before_.is_skipped;
   Forget();
   if (is_first) {
     past_ = past_before_;
     past_.is_skipped = true;
   }
-  past_.has_next = IsSpent(estimate);
-  if (past_.has_next) past_.next = estimate.state;
+  past_.has_next = reached != nullptr;
+  if (past_.has_next) past_.next = *reached;
 }
 void SkinEstimator::Forget() {
   past_.has_last = past_.has_next = false;
@@ -263,7 +263,7 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
 
 void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& estimate) {
   const bool is_new_frame = !std::exchange(is_same_frame_, false);
-  if (is_new_frame && past_.has_last)
+  if (is_new_frame && (past_.has_last || past_.has_next))
     past_before_ = past_;
   else if (is_new_frame)
     past_before_.has_last = past_before_.has_next = false;
@@ -296,7 +296,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   const bool stands = may_stand && SolveStanding(problem, estimate);
   const bool is_solved = stands || SolveWithoutIsolated(problem, estimate);
   if (!is_solved) {
-    KeepBefore(estimate);
+    KeepBefore(IsSpent(estimate) ? &estimate.state : nullptr);
     estimate.state = start_;
     mechanics_.markers().Displacements(start_, estimate.displacements_mm);
     estimate.has_shape = IsPossible(estimate);
@@ -312,7 +312,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
                      : estimate.loads.converged ? EstimateFailure::kNone
                                                 : EstimateFailure::kNotConverged;
-  if (estimate.failure != EstimateFailure::kNone) return KeepBefore(estimate);
+  if (estimate.failure != EstimateFailure::kNone) return KeepBefore(nullptr);
   if (estimate.loads.loads.empty()) return Forget();
   const Eigen::VectorXd local_n = used_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
   if (maker_ && is_new_frame) MakeAhead(problem, estimate, local_n);
@@ -345,11 +345,12 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
 
 // What the touched skin's tangents take from the skin without loads. One from 2 mm of inflation away would do
 // for the covariance, but not for the norms: weak loads were missed.
-bool SkinEstimator::PrepareUntouched(const SkinProblem& problem) {
+bool SkinEstimator::PrepareUntouched(const SkinProblem& problem, SkinEstimate& estimate) {
   const bool is_good = still_->is_prepared && still_->IsNear(problem.inflated.state) &&
+                       still_->loads.HasPressure(problem.prior) &&
                        still_->loads.untouched()->IsGoodFor(problem.observed, problem.prior);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
-  if (!is_good && !still_->Make(problem, problem.inflated.state, none, nullptr)) return false;
+  if (!is_good && !Remake(*still_, problem, problem.inflated.state, none, estimate)) return false;
   still_->loads.Hide(problem.observed);
   return true;
 }
@@ -369,7 +370,7 @@ bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   // A small dent is nearer to where its first step has led.
   if (is_small && local_n.size() == 0 && !small.loads.loads.empty()) estimate.state = small.state;
   start_ = estimate.state;
-  return PrepareUntouched(problem) && SolveLarge(problem, estimate, local_n);
+  return PrepareUntouched(problem, estimate) && SolveLarge(problem, estimate, local_n);
 }
 
 }  // namespace taclink

@@ -84,7 +84,7 @@ class SkinEstimator {
   /// Instead of Estimate, of a frame that is no observation.
   void Skip() {
     past_before_ = past_;
-    KeepBefore({});
+    KeepBefore(nullptr);
   }
   /// And the tangents that were made in them.
   void Restart();
@@ -117,7 +117,7 @@ class SkinEstimator {
   bool Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n);
   bool Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
               const Eigen::VectorXd& local_n, SkinEstimate& estimate);
-  void KeepBefore(const SkinEstimate& estimate);
+  void KeepBefore(const ShellState* reached);
   bool IsSpent(const SkinEstimate& estimate) const { return estimate.work.Units() > options_.most_work; }
   void TakeNext(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n);
   void MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate, const Eigen::VectorXd& local_n);
@@ -127,7 +127,7 @@ class SkinEstimator {
   bool SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
   SkinProblem MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
                           PressurePrior prior, const Eigen::VectorXd& baseline_mm) const;
-  bool PrepareUntouched(const SkinProblem& problem);
+  bool PrepareUntouched(const SkinProblem& problem, SkinEstimate& estimate);
   bool Solve(const SkinProblem& problem, SkinEstimate& estimate);
   bool SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& estimate);
   bool IsPossible(const SkinEstimate& estimate) const;

@@ -1,6 +1,7 @@
 // Where a frame begins: the part of SkinEstimator before its steps.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "sensing/estimation/isolated_markers.h"
 #include "sensing/estimation/skin_estimator.h"
@@ -23,7 +24,9 @@ double SkinEstimator::FurthestOff(const ShellState& state, const MarkerObservati
     const double most = information.trace();
     if (!(most > 0)) continue;
     const Vec3 off = markers_mm_.segment<3>(3 * static_cast<Eigen::Index>(m)) - observed.displacement_mm[m];
-    furthest = std::max(furthest, std::sqrt(off.dot(information * off) * 3 / most));
+    const double mm = std::sqrt(off.dot(information * off) * 3 / most);
+    if (!std::isfinite(mm)) return std::numeric_limits<double>::infinity();
+    furthest = std::max(furthest, mm);
   }
   return furthest;
 }
@@ -51,7 +54,7 @@ bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Ei
     estimate.work.assimilation_steps += done.iterations;
     return done.converged;
   };
-  if (!assimilate() && past_.has_last) {
+  if (!assimilate() && (past_.has_last || past_.has_next)) {
     estimate.state = problem.inflated.state;
     assimilate();
   }
@@ -80,7 +83,10 @@ bool SkinEstimator::SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& est
     if (hidden == 0) continue;
     const bool was_solved = is_solved;
     is_solved = Solve(without, estimate);
-    if (was_solved && !is_solved) return Solve(problem, estimate);
+    if (was_solved && !is_solved) {
+      estimate.work = {};  // what was found is found again, whatever has been spent
+      return Solve(problem, estimate);
+    }
     problem.observed = without.observed;
   }
   return is_solved;

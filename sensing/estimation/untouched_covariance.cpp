@@ -71,23 +71,23 @@ bool UntouchedCovariance::HasBaseline(const PressurePrior& prior) const {
   return (prior.baseline_sigma_mpa * baseline - by_baseline_mm).isZero(kSameMm);
 }
 
-bool UntouchedCovariance::HidesFew(const MarkerObservations& observed) const {
+bool UntouchedCovariance::LosesFew(const MarkerObservations& observed) const {
   const double unseen_mm2 = kUnseenShare * unseen_mm * unseen_mm;
-  size_t hidden = 0;
+  size_t lost = 0;
   for (size_t m = 0; m < noise_mm2.size(); ++m) {
-    if (noise_mm2[m].trace() < unseen_mm2 && NoiseTraceOf(observed.information[m], unseen_mm) > unseen_mm2)
-      ++hidden;
+    const double now_mm2 = NoiseTraceOf(observed.information[m], unseen_mm);
+    if (noise_mm2[m].trace() < unseen_mm2 && now_mm2 > kSameNoise * kSameNoise * noise_mm2[m].trace()) ++lost;
   }
-  return !IsMany(hidden, noise_mm2.size());
+  return !IsMany(lost, noise_mm2.size());
 }
 
 bool UntouchedCovariance::IsGoodFor(const MarkerObservations& observed, const PressurePrior& prior) const {
   int better = 0;
   for (size_t m = 0; m < noise_mm2.size(); ++m) {
-    const double now = NoiseTraceOf(observed.information[m], unseen_mm);
-    if (noise_mm2[m].trace() > kSameNoise * kSameNoise * now) ++better;
+    const auto [then, now] = ChangeOf(noise_mm2[m], observed.information[m], unseen_mm);
+    if (then > kSameNoise * kSameNoise * now) ++better;
   }
-  return better <= kOtherNoiseShare * static_cast<double>(noise_mm2.size()) && HidesFew(observed) &&
+  return better <= kOtherNoiseShare * static_cast<double>(noise_mm2.size()) && LosesFew(observed) &&
          HasBaseline(prior);
 }
 

@@ -29,8 +29,8 @@ struct UntouchedCovariance {
                                                          const MarkerObservations& observed,
                                                          const PressurePrior& prior);
 
-  /// For a skin that is touched: observations that are worse do not matter, nor do a few that are not there.
-  /// False: many are better or missing, or they count from another baseline.
+  /// For a skin that is touched: some that are worse or missing do not matter. False: some are better, many
+  /// worse or missing, or they count from another baseline.
   bool IsGoodFor(const MarkerObservations& observed, const PressurePrior& prior) const;
 
   double unseen_mm = 0;            ///< standard deviation of a direction in which a marker is not seen
@@ -39,8 +39,8 @@ struct UntouchedCovariance {
   Eigen::VectorXd by_baseline_mm;  ///< stacked, of one standard deviation of the baseline's pressure
   double baseline_sigma_mpa = 0;
   bool HasBaseline(const PressurePrior& prior) const;
-  /// Few of the markers that it counts as seen are hidden now, in any direction.
-  bool HidesFew(const MarkerObservations& observed) const;
+  /// Few of the markers that it counts as seen are hidden now, in any direction, or seen worse.
+  bool LosesFew(const MarkerObservations& observed) const;
   Eigen::MatrixXf covariance_mm2;  ///< lower half
   Eigen::MatrixXf factor;          ///< of that, lower
 };

@@ -408,6 +408,35 @@ TEST_F(SkinEstimatorTest, MarkersThatOneCameraSeesWorseSayLess) {
   EXPECT_NEAR(estimate_.loads.region_chi2_per_dof, cold.loads.region_chi2_per_dof, 0.1);
 }
 
+// Half of the markers change the camera that sees them: what the skin without loads was weighed with does not
+// show what is seen now.
+TEST_F(SkinEstimatorTest, AnotherCameraIsAsGoodAsTheFirst) {
+  const Pushed none = Push(model_, 1, 1.3, 95, 0, 4), pushed = Push(model_, 1, 1.3, 95, 0.4, 4);
+  ASSERT_TRUE(none.ok && pushed.ok);
+  const auto by_one_camera = [&](const Eigen::VectorXd& markers_mm, double camera_z) {
+    SkinObservation seen = Observe(markers_mm, 1, 0.05);
+    for (int m = 0; m < model_.markers.count(); ++m) {
+      const Vec3 at = model_.RestMarker(m), sight = (at - Vec3(0, 0, camera_z)).normalized();
+      if (at.y() > 0)
+        seen.markers.information[static_cast<size_t>(m)] =
+            (Mat3::Identity() - sight * sight.transpose()) / (0.05 * 0.05);
+    }
+    return seen;
+  };
+  estimator_.Estimate(by_one_camera(none.markers_mm, -10), estimate_);
+  ASSERT_TRUE(estimate_.loads.loads.empty());
+  const SkinObservation now = by_one_camera(pushed.markers_mm, model_.length_mm + 10);
+  estimator_.Estimate(now, estimate_);
+  SkinEstimator fresh(model_);
+  SkinEstimate cold;
+  fresh.Estimate(now, cold);
+  ASSERT_EQ(estimate_.loads.loads.size(), cold.loads.loads.size());
+  ASSERT_EQ(cold.loads.loads.size(), 1u);
+  const double sigma_n = std::sqrt(cold.loads.loads[0].force_covariance_n2.trace());
+  EXPECT_LT((estimate_.loads.loads[0].force_n - cold.loads.loads[0].force_n).norm(), 0.2 * sigma_n);
+  EXPECT_NEAR(std::sqrt(estimate_.loads.loads[0].force_covariance_n2.trace()) / sigma_n, 1, 0.1);
+}
+
 TEST_F(SkinEstimatorTest, WhatIsMadeAheadChangesNoAnswer) {
   std::vector<SkinObservation> stages;
   for (const double force_n : {0.1, 0.25, 0.4, 0.5, 0.6}) {
