@@ -30,6 +30,7 @@ ArmContact From(const v1::ArmContact& message) {
           .center_covariance_m2 = FromMessage(message.center_covariance_m2()),
           .normal_force_n = message.normal_force_n(),
           .area_m2 = message.area_m2(),
+          .is_ring_contact = message.is_ring_contact(),
           .exposure_utc_ns = message.exposure_utc_ns(),
           .validity = From(message.validity())};
 }

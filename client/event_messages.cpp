@@ -1,14 +1,10 @@
-#include <array>
 #include <cmath>
 
 #include "client/messages.h"
+#include "wire/enum_names.h"
 
 namespace taclink::client {
 namespace {
-
-constexpr std::array<const char*, 13> kKindNames = {
-    "unknown",     "contact_begin", "contact_update", "contact_end", "force_level", "link_status", "tare",
-    "calibration", "baseline",      "drift",          "thresholds",  "frames_lost", "recording"};
 
 ForceLevel From(v1::ForceLevel level) {
   switch (level) {
@@ -76,6 +72,8 @@ void TakeDetail(const v1::Event& message, Event& event) {
   }
 }
 
+static_assert(static_cast<int>(EventKind::kCamera) == v1::EventKind_MAX, "EventKind misses a kind");
+
 }  // namespace
 
 const char* Name(BaselineOrigin origin) {
@@ -109,14 +107,13 @@ const char* Name(ForceLevel level) {
 }
 
 const char* Name(EventKind kind) {
-  return kKindNames[static_cast<size_t>(kind)];
+  return wire::NamesOf<v1::EventKind>().Name(static_cast<int>(kind));
 }
 
 std::optional<EventKind> EventKindOf(const std::string& name) {
-  for (size_t i = 1; i < kKindNames.size(); ++i) {
-    if (name == kKindNames[i]) return static_cast<EventKind>(i);
-  }
-  return {};
+  const auto number = wire::NamesOf<v1::EventKind>().Number(name);
+  if (!number) return {};
+  return static_cast<EventKind>(*number);
 }
 
 Baseline FromMessage(const v1::Baseline& message) {
@@ -138,8 +135,8 @@ ForceLevelState FromMessage(const v1::ForceLevelState& message) {
 Event FromMessage(const v1::Event& message) {
   Event event;
   event.sequence = message.sequence();
-  const bool known = message.kind() > 0 && static_cast<size_t>(message.kind()) < kKindNames.size();
-  event.kind = known ? static_cast<EventKind>(message.kind()) : EventKind::kUnknown;
+  event.kind =
+      v1::EventKind_IsValid(message.kind()) ? static_cast<EventKind>(message.kind()) : EventKind::kUnknown;
   event.link = message.link();
   event.frame_sequence = message.frame_sequence();
   const v1::EventTimes& times = message.times();

@@ -245,6 +245,7 @@ Contact From(const v1::Contact& message) {
   contact.center_covariance_m2 = From(message.center_covariance_m2());
   contact.normal_force_n = message.normal_force_n();
   contact.area_m2 = message.area_m2();
+  contact.is_ring_contact = message.is_ring_contact();
   for (const uint32_t marker : message.markers()) contact.markers.push_back(static_cast<int>(marker));
   contact.moment_nm = From(message.moment_nm());
   contact.peak_pressure_pa = message.peak_pressure_pa();

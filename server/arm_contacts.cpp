@@ -15,6 +15,7 @@ ArmContact InBase(size_t link, const Contact& contact, const Rigid3& base_from_l
                  .normal = rotation * contact.normal,
                  .force_n = rotation * contact.force_n,
                  .normal_force_n = contact.normal_force_n,
+                 .is_ring_contact = contact.is_ring_contact,
                  .area_mm2 = contact.area_mm2};
   out.moment_nmm = out.center_mm.cross(out.force_n);
   if (contact.force_covariance_n2)

@@ -23,6 +23,7 @@ struct ArmContact {
   std::optional<Mat3> force_covariance_n2 = {};
   std::optional<Mat3> center_covariance_mm2 = {};
   double normal_force_n = 0;
+  bool is_ring_contact = false;
   double area_mm2 = 0;
 };
 

@@ -2,23 +2,15 @@
 
 #include <utility>
 
+#include "sensing/core/link_state_fields.h"
+
 namespace taclink::server {
 
 void ResetTo(LinkState& state, LinkStatus status, std::string reason, std::optional<ReasonId> id) {
-  state.reasons.clear();
+  ResetField(state, LinkState());
   if (id) state.reasons.push_back({*id, reason});
-  state.times = {};
   state.status = status;
   state.status_reason = std::move(reason);
-  state.pressure_mpa.reset();
-  state.pressure = {};
-  state.cameras = {};
-  state.tracking = {};
-  state.ClearMeasurement();
-  state.baseline_age_s = 0;
-  state.baseline = {};
-  state.stage_ms = {};
-  state.replayed = false;
 }
 
 void LinkOutlet::Close() {

@@ -15,7 +15,7 @@
 
 namespace taclink::server {
 
-/// Turns `state` into one that says nothing but its status and why; its buffers stay.
+/// Clears all of `state` and sets its status and the reason; its buffers stay.
 void ResetTo(LinkState& state, LinkStatus status, std::string reason, std::optional<ReasonId> id = {});
 
 /// Where a link's states leave. It outlasts the workers that the link has one after the other: only the

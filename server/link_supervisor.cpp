@@ -351,7 +351,7 @@ Result<void> LinkSupervisor::Tare(const TareOptions& options, TareObserver obser
   return NoWorker();
 }
 
-Result<void> LinkSupervisor::SetCamera(const CameraOrder& order, CameraObserver observer) {
+Result<void> LinkSupervisor::SetCamera(const CameraOrder& order, CommandObserver observer) {
   const auto kept = [memory = cameras_, order, observer = std::move(observer)](const Result<void>& done) {
     if (done) memory->Keep(order);
     observer(done);
@@ -360,25 +360,28 @@ Result<void> LinkSupervisor::SetCamera(const CameraOrder& order, CameraObserver 
   return NoWorker();
 }
 
-void LinkSupervisor::EndCameraOrders(const Error& why) {
-  if (const auto worker = current()) worker->EndCameraOrders(why);
+void LinkSupervisor::CloseCommands(const Error& why) {
+  if (const auto worker = current()) worker->CloseCommands(why);
 }
 
-Result<void> LinkSupervisor::SetForceModel(std::optional<ForceModel> model) {
+Result<void> LinkSupervisor::SetForceModel(std::optional<ForceModel> model, CommandObserver observer) {
   if (!factories_.estimator)
     return Error{ErrorCode::kFailedPrecondition, "link '" + name_ + "' computes no forces here"};
   const auto worker = current();
   if (!worker) return NoWorker();
+  const auto adopted = [choose = factories_.choose, model,
+                        observer = std::move(observer)](const Result<void>& done) {
+    if (done && choose) choose(model);
+    observer(done);
+  };
   try {
     auto estimator = factories_.estimator(model);
     if (!estimator)
       return Error{estimator.error().code, "link '" + name_ + "': " + estimator.error().message};
-    worker->UseEstimator(std::move(*estimator));
+    return worker->UseEstimator(std::move(*estimator), adopted);
   } catch (const std::exception& e) {
     return Error{ErrorCode::kInternal, std::string("the force model can't be made: ") + e.what()};
   }
-  if (factories_.choose) factories_.choose(model);
-  return {};
 }
 
 Error LinkSupervisor::NoWorker() const {

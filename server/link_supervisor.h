@@ -102,13 +102,14 @@ class LinkSupervisor {
   /// Likewise.
   Result<void> Tare(const TareOptions& options, TareObserver observer);
   /// Likewise. What was taken lasts until the server ends, also with a fresh worker.
-  Result<void> SetCamera(const CameraOrder& order, CameraObserver observer);
-  /// At shutdown: answers those that wait, whatever their cameras do.
-  void EndCameraOrders(const Error& why);
+  Result<void> SetCamera(const CameraOrder& order, CommandObserver observer);
+  /// At shutdown: answers the commands that wait for a thread, whether or not it hangs.
+  void CloseCommands(const Error& why);
   /// Computes the forces by `model` (none: by tolerance, frame by frame) from the next frame on, also after a
-  /// restart. Takes up to seconds. Errors: kUnavailable (no worker now), kFailedPrecondition (nothing is
-  /// computed here).
-  Result<void> SetForceModel(std::optional<ForceModel> model);
+  /// restart. Builds the model first, which takes up to seconds. `observer` learns whether the FEM thread
+  /// adopted it. Errors: kUnavailable (no worker now), kFailedPrecondition (nothing is computed here, or the
+  /// model does not hold); then `observer` is not called.
+  Result<void> SetForceModel(std::optional<ForceModel> model, CommandObserver observer);
 
  private:
   enum class Phase { kRunning, kEnding, kBackoff, kBuilding, kResting };

@@ -76,7 +76,7 @@ void LinkWorker::Died(const std::string& reason) {
   const Error error{ErrorCode::kInternal, "the link's worker failed: " + reason};
   EndCalibrationFromOutside(error);
   tare_.EndFromOutside(error);
-  cameras_.End(error);
+  CloseCommands(error);
   const std::lock_guard lock(end_mutex_);
   if (!failure_) failure_ = reason;
 }
@@ -98,7 +98,7 @@ void LinkWorker::Abandon() {
   const Error error{ErrorCode::kUnavailable, "the link's worker hangs and was given up"};
   EndCalibrationFromOutside(error);
   tare_.EndFromOutside(error);
-  cameras_.End(error);
+  CloseCommands(error);
   if (capture_.joinable()) capture_.detach();
   if (solve_.joinable()) solve_.detach();
 }
@@ -118,7 +118,7 @@ void LinkWorker::Capture(const std::stop_token& stop) {
   StereoFrame frame;
   while (!stop.stop_requested()) {
     capture_mark_.Begin(WorkStage::kWait, clock_.MonotonicNs());
-    cameras_.CarryOut(supervisor_);
+    capture_commands_.RunAll(supervisor_);
     if (supervisor_.WaitsForReader() && !mailbox_.WaitUntilTaken(options_.poll)) continue;
     if (!supervisor_.Next(frame, options_.poll)) continue;
     if (options_.pressure) options_.pressure->Apply(frame);
@@ -126,7 +126,7 @@ void LinkWorker::Capture(const std::stop_token& stop) {
     if (frame.pressure_mpa) frame.pressure_mpa = ExactInPascals(*frame.pressure_mpa);
     mailbox_.Put(frame);
   }
-  cameras_.End({ErrorCode::kUnavailable, "the link is stopping"});
+  capture_commands_.Close({ErrorCode::kUnavailable, "the link is stopping"});
 }
 
 void LinkWorker::Solve(const std::stop_token& stop) {
@@ -135,7 +135,7 @@ void LinkWorker::Solve(const std::stop_token& stop) {
     fem_mark_.Begin(WorkStage::kWait, clock_.MonotonicNs());
     const bool any = mailbox_.Take(frame, options_.poll);
     TakeCalibrationOrder();
-    TakeEstimator();
+    fem_commands_.RunAll(*processor_);
     tare_.Begin(*processor_, clock_.MonotonicNs());
     if (any) {
       SolveOne(frame);
@@ -154,6 +154,7 @@ void LinkWorker::Solve(const std::stop_token& stop) {
   tare_.End(*processor_, {ErrorCode::kUnavailable, "the link is stopping"});
   // Nobody would answer what is ordered from now on.
   EndCalibrationFromOutside({ErrorCode::kUnavailable, "the link is stopping"});
+  fem_commands_.Close({ErrorCode::kUnavailable, "the link is stopping"});
   tare_.EndFromOutside({ErrorCode::kUnavailable, "the link is stopping"});
 }
 
@@ -170,20 +171,26 @@ Result<void> LinkWorker::Calibrate(const CalibrationOrder& order, CalibrationObs
   return {};
 }
 
-void LinkWorker::UseEstimator(std::shared_ptr<StateEstimator> estimator) {
-  const std::lock_guard lock(estimator_mutex_);
-  estimator_ = std::move(estimator);
+Result<void> LinkWorker::SetCamera(const CameraOrder& order, CommandObserver done) {
+  return capture_commands_.Post(
+      [order](SourceSupervisor& source) {
+        Result<void> set;
+        for (const CameraId id : kBothCameras)
+          if (set && order.cameras[Index(id)]) set = source.SetCamera(id, order.settings);
+        return set;
+      },
+      std::move(done));
 }
 
-void LinkWorker::TakeEstimator() {
-  std::shared_ptr<StateEstimator> estimator;
-  {
-    const std::lock_guard lock(estimator_mutex_);
-    estimator = std::move(estimator_);
-  }
-  if (!estimator) return;
-  if (const auto used = processor_->UseEstimator(std::move(estimator)); !used)
-    SPDLOG_ERROR("link {}: force model: {}", name_, used.error().message);
+Result<void> LinkWorker::UseEstimator(std::shared_ptr<StateEstimator> estimator, CommandObserver done) {
+  return fem_commands_.Post([estimator = std::move(estimator)](
+                                LinkProcessor& processor) { return processor.UseEstimator(estimator); },
+                            std::move(done));
+}
+
+void LinkWorker::CloseCommands(const Error& why) {
+  capture_commands_.Close(why);
+  fem_commands_.Close(why);
 }
 
 void LinkWorker::TakeCalibrationOrder() {

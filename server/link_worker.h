@@ -14,7 +14,8 @@
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
 #include "sensing/core/link_state.h"
-#include "server/camera_desk.h"
+#include "server/camera_memory.h"
+#include "server/command_queue.h"
 #include "server/hub.h"
 #include "server/link_outlet.h"
 #include "server/link_processor.h"
@@ -30,6 +31,9 @@ namespace taclink::server {
 /// Called on the FEM thread as a calibration goes on, last with its end. False: cancel it; then no more
 /// calls.
 using CalibrationObserver = std::function<bool(const CalibrationProgress&)>;
+
+/// Called once, on the thread that ran the command or that gave it up.
+using CommandObserver = std::function<void(const Result<void>&)>;
 
 struct LinkWorkerOptions {
   /// Longest wait of both threads for anything, so also about how long Stop takes.
@@ -79,13 +83,12 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
     return tare_.Order(options, std::move(observer));
   }
 
-  Result<void> SetCamera(const CameraOrder& order, CameraObserver observer) {
-    return cameras_.Order(order, std::move(observer));
-  }
-  void EndCameraOrders(const Error& why) { cameras_.End(why); }
-
-  /// From the next frame on. Not null. Any thread.
-  void UseEstimator(std::shared_ptr<StateEstimator> estimator);
+  /// Stops at the first camera that refuses. Errors: as CommandQueue::Post; all else goes to `done`.
+  Result<void> SetCamera(const CameraOrder& order, CommandObserver done);
+  /// Uses `estimator` (not null) from the next frame on. Errors: likewise.
+  Result<void> UseEstimator(std::shared_ptr<StateEstimator> estimator, CommandObserver done);
+  /// Answers the commands of SetCamera and UseEstimator that wait; no further ones are accepted. Any thread.
+  void CloseCommands(const Error& why);
 
   LinkStatistics Statistics() const { return outlet_->Statistics(); }
   SourceCondition source_condition() const { return supervisor_.condition(); }
@@ -101,7 +104,6 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   void SolveOne(StereoFrame& frame);
   void PublishStatusIfDue();
   void TakeCalibrationOrder();
-  void TakeEstimator();
   void TellCalibration();
   CalibrationObserver ForgetCalibration();
   void EndCalibrationWithout(const Error& error);
@@ -118,7 +120,8 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   SourceSupervisor supervisor_;
   Mailbox<StereoFrame> mailbox_;
   TareDesk tare_;
-  CameraDesk cameras_;
+  CommandQueue<SourceSupervisor> capture_commands_;
+  CommandQueue<LinkProcessor> fem_commands_;
 
   mutable std::mutex end_mutex_;
   std::condition_variable ended_;
@@ -137,10 +140,6 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
       watching_;              // of the one ordered or under way, for when the FEM thread can't tell its end
   bool calibrating_ = false;  // ordered or under way
   bool calibration_closed_ = false;
-
-  std::mutex estimator_mutex_;
-  std::shared_ptr<StateEstimator>
-      estimator_;  // guarded by estimator_mutex_: to be used from the next frame on
 
   // Used by the FEM thread only.
   const std::unique_ptr<LinkProcessor> processor_;

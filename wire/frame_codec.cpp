@@ -68,6 +68,7 @@ std::optional<Mat3> CovarianceFrom(const google::protobuf::RepeatedField<double>
 
 void FillContact(const Contact& contact, Detail detail, v1::Contact& out) {
   out.set_id(contact.id);
+  out.set_is_ring_contact(contact.is_ring_contact);
   Fill(contact.center_mm, kMetresPerMm, *out.mutable_center_m());
   Fill(contact.normal, 1, *out.mutable_normal());
   Fill(contact.force_n, 1, *out.mutable_force_n());
@@ -90,6 +91,7 @@ void FillContact(const Contact& contact, Detail detail, v1::Contact& out) {
 Contact ContactFrom(const v1::Contact& message) {
   Contact contact;
   contact.id = message.id();
+  contact.is_ring_contact = message.is_ring_contact();
   contact.center_mm = FromWire(message.center_m(), 1 / kMetresPerMm);
   contact.normal = FromWire(message.normal(), 1);
   contact.force_n = FromWire(message.force_n(), 1);

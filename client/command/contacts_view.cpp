@@ -18,6 +18,7 @@ Json ArmContactJson(const client::ArmContact& contact) {
           {"force_sigma_n", SigmasJson(contact.force_covariance_n2, 1)},
           {"center_sigma_mm", SigmasJson(contact.center_covariance_m2, kMmPerMetre)},
           {"normal_force_n", contact.normal_force_n},
+          {"is_ring_contact", contact.is_ring_contact},
           {"area_mm2", contact.area_m2 * kMm2PerSquareMetre},
           {"exposure_utc_ns", contact.exposure_utc_ns},
           {"pose", client::Name(contact.validity)}};

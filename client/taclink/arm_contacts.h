@@ -35,6 +35,7 @@ struct ArmContact {
   std::optional<Covariance3> center_covariance_m2;
   double normal_force_n = 0;  ///< pressing in is positive
   double area_m2 = 0;
+  bool is_ring_contact = false;  ///< as Contact
   int64_t exposure_utc_ns = 0;
   PoseValidity validity = PoseValidity::kUnspecified;
 };

@@ -195,8 +195,9 @@ struct Contact {
   Vector3 force_n{};                                ///< what the world exerts on the skin
   std::optional<Covariance3> force_covariance_n2;   ///< none: not known
   std::optional<Covariance3> center_covariance_m2;  ///< likewise
-  /// Integral of the inward load: of a hug, whose resultant is none, all that it presses with.
+  /// Integral of the inward load; nonzero also for a ring contact, whose resultant is about zero.
   double normal_force_n = 0;
+  bool is_ring_contact = false;  ///< presses evenly around the whole circumference
   double area_m2 = 0;
   std::vector<int> markers;
   Vector3 moment_nm{};  ///< of the load about the link frame's origin

@@ -110,7 +110,7 @@ void ContactWriter::WriteShape(const EstimatedLoad& load, Contact& contact) {
     sum += at.inward_n;
     if (at.inward_n > kLoaded * peak_mpa_ * area) contact.area_mm2 += area;
   }
-  if (load.is_hug) {
+  if (load.is_ring_contact) {
     contact.center_mm.setZero();
     for (const SiteLoad& at : spread_) contact.center_mm += at.inward_n / sum * OuterPoint(at.site);
   }
@@ -169,7 +169,7 @@ void ContactWriter::WriteMarkers(Contact& contact) const {
 
 void ContactWriter::Write(const EstimatedLoad& load, Contact& contact) {
   Spread(load);
-  contact.is_hug = load.is_hug;
+  contact.is_ring_contact = load.is_ring_contact;
   contact.force_n = load.force_n;
   contact.normal_force_n = load.normal_force_n;
   contact.force_covariance_n2 = load.force_covariance_n2;

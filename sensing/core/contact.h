@@ -53,14 +53,14 @@ struct NodalForces {
 
 /// A connected region of the skin that something pushes on. Link frame.
 struct Contact {
-  uint64_t id = 0;                            ///< lasts while the contact does; unique within a link's run
-  bool is_hug = false;                        ///< presses alike all around the skin
-  Vec3 center_mm = Vec3::Zero();              ///< on the deformed outer surface; of a hug, on the axis
-  Vec3 normal = Vec3::Zero();                 ///< unit, of the deformed skin, away from the axis
-  Vec3 force_n = Vec3::Zero();                ///< what the world exerts on the skin
-  std::optional<Mat3> force_covariance_n2;    ///< none: not known
+  uint64_t id = 0;                          ///< lasts while the contact does; unique within a link's run
+  bool is_ring_contact = false;             ///< presses evenly around the whole circumference
+  Vec3 center_mm = Vec3::Zero();            ///< on the deformed outer surface; of a ring contact, on the axis
+  Vec3 normal = Vec3::Zero();               ///< unit, of the deformed skin, away from the axis
+  Vec3 force_n = Vec3::Zero();              ///< what the world exerts on the skin
+  std::optional<Mat3> force_covariance_n2;  ///< none: not known
   std::optional<Mat3> center_covariance_mm2;  ///< likewise
-  /// Integral of the inward load: of a hug, whose resultant is none, all that it presses with.
+  /// Integral of the inward load; nonzero also for a ring contact, whose resultant is about zero.
   double normal_force_n = 0;
   double area_mm2 = 0;             ///< of the loaded region, no finer than the marker grid
   std::vector<int> markers;        ///< indices of the loaded markers
@@ -70,7 +70,7 @@ struct Contact {
   /// deviation of the load along it.
   Vec3 major_axis_mm = Vec3::Zero(), minor_axis_mm = Vec3::Zero();
   /// A polygon round the loaded region on the deformed outer surface, counter-clockwise seen from outside;
-  /// convex on the unrolled skin, a hug's cut open on the other side of `normal`. Empty: not known.
+  /// convex on the unrolled skin, a ring contact's cut open on the other side of `normal`. Empty: not known.
   std::vector<Vec3> outline_mm;
 };
 

@@ -1,5 +1,7 @@
 #include "sensing/core/link_state.h"
 
+#include "sensing/core/link_state_fields.h"
+
 namespace taclink {
 
 const char* Name(ReasonId id) {
@@ -77,6 +79,10 @@ std::optional<ReasonId> ReasonNamed(std::string_view name) {
     if (name == Name(static_cast<ReasonId>(i))) return static_cast<ReasonId>(i);
   }
   return std::nullopt;
+}
+
+void LinkState::ClearMeasurement() {
+  ResetFields(*this, FieldScope::kMeasurement);
 }
 
 }  // namespace taclink

@@ -113,25 +113,8 @@ struct LinkState {
   bool has_forces() const {
     return (status == LinkStatus::kOk || status == LinkStatus::kDegraded) && forces.converged;
   }
-  /// Nothing is measured; most buffers stay.
-  void ClearMeasurement() {
-    shape.positions_mm.clear();
-    shape.displacements_mm.clear();
-    shape.covariances_mm2.clear();
-    shape.sources.clear();
-    shape.measured.clear();
-    shape.rejected.clear();
-    forces.forces_n.clear();
-    forces.sigmas_n.clear();
-    forces.loaded.clear();
-    forces.limits_n.clear();
-    forces.limit_around_n = 0;
-    forces.residual = forces.region_residual = forces.camera_shift_mm = 0;
-    pressure_estimate.reset();
-    forces.converged = true;
-    contacts.clear();
-    total_force_n.setZero();
-  }
+  /// All fields of the measurement back to their defaults (see link_state_fields.h); buffers stay.
+  void ClearMeasurement();
 };
 
 }  // namespace taclink

@@ -24,7 +24,7 @@ struct EstimatedLoad {
   std::vector<int> sites;
   std::vector<double> inward_n;  ///< by `sites`; spreads over the neighbors of each
   std::vector<double> shares;    ///< by `sites`, of the tangential force; sum to 1
-  bool is_hug = false;           ///< all around the skin, alike: without a resultant across it
+  bool is_ring_contact = false;  ///< all around the skin, alike: without a resultant across it
   bool has_tangential = false;
   Vec2 tangential_n = Vec2::Zero();  ///< around and along
   Vec2 couple_nmm = Vec2::Zero();    ///< about around and along: a glued body may turn the skin

@@ -34,7 +34,7 @@ void LoadEstimator::Finish(Linearization& skin, LoadEstimate& estimate) {
     EstimatedLoad load;
     for (const int column : hills[i]) {
       const double inward = solution_.loads[at++];
-      load.is_hug = IsBand(column);
+      load.is_ring_contact = IsBand(column);
       ForSites(column, [&](int site, double share) {
         load.sites.push_back(site);
         load.inward_n.push_back(share * inward);
@@ -196,7 +196,7 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
     const int site = load.sites[static_cast<size_t>(
         std::max_element(load.inward_n.begin(), load.inward_n.end()) - load.inward_n.begin())];
     const Mat3& frame = skin.frames()[static_cast<size_t>(site)];
-    if (load.is_hug) {
+    if (load.is_ring_contact) {
       // How much it presses, and pulls along; sideways it may be uneven by as much.
       load.force_covariance_n2 =
           Vec3(covariance(5 * i, 5 * i), covariance(5 * i, 5 * i), covariance(5 * i + 2, 5 * i + 2))
@@ -211,7 +211,7 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
     load.force_covariance_n2 += kForceShare * kForceShare / 3 * size_n * size_n * Mat3::Identity();
     // A force is as wrong as Young's modulus, less what pressure makes stiff.
     const double modulus_share = ModulusShare(mechanics_.model());
-    if (load.is_hug)
+    if (load.is_ring_contact)
       load.force_covariance_n2 += std::pow(modulus_share * size_n, 2) / 2 * Vec3(1, 1, 0).asDiagonal();
     else
       load.force_covariance_n2 += std::pow(modulus_share, 2) * load.force_n * load.force_n.transpose();

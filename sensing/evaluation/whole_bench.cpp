@@ -102,7 +102,7 @@ class Scorer {
     double least = kPhantomMm * length_;
     for (size_t i = 0; i < truth_.contacts.size(); ++i) {
       const TrueContact& disc = truth_.contacts[i];
-      const double away = contact.is_hug
+      const double away = contact.is_ring_contact
                               ? std::abs(contact.center_mm.z() - disc.center_mm.z())
                               : (contact.center_mm - disc.center_mm).norm() - disc.patch_diameter_mm / 2;
       if (away < least) least = away, nearest = &bodies_[scene_.is_one_body ? 0 : i];

@@ -142,7 +142,7 @@ bool IsBeyondMarkers(const LinkModel& model, const SkinShape& shape, const Conta
   const double angle = std::atan2(contact.center_mm.y(), contact.center_mm.x());
   const auto path = static_cast<int>(
       std::lround((angle - model.markers.first_path_angle_rad) / model.markers.path_pitch_rad()));
-  for (int beside = 0; beside < (contact.is_hug ? model.markers.paths : 1); ++beside) {
+  for (int beside = 0; beside < (contact.is_ring_contact ? model.markers.paths : 1); ++beside) {
     if (IsBeyondMarkersOf(model, shape, path + beside, contact)) return true;
   }
   return false;
@@ -290,7 +290,7 @@ void AddModelReason(const SkinEstimate& estimate, double unit, LinkState& state)
 void AddHugReason(LinkState& state) {
   const double least_n = kHugLimits * state.forces.limit_around_n;
   for (const Contact& contact : state.contacts) {
-    if (!contact.is_hug || contact.normal_force_n >= least_n) continue;
+    if (!contact.is_ring_contact || contact.normal_force_n >= least_n) continue;
     state.reasons.push_back(
         {ReasonId::kEncircled,
          Text("what presses alike all around is not far above its limit of detection, %.2f N: its sum may be "

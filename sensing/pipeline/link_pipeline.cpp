@@ -146,7 +146,6 @@ struct LinkPipeline::Stages {
   // Nothing stays of what was measured into the same buffers before.
   static void Forget(LinkState& state) {
     state.ClearMeasurement();
-    state.forces.model = NodalForces().model;
     state.baseline = {};
     state.baseline_age_s = 0;
     for (CameraCounts& camera : state.cameras) camera.labelled = 0;

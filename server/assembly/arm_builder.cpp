@@ -48,6 +48,9 @@ Result<bool> IsInflatedByScene(const LinkConfig& link) {
   return std::ranges::any_of(scene->pressure, [](const PressureKey& key) { return key.kpa != 0; });
 }
 
+// SourceKind names the alternatives of SourceConfig in their order.
+static_assert(std::variant_size_v<SourceConfig> == static_cast<size_t>(SourceKind::kLog));
+
 Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock, const BackgroundRunner& background) {
   auto model = LoadLinkModel(link.model);
   if (!model) return model.error();

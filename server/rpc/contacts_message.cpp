@@ -41,6 +41,7 @@ void FillContact(const LinkContacts& link, const std::string& link_name, const A
   if (contact.center_covariance_mm2)
     wire::FillCovariance(*contact.center_covariance_mm2, kMetresPerMm, *out.mutable_center_covariance_m2());
   out.set_normal_force_n(contact.normal_force_n);
+  out.set_is_ring_contact(contact.is_ring_contact);
   out.set_area_m2(contact.area_mm2 * wire::kSquareMetresPerMm2);
   out.set_exposure_utc_ns(link.times.exposure_utc_ns);
   out.set_validity(ToWire(link.pose.validity));

@@ -1,5 +1,6 @@
 #include "server/rpc/event_calls.h"
 
+#include <string>
 #include <utility>
 
 #include "server/rpc/event_message.h"
@@ -12,8 +13,9 @@ Result<EventStreamOptions> ToEventStreamOptions(const v1::StreamEventsRequest& r
   EventStreamOptions options{.start = {}, .filter = {.links = std::move(links)}};
   options.filter.all_kinds = request.kinds().empty();
   for (const int kind : request.kinds()) {
-    if (kind == v1::EVENT_KIND_UNSPECIFIED)
-      return Error{ErrorCode::kInvalidArgument, "kinds has 0, which is no kind of event"};
+    if (kind == v1::EVENT_KIND_UNSPECIFIED || !v1::EventKind_IsValid(kind))
+      return Error{ErrorCode::kInvalidArgument,
+                   "kinds has " + std::to_string(kind) + ", which is not a kind of event"};
     options.filter.kinds[static_cast<size_t>(kind) - 1] = true;
   }
   const auto after =

@@ -18,6 +18,9 @@ v1::ForceLevel ToWire(ForceLevel level) {
   return v1::FORCE_LEVEL_UNSPECIFIED;
 }
 
+// Both enums number their values in the same order, v1::EventKind from 1.
+static_assert(kEventKinds == v1::EventKind_MAX, "EventKind of event.h and of events.proto differ");
+
 struct DetailWriter {
   v1::Event& out;
 

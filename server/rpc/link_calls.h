@@ -5,7 +5,7 @@
 
 #include "sensing/core/result.h"
 #include "server/arm.h"
-#include "server/camera_desk.h"
+#include "server/camera_memory.h"
 #include "server/events/event.h"
 #include "taclink/v1/tactile.pb.h"
 

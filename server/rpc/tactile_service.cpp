@@ -50,7 +50,7 @@ void TactileService::EndStreams(const std::string& reason) {
   calibrations_.Close(reason);
   tares_.Close(reason);
   for (size_t link = 0; link < link_names_.size(); ++link)
-    arm_.worker(link).EndCameraOrders({ErrorCode::kUnavailable, reason});
+    arm_.worker(link).CloseCommands({ErrorCode::kUnavailable, reason});
 }
 
 ServiceLimits TactileService::limits() const {
@@ -161,9 +161,12 @@ grpc::ServerUnaryReactor* TactileService::SetForceModel(grpc::CallbackServerCont
   if (!model) return RefuseCall(*context, kCall, model.error());
   grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
   boost::asio::post(*aside_, [this, reactor, link = *link, model = *model, who = Who(*context, *security_)] {
-    const Result<void> set = arm_.worker(link).SetForceModel(model);
-    arm_.events().Post(EventKind::kForceModel, link, ToOperation(model, set, who));
-    reactor->Finish(set ? grpc::Status::OK : ToGrpc(set.error()));
+    const auto observer = [reactor, &arm = arm_, link, model, who](const Result<void>& end) {
+      arm.events().Post(EventKind::kForceModel, link, ToOperation(model, end, who));
+      reactor->Finish(end ? grpc::Status::OK : ToGrpc(end.error()));
+    };
+    if (const auto posted = arm_.worker(link).SetForceModel(model, observer); !posted)
+      observer(posted.error());
   });
   return reactor;
 }

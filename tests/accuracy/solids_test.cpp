@@ -88,7 +88,7 @@ TEST(SolidsTest, AHugIsOneContact) {
       const LinkState state = SolveMarkers(model, estimator, shown.pressure, shown.shape);
       ASSERT_EQ(state.contacts.size(), 1u);
       const Contact& contact = state.contacts.front();
-      EXPECT_TRUE(contact.is_hug);
+      EXPECT_TRUE(contact.is_ring_contact);
       EXPECT_NEAR(contact.normal_force_n, truth.normal_force_n, 0.12 * truth.normal_force_n);
       EXPECT_LT(contact.force_n.norm(), 0.05 * truth.normal_force_n);
       EXPECT_LT((contact.center_mm - truth.center_mm).norm(), 4);

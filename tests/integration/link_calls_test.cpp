@@ -39,6 +39,7 @@ class LinkCallsTest : public ::testing::Test {
     std::vector<std::pair<CameraId, CameraSettings>> set;  // guarded by mutex
     std::vector<std::optional<ForceModel>> made;           // likewise
     std::atomic<int> used = 0;
+    std::atomic<bool> refuses = false;
   };
 
   class Processor final : public LinkProcessor {
@@ -54,6 +55,7 @@ class LinkCallsTest : public ::testing::Test {
     const LabelledMarkers* labels() const override { return &labels_; }
     Result<void> UseEstimator(std::shared_ptr<StateEstimator> estimator) override {
       EXPECT_NE(estimator, nullptr);
+      if (log_->refuses) return Error{ErrorCode::kFailedPrecondition, "a calibration is under way"};
       ++log_->used;
       log_->used.notify_all();
       return {};
@@ -122,6 +124,20 @@ class LinkCallsTest : public ::testing::Test {
     request.set_model(model);
     v1::SetForceModelResponse response;
     return stub_->SetForceModel(&context, request, &response);
+  }
+  /// The first event of `kind` since the server started.
+  v1::Event FirstEvent(v1::EventKind kind) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kForever);
+    v1::StreamEventsRequest wanted;
+    wanted.set_after_sequence(0);
+    wanted.add_kinds(kind);
+    const auto stream = stub_->StreamEvents(&context, wanted);
+    v1::StreamEventsResponse message;
+    while (stream->Read(&message) && !message.has_event()) {
+    }
+    context.TryCancel();
+    return message.event();
   }
   /// The source runs once it was asked for a frame.
   void WaitUntilRunning() { script_->WaitUntilTaken(); }
@@ -251,6 +267,16 @@ TEST_F(LinkCallsTest, AForceModelThatDoesNotHoldIsRefused) {
   const auto refused = SetForceModel("upper", v1::FORCE_MODEL_LITERAL);
   EXPECT_EQ(refused.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_EQ(refused.error_message(), "link 'upper': it does not hold");
+}
+
+TEST_F(LinkCallsTest, AForceModelThatTheFemThreadRefusesIsNotAccepted) {
+  WaitUntilRunning();
+  log_->refuses = true;
+  const auto refused = SetForceModel("upper", v1::FORCE_MODEL_NONLINEAR);
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_EQ(refused.error_message(), "a calibration is under way");
+  EXPECT_FALSE(FirstEvent(v1::EVENT_KIND_FORCE_MODEL).operation().accepted());
+  EXPECT_EQ(log_->used, 0);
 }
 
 TEST_F(LinkCallsTest, NoForceModelNoChange) {

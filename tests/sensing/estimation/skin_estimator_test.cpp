@@ -147,7 +147,7 @@ TEST_F(SkinEstimatorTest, ABandAllAroundIsOneContact) {
   std::vector<Contact> contacts;
   finder.Find(estimator_, estimate_, contacts);
   ASSERT_EQ(contacts.size(), 1u);
-  EXPECT_TRUE(contacts[0].is_hug);
+  EXPECT_TRUE(contacts[0].is_ring_contact);
   EXPECT_NEAR(contacts[0].normal_force_n, 3, 0.3);
   EXPECT_LT(contacts[0].force_n.norm(), 0.1);
   EXPECT_LT((contacts[0].center_mm - Vec3(0, 0, 95)).norm(), 3);

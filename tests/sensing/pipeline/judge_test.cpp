@@ -123,7 +123,7 @@ TEST_F(JudgeTest, APressureThatNobodyTellsIsTold) {
 
 TEST_F(JudgeTest, AHugIsToldWhereItIsHardlySeen) {
   Touch(0, 95);
-  state_.contacts[0].is_hug = true;
+  state_.contacts[0].is_ring_contact = true;
   state_.contacts[0].normal_force_n = 1;
   state_.forces.limit_around_n = 0.24;
   EXPECT_THAT(Reasons(), ::testing::IsEmpty());

@@ -289,8 +289,7 @@ export class ArmScene {
         out.push({
           tip: new THREE.Vector3(centerM.x, centerM.y, centerM.z).applyMatrix4(object.group.matrix),
           force: new THREE.Vector3(forceN.x, forceN.y, forceN.z).applyMatrix3(rotation),
-          // A hug has hardly a resultant: what it presses with is told.
-          text: `${Math.max(newtons, contact.normalForceN).toFixed(2)} N  #${contact.id}`,
+          text: `${(contact.isRingContact ? contact.normalForceN : newtons).toFixed(2)} N  #${contact.id}`,
         });
       }
     }

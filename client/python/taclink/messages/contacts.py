@@ -26,6 +26,7 @@ class ArmContact:
     force_covariance_n2: FloatArray | None  # (3, 3); None: not known
     center_covariance_m2: FloatArray | None  # (3, 3); without the error of the link's pose
     normal_force_n: float  # pressing in is positive
+    is_ring_contact: bool  # as Contact
     area_m2: float
     exposure_utc_ns: int
     validity: PoseValidity

@@ -43,7 +43,8 @@ class Contact:
     force_n: FloatArray  # (3,), what the world exerts on the skin
     force_covariance_n2: FloatArray | None  # (3, 3); None: not known
     center_covariance_m2: FloatArray | None  # (3, 3); likewise
-    normal_force_n: float  # integral of the inward load: of a hug, whose resultant is none, all it presses with
+    normal_force_n: float  # integral of the inward load; nonzero also for a ring contact
+    is_ring_contact: bool  # presses evenly around the whole circumference; force_n is about zero
     area_m2: float
     markers: IntArray  # (k,), indices of the loaded markers
     moment_nm: FloatArray  # (3,), of the load about the link frame's origin
