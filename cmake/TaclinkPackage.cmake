@@ -7,7 +7,7 @@ install(FILES deploy/config/demo.yaml DESTINATION /etc/taclink RENAME taclinkd.y
 install(DIRECTORY deploy/config/ DESTINATION "${docs}/examples" COMPONENT server)
 install(FILES deploy/package/completion.bash DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions"
         RENAME taclink COMPONENT server)
-install(DIRECTORY client/example DESTINATION "${docs}-client" COMPONENT development)
+install(DIRECTORY client/cpp/example DESTINATION "${docs}-client" COMPONENT development)
 install(FILES LICENSE DESTINATION "${docs}" RENAME copyright COMPONENT server)
 
 option(TACLINK_PACKAGE "Make manual pages and the list of parts for packages (needs help2man and python3)" OFF)

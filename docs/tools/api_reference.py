@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Prints the API's reference in Markdown, made from the comments of its .proto files.
+"""Writes the API's reference in Markdown, made from the comments of its .proto files.
 
-    protoc --include_source_info --include_imports --descriptor_set_out=FILE -I proto proto/taclink/v1/*.proto
-    docs/tools/api_reference.py FILE > docs/api.md
+    api_reference.py DESCRIPTORS PAGE      (the target api_reference calls it)
 """
 
+import contextlib
 import sys
 
 from google.protobuf import descriptor_pb2
@@ -13,8 +13,7 @@ Field = descriptor_pb2.FieldDescriptorProto
 SCALARS = {getattr(Field, name): name[5:].lower() for name in dir(Field) if name.startswith("TYPE_")}
 HEAD = """# API reference
 
-Package `taclink.v1`: gRPC, and gRPC-Web over HTTP ([security.md](security.md)). SI units throughout: m, N, Pa, s, rad. This page is made
-from the comments of [`proto/taclink/v1`](../proto/taclink/v1) by `docs/tools/api_reference.py`; change those.
+Package `taclink.v1`: gRPC, and gRPC-Web over HTTP. SI units throughout: m, N, Pa, s, rad. This page is made from the comments of `proto/taclink/v1`.
 """
 
 
@@ -85,15 +84,16 @@ def main():
     with open(sys.argv[1], "rb") as descriptors:
         files.ParseFromString(descriptors.read())
     ours = [File(proto) for proto in sorted(files.file, key=lambda f: f.name) if proto.package == "taclink.v1"]
-    print(HEAD.rstrip())
-    for file in ours:
-        print_services(file)
-    for file in ours:
-        print(f"\n## {file.proto.name}")
-        for m, message in enumerate(file.proto.message_type):
-            print_message(file, message, (4, m))
-        for e, enum in enumerate(file.proto.enum_type):
-            print_enum(file, enum, (5, e))
+    with open(sys.argv[2], "w", encoding="utf-8") as page, contextlib.redirect_stdout(page):
+        print(HEAD.rstrip())
+        for file in ours:
+            print_services(file)
+        for file in ours:
+            print(f"\n## {file.proto.name}")
+            for m, message in enumerate(file.proto.message_type):
+                print_message(file, message, (4, m))
+            for e, enum in enumerate(file.proto.enum_type):
+                print_enum(file, enum, (5, e))
 
 
 if __name__ == "__main__":

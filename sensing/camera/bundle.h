@@ -56,9 +56,9 @@ struct BundleResult {
   bool converged = false;
 };
 
-/// Bundle adjustment with Ceres: all parameters of the cameras, and where the markers are, against the
-/// pictures and what is known of the build. The model's places of the markers fix the frame. A camera that
-/// can't project its samples gives a result that has not converged.
+/// Bundle adjustment [triggs2000] with Ceres [ceres]: all parameters of the cameras, and where the markers
+/// are, against the pictures and what is known of the build. The model's places of the markers fix the frame.
+/// A camera that can't project its samples gives a result that has not converged.
 BundleResult AdjustBundle(std::span<const BundleCamera> cameras, const BundleOptions& options);
 
 }  // namespace taclink

@@ -19,8 +19,8 @@ constexpr int LensParameterCount(LensKind kind) {
 LensParameters ParametersOf(const LensModel& lens);
 void SetParameters(const LensParameters& parameters, LensModel& lens);
 
-/// The one interface of all lens models: distance r in the picture against the angle theta off the axis, over
-/// the part where it rises. Allocates nothing.
+/// The one interface of both lens models [fitzgibbon2001], [kannala2006]: distance r in the picture against
+/// the angle theta off the axis, over the part where it rises. Allocates nothing.
 class Lens {
  public:
   /// Used up to `limit_px` from the principal point, or as far as r(theta) rises.
@@ -43,7 +43,7 @@ class Lens {
   double max_radius_px() const { return max_radius_px_; }
 
  private:
-  // Division model: tan(theta) = r / Depth(r).
+  // Division model: tan(theta) = r / Depth(r). Solved by guarded Newton steps [press2007, section 9.4].
   double Depth(double r) const {
     const double r2 = r * r;
     return model_.focal_px * (1 + r2 * (model_.k1_per_px2 + r2 * model_.k2_per_px4));
@@ -52,7 +52,7 @@ class Lens {
     return model_.focal_px * r * (2 * model_.k1_per_px2 + 4 * r * r * model_.k2_per_px4);
   }
   Radius DivisionRadius(double sine, double cosine) const;
-  // Kannala and Brandt's: r = f ThetaD(theta).
+  // Kannala and Brandt's: r = f ThetaD(theta). Solved for theta likewise.
   double ThetaD(double theta) const;
   double ThetaDSlope(double theta) const;
   void LimitDivision(double limit_px);

@@ -15,13 +15,13 @@ struct SightRay {
   std::optional<Vec3> AtZ(double z_mm) const;
 };
 
-/// The middle of the shortest line between two rays, and that line's length.
+/// The middle of the shortest line between two rays [hartley1997], and that line's length.
 struct RayMeeting {
   Vec3 point_mm = Vec3::Zero();
   double gap_mm = 0;
 };
 
-/// None: the rays are parallel, or pass nearest behind one of the origins.
+/// To label and check markers. None: the rays are parallel, or pass nearest behind one of the origins.
 std::optional<RayMeeting> MeetRays(const SightRay& a, const SightRay& b);
 
 }  // namespace taclink

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kLoaded = 0.1;  // of the peak pressure: within a contact
 
-// Andrew's monotone chain; counter-clockwise.
+// Monotone chain [andrew1979]; counter-clockwise.
 std::vector<Vec2> ConvexHull(std::vector<Vec2> points) {
   const auto less = [](const Vec2& a, const Vec2& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();

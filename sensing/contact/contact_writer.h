@@ -26,7 +26,7 @@ class ContactWriter {
   Vec3 OuterPointAt(double column, double row) const;
   int FromOrigin(int site) const;
   void WriteShape(const EstimatedLoad& load, Contact& contact);
-  void WriteOutline(Contact& contact);
+  void WriteOutline(Contact& contact);  // a convex hull [andrew1979]
   void WriteMarkers(Contact& contact) const;
 
   const SkinMechanics& mechanics_;

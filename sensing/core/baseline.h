@@ -10,7 +10,7 @@ enum class BaselineOrigin : uint8_t {
   kStart,        ///< from the first pictures of the link
   kCalibration,  ///< with new cameras, on demand
   kTare,         ///< on demand, while nothing touched
-  kForcedTare,   ///< on demand, whatever touched
+  kForcedTare,   ///< on demand, whatever touched; and by any tare after that, until rest is taken again
 };
 
 enum class DriftState : uint8_t {

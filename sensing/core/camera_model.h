@@ -7,7 +7,7 @@
 namespace taclink {
 
 /// The two cameras of a link. `top` sits before the end z = 0 and looks along +Z, `bottom` sits behind the
-/// end z = L and looks along -Z (camera 1 and camera 2 of the thesis, figure 4.1).
+/// end z = L and looks along -Z (camera 1 and camera 2 of [duong2021, figure 4.1]).
 enum class CameraId : int { kTop = 0, kBottom = 1 };
 inline constexpr int kCameraCount = 2;
 inline constexpr std::array<CameraId, kCameraCount> kBothCameras = {CameraId::kTop, CameraId::kBottom};
@@ -21,10 +21,10 @@ constexpr const char* Name(CameraId id) {
 
 /// How a lens maps the angle theta off its axis to the distance r in the picture from the principal point.
 enum class LensKind : int {
-  /// A pinhole behind the division distortion model, (4.3) and (4.41):
+  /// A pinhole behind the division model [fitzgibbon2001] with two coefficients [duong2021, (4.3), (4.41)]:
   ///   r_pinhole = f tan(theta) = r / (1 + k1 r^2 + k2 r^4).
   kDivision = 0,
-  /// Kannala and Brandt's fisheye, in OpenCV's form: r = f theta (1 + k1 theta^2 + ... + k4 theta^8).
+  /// The fisheye of [kannala2006] in the form of [opencv]: r = f theta (1 + k1 theta^2 + ... + k4 theta^8).
   kKannalaBrandt = 1,
 };
 inline constexpr std::array<const char*, 2> kLensNames = {"division", "kannala_brandt"};

@@ -80,7 +80,7 @@ struct MarkerGrid {
 ///
 /// Link frame: origin in the centre of the clamped end at the top camera's side, +Z along the axis to the
 /// other end; mm. A marker's index is (ring - 1) * paths + (path - 1), rings and paths counted from 1: ring
-/// by ring, (4.20) without the clamped rings.
+/// by ring, the numbering of [duong2021, (4.20)] without its clamped rings.
 struct LinkModel {
   std::string name;
   std::string description;

@@ -16,7 +16,7 @@ inline double SigmaOf(const Mat2& covariance_px2) {
 
 /// A bright spot that looks like a marker.
 struct Detection {
-  Vec2 center_px = Vec2::Zero();  ///< intensity-weighted; pixel (0, 0)'s centre is at (0, 0)
+  Vec2 center_px = Vec2::Zero();  ///< of the outline, shade inside taken out; pixel (0, 0) has (0, 0)
   double width_px = 0;            ///< of the upright bounding box
   double height_px = 0;
   double area_px2 = 0;

@@ -5,8 +5,8 @@
 
 namespace taclink {
 
-/// sqrt(R t) of the mid-surface at mid-length, mm: over that length a dent decays (Calladine, Theory of shell
-/// structures, 1983).
+/// sqrt(R t) of the mid-surface at mid-length, mm: the length over which a dent in the skin decays
+/// [calladine1983].
 double DecayLengthMm(const LinkModel& model);
 
 /// That in terms of the shipped cylinder's: what lengths that go with the skin's size are multiplied by.

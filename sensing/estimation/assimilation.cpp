@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sensing/mechanics/element_load.h"
+#include "sensing/shell/element_load.h"
 
 namespace taclink {
 namespace {

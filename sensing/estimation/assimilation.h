@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "sensing/estimation/skin_mechanics.h"
-#include "sensing/mechanics/sparse_cholesky.h"
+#include "sensing/shell/sparse_cholesky.h"
 
 namespace taclink {
 

@@ -39,10 +39,10 @@ struct CameraAgreement {
   int apart = 0;  ///< of these, whose two lines of sight do not meet
 };
 
-/// Both cameras' labeled markers as displacements. Where both cameras see a marker its place follows from its
-/// two rays alone, whatever a model expects; where one does, along its ray it is where the estimate has it.
-/// One thread; no allocation after construction. Displacements: from the model's rest, stacked, link frame,
-/// mm.
+/// Both cameras' labeled markers as displacements. Where both cameras see a marker its place is the
+/// least-squares point of both images [hartley1997], whatever a model expects; where one does, along its ray
+/// it is where the estimate has it. One thread; no allocation after construction. Displacements: from the
+/// model's rest, stacked, link frame, mm.
 class CameraEvidence {
  public:
   CameraEvidence(const LinkModel& model, const StereoRig& rig, const CameraEvidenceOptions& options);
@@ -103,7 +103,7 @@ class CameraEvidence {
   Mat2 DriftOver(const Vec2& moved_px) const;
   void FillUnknownResiduals();
   void FillRing(int ring, size_t camera, double any_change_px2);
-  double Triangulate(int marker, Vec3& place, Mat3& information);
+  double Triangulate(int marker, Vec3& place, Mat3& information);  // weighted least squares [hartley1997]
   double Misfit(size_t observation, const Vec3& u, const Mat3& covariance);
 
   const CameraEvidenceOptions options_;

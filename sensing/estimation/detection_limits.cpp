@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "sensing/estimation/load_estimator.h"
-#include "sensing/mechanics/dense.h"
+#include "sensing/shell/dense.h"
 
 namespace taclink {
 

@@ -10,9 +10,9 @@
 namespace taclink {
 
 /// Groups loads into contacts: contacts are hills of the load, not islands. The loads are smoothed over the
-/// sites and their watershed is taken: two peaks are one contact if the saddle between them is high, or if
-/// the skin between them lies below the chord of both, as under one plate; never if their forces cancel each
-/// other, as on opposite sides. One thread.
+/// sites and their watershed is taken [vincent1991]: two peaks are one contact if the saddle between them is
+/// high, or if the skin between them lies below the chord of both, as under one plate; never if their forces
+/// cancel each other, as on opposite sides. One thread.
 class HillFinder {
  public:
   explicit HillFinder(const SkinMechanics& mechanics);

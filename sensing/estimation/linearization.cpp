@@ -5,7 +5,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "sensing/mechanics/element_load.h"
+#include "sensing/shell/element_load.h"
 
 namespace taclink {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sensing/estimation/skin_mechanics.h"
-#include "sensing/mechanics/block_tridiagonal.h"
+#include "sensing/shell/block_tridiagonal.h"
 
 namespace taclink {
 

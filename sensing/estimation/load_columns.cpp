@@ -2,7 +2,7 @@
 
 #include <cassert>
 
-#include "sensing/mechanics/dense.h"
+#include "sensing/shell/dense.h"
 
 namespace taclink {
 

@@ -7,12 +7,12 @@
 #include <cmath>
 
 #include "sensing/estimation/camera_noise.h"
-#include "sensing/mechanics/dense.h"
+#include "sensing/shell/dense.h"
 
 namespace taclink {
 namespace {
 
-// Found on three-dimensional solids (docs/calculix.md); forces and lengths in SkinMechanics' units.
+// Found on three-dimensional solids (docs/reports/calculix.md); forces and lengths in SkinMechanics' units.
 constexpr double kSparsity = 1.5;  // of a load's norm: a load explains so many standard deviations
 constexpr int kReweightings = 2;
 constexpr double kHillN = 0.02;    // the sparsity halves where so much acts nearby

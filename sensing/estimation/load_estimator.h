@@ -39,7 +39,7 @@ struct EstimatedLoad {
   Mat2 center_covariance = Mat2::Zero();  ///< of `center`
 };
 
-/// The weakest inward loads that would be told 95 times in 100 (limits of detection), N.
+/// The weakest inward loads that would be told 95 times in 100 (limits of detection [currie1968]), N.
 struct DetectionLimits {
   Eigen::VectorXd by_site_n;  ///< where nothing else presses nearby
   double around_n = 0;        ///< of what presses alike all around, the sum; at the worst row of sites
@@ -65,9 +65,9 @@ struct LoadEstimate {
   int trials = 0;  ///< answers to which contacts there are, and which of them pull along the wall, tried
 };
 
-/// The loads that explain the markers, given the linearized skin: non-negative inward loads at all sites with
-/// a sparsity term that fades inside a hill, grouped into hills, those hills that explain little left out,
-/// and a tangential force for each hill that needs one. See estimation.md. One thread.
+/// The loads that explain the markers, given the linearized skin: non-negative inward loads [lawson1974] at
+/// all sites with a sparsity term that fades inside a hill, grouped into hills, those hills that explain
+/// little left out, and a tangential force for each hill that needs one. See estimation.md. One thread.
 class LoadEstimator {
  public:
   /// Both are referred to.
@@ -156,7 +156,7 @@ class LoadEstimator {
   void ShareBands(const Eigen::VectorXd& inward_n, const std::vector<int>& loads);
   void JoinHugs(std::vector<Hill>& hills);
   void JoinHug(std::vector<Hill>& hills, const std::vector<size_t>& group);
-  Eigen::VectorXd Penalties(const Eigen::VectorXd& near_n) const;
+  Eigen::VectorXd Penalties(const Eigen::VectorXd& near_n) const;  // reweighted l1 [candes2008]
   void WriteNorms(const Eigen::VectorXd* untouched_norms);
   void SolveSparse(const Eigen::VectorXd& near_n);
   bool LetIn(Linearization& skin, bool all);

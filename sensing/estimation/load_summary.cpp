@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "sensing/estimation/load_estimator.h"
-#include "sensing/mechanics/dense.h"
+#include "sensing/shell/dense.h"
 
 namespace taclink {
 namespace {

@@ -3,12 +3,12 @@
 #include <cmath>
 #include <numeric>
 
-#include "sensing/mechanics/dense.h"
+#include "sensing/shell/dense.h"
 
 namespace taclink {
 namespace {
 
-// Found on three-dimensional solids (docs/calculix.md); lengths and forces in SkinMechanics' units.
+// Found on three-dimensional solids (docs/reports/calculix.md); lengths and forces in SkinMechanics' units.
 constexpr double kFloorMm = 0.02;
 constexpr double kByMotion = 0.01;
 constexpr double kSpreadShare = 0.5;  // of the error near a large motion

@@ -56,7 +56,7 @@ class MarkerCovariance {
   };
   std::vector<Stray> Strays(const Eigen::VectorXd& local_n) const;
   void AddUntouchedStray(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const;
-  Eigen::MatrixXd MotionColumns() const;
+  Eigen::MatrixXd MotionColumns() const;  // by pivoted Cholesky decomposition [harbrecht2012]
 
   static constexpr double kUnseenMm = 30;  // in SkinMechanics' units
 

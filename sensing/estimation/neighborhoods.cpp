@@ -7,7 +7,7 @@
 namespace taclink {
 namespace {
 
-// Found on three-dimensional solids (docs/calculix.md); in SkinMechanics' units of length.
+// Found on three-dimensional solids (docs/reports/calculix.md); in SkinMechanics' units of length.
 constexpr double kMotionLengthMm = 20, kMotionShare = 0.8;
 constexpr double kSpreadMm = 12;
 constexpr double kInflationLengthMm = 15;

@@ -5,9 +5,9 @@
 
 namespace taclink {
 
-/// Minimizes 1/2 x'Hx - b'x over x >= 0: Lawson and Hanson's active set (Solving Least Squares Problems,
-/// 1974, chapter 23), with a Cholesky factor that grows by a row where a variable comes in. The minimum does
-/// not depend on where it starts. One thread.
+/// Minimizes 1/2 x'Hx - b'x over x >= 0: the active-set method of [lawson1974, chapter 23], with a Cholesky
+/// factor that grows by a row where a variable comes in. The minimum does not depend on where it starts. One
+/// thread.
 class NonNegativeSolver {
  public:
   /// `h`: symmetric but for rounding, both halves, in double or single precision. `support`: on entry where

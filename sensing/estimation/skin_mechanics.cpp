@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "sensing/core/similar_skin.h"
-#include "sensing/mechanics/element_load.h"
-#include "sensing/mechanics/pressed_skin.h"
-#include "sensing/mechanics/sparse_cholesky.h"
+#include "sensing/shell/element_load.h"
+#include "sensing/shell/pressed_skin.h"
+#include "sensing/shell/sparse_cholesky.h"
 
 namespace taclink {
 namespace {

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "sensing/core/link_model.h"
-#include "sensing/mechanics/equilibrium.h"
-#include "sensing/mechanics/marker_map.h"
-#include "sensing/mechanics/nonlinear_shell.h"
-#include "sensing/mechanics/shell_mesh.h"
+#include "sensing/shell/equilibrium.h"
+#include "sensing/shell/marker_map.h"
+#include "sensing/shell/nonlinear_shell.h"
+#include "sensing/shell/shell_mesh.h"
 
 namespace taclink {
 

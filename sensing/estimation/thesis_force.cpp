@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "sensing/mechanics/element_load.h"
-#include "sensing/mechanics/nonlinear_shell.h"
+#include "sensing/shell/element_load.h"
+#include "sensing/shell/nonlinear_shell.h"
 
 namespace taclink {
 namespace {

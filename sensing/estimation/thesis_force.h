@@ -7,9 +7,9 @@
 
 namespace taclink {
 
-/// The thesis' own force: F = K u with zero rotations, (6.1) and (6.2), of which only the radial part counts,
-/// (6.5) and (6.6), where it pushes in by more than 0.02 N per mm of the cameras' error. For comparison only:
-/// it amplifies the markers' noise, and the rotations are not zero.
+/// The force of [duong2021]: F = K u with zero rotations, (6.1) and (6.2), of which only the radial part
+/// counts, (6.5) and (6.6), where it pushes in by more than 0.02 N per mm of the cameras' error. For
+/// comparison only: it amplifies the markers' noise, and the rotations are not zero.
 class ThesisForce {
  public:
   explicit ThesisForce(const LinkModel& model, int refinement = 1);

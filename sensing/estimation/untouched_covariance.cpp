@@ -2,7 +2,7 @@
 
 #include "sensing/core/median.h"
 #include "sensing/estimation/camera_noise.h"
-#include "sensing/mechanics/dense.h"
+#include "sensing/shell/dense.h"
 
 namespace taclink {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "sensing/mechanics/dense.h"
+#include "sensing/shell/dense.h"
 
 namespace taclink {
 

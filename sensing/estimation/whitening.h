@@ -7,8 +7,8 @@ namespace taclink {
 
 /// Makes errors independent, of unit variance: a matrix M' with M M' = C^-1, C = S + U U'. S is given by a
 /// factor that others share, U by its columns, far fewer than rows, so that a change of C costs little. With
-/// S = L L', W = L^-1 U and A A' = I + W' W (Cholesky), M' = (I - W K' W') L^-1, K = A^-T (I + A)^-1.
-/// In single precision. Constant between calls of Set; those may be made by one thread at a time.
+/// S = L L', W = L^-1 U and A A' = I + W' W (Cholesky), M' = (I - W K' W') L^-1, K = A^-T (I + A)^-1
+/// [andrews1968], [whitaker2002]. Single precision. Constant between calls of Set, by one thread at a time.
 class Whitening {
  public:
   /// `lower`: L; `columns`: U. False: one of them is not finite.

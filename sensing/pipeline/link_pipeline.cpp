@@ -7,9 +7,9 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "sensing/markers/detector.h"
-#include "sensing/markers/marker_tracker.h"
-#include "sensing/markers/path_tracker.h"
+#include "sensing/markers/detect/detector.h"
+#include "sensing/markers/label/path_tracker.h"
+#include "sensing/markers/track/marker_tracker.h"
 #include "sensing/pipeline/baseline_keeper.h"
 #include "sensing/pipeline/camera_motion.h"
 #include "sensing/pipeline/judge.h"

@@ -12,7 +12,7 @@
 #include "sensing/core/link_state.h"
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
-#include "sensing/markers/marker_tracker.h"
+#include "sensing/markers/track/marker_tracker.h"
 #include "sensing/pipeline/drift_options.h"
 #include "sensing/pipeline/state_estimator.h"
 

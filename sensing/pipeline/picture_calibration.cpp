@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "sensing/markers/detector.h"
-#include "sensing/markers/rest_labels.h"
+#include "sensing/markers/detect/detector.h"
+#include "sensing/markers/label/rest_labels.h"
 #include "sensing/pipeline/rest_match.h"
 
 namespace taclink {

@@ -5,7 +5,7 @@
 
 #include "sensing/camera/rest_check.h"
 #include "sensing/core/similar_skin.h"
-#include "sensing/markers/rest_labels.h"
+#include "sensing/markers/label/rest_labels.h"
 #include "sensing/pipeline/rest_match.h"
 
 namespace taclink {

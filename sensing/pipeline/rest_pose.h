@@ -9,7 +9,7 @@
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
-#include "sensing/markers/path_tracker.h"
+#include "sensing/markers/label/path_tracker.h"
 #include "sensing/pipeline/marker_mean.h"
 
 namespace taclink {

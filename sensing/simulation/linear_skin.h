@@ -6,7 +6,7 @@
 
 #include "sensing/core/link_model.h"
 #include "sensing/core/result.h"
-#include "sensing/mechanics/linear_shell.h"
+#include "sensing/shell/linear_shell.h"
 #include "sensing/simulation/contact_balance.h"
 #include "sensing/simulation/contact_plan.h"
 #include "sensing/simulation/patch.h"

@@ -5,7 +5,7 @@
 
 #include "sensing/core/geometry.h"
 #include "sensing/core/link_model.h"
-#include "sensing/mechanics/shell_mesh.h"
+#include "sensing/shell/shell_mesh.h"
 
 namespace taclink {
 

@@ -4,8 +4,8 @@
 
 namespace taclink {
 
-/// SplitMix64's output function: turns counters into independent random numbers, so that a frame's noise
-/// depends only on the seed and the frame's number.
+/// The output function of SplitMix64 [steele2014]: turns counters into independent random numbers, so that a
+/// frame's noise depends only on the seed and the frame's number.
 constexpr uint64_t MixBits(uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;

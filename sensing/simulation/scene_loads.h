@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "sensing/mechanics/disc_skin.h"
+#include "sensing/shell/disc_skin.h"
 #include "sensing/simulation/contact_plan.h"
 #include "sensing/simulation/patch.h"
 #include "sensing/simulation/scene.h"

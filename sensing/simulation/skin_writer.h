@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "sensing/core/link_model.h"
-#include "sensing/mechanics/marker_map.h"
-#include "sensing/mechanics/shell_mesh.h"
+#include "sensing/shell/marker_map.h"
+#include "sensing/shell/shell_mesh.h"
 #include "sensing/simulation/scene.h"
 #include "sensing/simulation/skin_truth.h"
 

@@ -11,11 +11,11 @@
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/state_estimator.h"
 #include "sensing/simulation/scene.h"
-#include "server/assembly/encoder.h"
 #include "server/assembly/pressure_factory.h"
 #include "server/assembly/processor_factory.h"
 #include "server/assembly/source_factory.h"
-#include "server/background_thread.h"
+#include "server/hub/encoder.h"
+#include "server/process/background_thread.h"
 
 namespace taclink::server {
 namespace {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "sensing/core/clock.h"
-#include "server/arm.h"
-#include "server/config.h"
+#include "server/arm/arm.h"
+#include "server/config/config.h"
 
 namespace taclink::server {
 

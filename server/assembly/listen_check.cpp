@@ -11,7 +11,7 @@
 #include <set>
 #include <sstream>
 
-#include "server/unix_socket.h"
+#include "server/process/unix_socket.h"
 
 namespace taclink::server {
 namespace {

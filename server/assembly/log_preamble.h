@@ -1,6 +1,6 @@
 #pragma once
 
-#include "server/config.h"
+#include "server/config/config.h"
 #include "server/recording/log_file.h"
 
 namespace taclink::server {

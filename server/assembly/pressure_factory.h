@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "sensing/core/clock.h"
-#include "server/config.h"
+#include "server/config/config.h"
 #include "server/pressure/pressure_source.h"
 
 namespace taclink::server {

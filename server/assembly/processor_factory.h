@@ -4,8 +4,8 @@
 
 #include "sensing/core/link_model.h"
 #include "sensing/pipeline/link_pipeline.h"
-#include "server/config.h"
-#include "server/link_processor.h"
+#include "server/config/config.h"
+#include "server/link/link_processor.h"
 
 namespace taclink::server {
 

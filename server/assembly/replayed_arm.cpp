@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "sensing/model/model_file.h"
+#include "server/arm/link_names.h"
 #include "server/assembly/arm_builder.h"
-#include "server/assembly/encoder.h"
 #include "server/assembly/log_preamble.h"
-#include "server/link_names.h"
+#include "server/hub/encoder.h"
 #include "server/replay/replay_link.h"
 #include "wire/log/topics.h"
 

@@ -3,12 +3,12 @@
 #include <memory>
 #include <string>
 
+#include "mcap/reader.h"
 #include "sensing/core/clock.h"
-#include "server/arm.h"
-#include "server/config.h"
+#include "server/arm/arm.h"
+#include "server/config/config.h"
 #include "server/recording/log_file.h"
 #include "server/replay/joint_replay.h"
-#include "wire/mcap/reader.h"
 
 namespace taclink::server {
 

@@ -5,7 +5,7 @@
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
 #include "sensing/core/link_model.h"
-#include "server/config.h"
+#include "server/config/config.h"
 
 namespace taclink::server {
 

@@ -18,7 +18,7 @@ class AuditLog {
   /// `file` empty: nothing is written.
   AuditLog(std::string file, size_t max_bytes);
 
-  /// Tares, calibrations, baselines, drift, thresholds and recordings are written, other kinds are not.
+  /// Drift and every Operation are written, such as a tare, a threshold or a force model; others are not.
   void Write(const Event& event, const std::string& link);
   /// Something that was done to the server, and not by an event.
   void Write(const std::string& what, const Operation& operation, int64_t utc_ns);

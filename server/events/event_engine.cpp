@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "sensing/core/printable.h"
-#include "server/thread_setup.h"
+#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 namespace {

@@ -14,7 +14,7 @@
 #include "server/events/event.h"
 #include "server/events/event_history.h"
 #include "server/events/link_watch.h"
-#include "server/hub.h"
+#include "server/hub/hub.h"
 
 namespace taclink::server {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "server/arm.h"
+#include "server/arm/arm.h"
 #include "server/gateway/metrics_text.h"
 
 namespace taclink::server {

@@ -18,11 +18,11 @@
 #include <thread>
 #include <utility>
 
-#include "server/config.h"
+#include "server/config/config.h"
 #include "server/gateway/session.h"
-#include "server/party.h"
-#include "server/shares.h"
-#include "server/thread_setup.h"
+#include "server/process/thread_setup.h"
+#include "server/security/party.h"
+#include "server/security/shares.h"
 
 namespace taclink::server {
 namespace {

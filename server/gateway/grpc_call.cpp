@@ -6,7 +6,7 @@
 #include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/client_callback.h>
 
-#include "server/forwarded.h"
+#include "server/security/forwarded.h"
 
 namespace taclink::server {
 namespace {

@@ -23,7 +23,7 @@ struct GrpcCallRequest {
   std::string method;                 ///< "/package.Service/Method"
   std::vector<std::string> messages;  ///< serialised; a unary method takes one
   std::optional<std::chrono::nanoseconds> timeout;
-  std::string peer, name;  ///< who calls (see server/forwarded.h); name empty: not known
+  std::string peer, name;  ///< who calls (see server/security/forwarded.h); name empty: not known
   char role = 0;           ///< likewise
 };
 

@@ -9,8 +9,8 @@
 
 #include "sensing/core/result.h"
 
-// gRPC-Web (https://github.com/grpc/grpc/blob/master/doc/PROTOCOL-WEB.md): a body is frames of a flag byte,
-// the length as big-endian u32, and so many bytes. Pure functions of bytes, for bad input too.
+// The framing of gRPC-Web [grpcweb]: a body is frames of a flag byte, the length as big-endian
+// u32, and so many bytes. Pure functions of bytes, for bad input too.
 namespace taclink::server {
 
 enum class WebFormat { kBinary, kText };  ///< kText: each piece of a body in base64

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "server/latency_histogram.h"
+#include "server/link/latency_histogram.h"
 
 namespace taclink::server {
 

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "server/gateway/http_target.h"
-#include "server/party.h"
+#include "server/security/party.h"
 
 namespace taclink::server {
 namespace {

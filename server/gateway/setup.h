@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "sensing/core/result.h"
-#include "server/arm.h"
-#include "server/config_http.h"
+#include "server/arm/arm.h"
+#include "server/config/config_http.h"
 #include "server/gateway/gateway.h"
 #include "server/publish/publisher.h"
 #include "server/rpc/rpc_server.h"

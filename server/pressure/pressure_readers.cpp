@@ -11,6 +11,7 @@
 #include <cstring>
 #include <utility>
 
+#include "server/config/config_pressure.h"
 #include "server/pressure/line_reader.h"
 
 namespace taclink::server {
@@ -18,16 +19,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr std::array<std::pair<int, speed_t>, 10> kBaudRates = {{{1200, B1200},
-                                                                 {2400, B2400},
-                                                                 {4800, B4800},
-                                                                 {9600, B9600},
-                                                                 {19200, B19200},
-                                                                 {38400, B38400},
-                                                                 {57600, B57600},
-                                                                 {115200, B115200},
-                                                                 {230400, B230400},
-                                                                 {921600, B921600}}};
+// In the order of kBaudRates.
+constexpr std::array<speed_t, kBaudRates.size()> kSpeeds = {B1200,  B2400,  B4800,   B9600,   B19200,
+                                                            B38400, B57600, B115200, B230400, B921600};
 
 Error Unavailable(const std::string& path, const std::string& what) {
   return {ErrorCode::kUnavailable, path + ": " + what};
@@ -196,14 +190,10 @@ std::unique_ptr<PressureReader> MakeFilePressureReader(std::string path, Clock& 
   return std::make_unique<FilePressureReader>(std::move(path), clock);
 }
 
-bool IsBaudRate(int baud) {
-  return std::any_of(kBaudRates.begin(), kBaudRates.end(),
-                     [&](const auto& rate) { return rate.first == baud; });
-}
-
 std::unique_ptr<PressureReader> MakeSerialPressureReader(std::string device, int baud, Clock& clock) {
   speed_t speed = B9600;
-  for (const auto& [rate, constant] : kBaudRates) speed = rate == baud ? constant : speed;
+  for (size_t i = 0; i < kBaudRates.size(); ++i)
+    if (kBaudRates[i] == baud) speed = kSpeeds[i];
   return std::make_unique<SerialPressureReader>(std::move(device), speed, clock);
 }
 

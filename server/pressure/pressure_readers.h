@@ -14,6 +14,5 @@ std::unique_ptr<PressureReader> MakeFilePressureReader(std::string path, Clock& 
 
 /// A serial device that sends a number a line, 8N1.
 std::unique_ptr<PressureReader> MakeSerialPressureReader(std::string device, int baud, Clock& clock);
-bool IsBaudRate(int baud);
 
 }  // namespace taclink::server

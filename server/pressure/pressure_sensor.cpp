@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "sensing/core/units.h"
-#include "server/thread_setup.h"
+#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 namespace {

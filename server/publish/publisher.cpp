@@ -5,8 +5,8 @@
 #include <condition_variable>
 #include <utility>
 
-#include "server/rpc/event_message.h"
-#include "server/thread_setup.h"
+#include "server/messages/event_message.h"
+#include "server/process/thread_setup.h"
 #include "wire/frame_codec.h"
 
 namespace taclink::server {

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/arm.h"
-#include "server/config_publish.h"
+#include "server/arm/arm.h"
+#include "server/config/config_publish.h"
 #include "server/publish/nats_connection.h"
 #include "server/publish/outbox.h"
 

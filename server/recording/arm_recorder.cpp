@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <map>
 
-#include "server/rpc/arm_message.h"
-#include "server/rpc/contacts_message.h"
-#include "server/rpc/event_message.h"
+#include "server/messages/arm_message.h"
+#include "server/messages/contacts_message.h"
+#include "server/messages/event_message.h"
 #include "taclink/v1/log.pb.h"
 #include "wire/log/scene.h"
 

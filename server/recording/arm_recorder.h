@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "server/arm.h"
-#include "server/rate_limit.h"
+#include "server/arm/arm.h"
+#include "server/hub/rate_limit.h"
 #include "taclink/v1/contacts.pb.h"
 #include "wire/log/log_writer.h"
 

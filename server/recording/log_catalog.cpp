@@ -4,9 +4,9 @@
 #include <charconv>
 #include <optional>
 
+#include "mcap/cursor.h"
 #include "server/recording/log_file.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/cursor.h"
 
 namespace taclink::server {
 namespace {

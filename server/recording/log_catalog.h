@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "mcap/reader.h"
 #include "server/recording/log_folder.h"
 #include "taclink/v1/recording.pb.h"
-#include "wire/mcap/reader.h"
 
 namespace taclink::server {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "mcap/file_sink.h"
 #include "server/recording/log_folder.h"
 #include "wire/log/log_writer.h"
-#include "wire/mcap/file_sink.h"
 
 namespace taclink::server {
 
@@ -40,7 +40,7 @@ class LogFile {
   Result<void> Flush() { return writer_->mcap().Flush(); }
   /// All that was written is safe from a power cut. Errors: the system's; then what was written since the
   /// last Sync may be lost, also what the file has taken: the system has dropped it, and the next Sync would
-  /// not tell (Rebello et al., Can applications recover from fsync failures?, 2020).
+  /// not tell [rebello2020].
   Result<void> Sync() { return writer_->mcap().Sync(); }
   mcap::FileSink::Place WhereItIs() const { return sink_->WhereItIs(); }
   /// Ends the log and gives it its final name, or, where its file was moved, leaves it there. Errors: the

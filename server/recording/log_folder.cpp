@@ -13,8 +13,8 @@
 #include <span>
 #include <utility>
 
-#include "wire/mcap/file_sink.h"
-#include "wire/mcap/recover.h"
+#include "mcap/file_sink.h"
+#include "mcap/recover.h"
 
 namespace taclink::server {
 namespace {

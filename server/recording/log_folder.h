@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "mcap/file_calls.h"
 #include "sensing/core/result.h"
-#include "wire/mcap/file_calls.h"
 
 namespace taclink::server {
 

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "sensing/core/name.h"
-#include "server/link_names.h"
-#include "server/thread_setup.h"
+#include "server/arm/link_names.h"
+#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 namespace {

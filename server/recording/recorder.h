@@ -5,8 +5,8 @@
 #include <string>
 #include <thread>
 
-#include "server/arm.h"
-#include "server/config_recording.h"
+#include "server/arm/arm.h"
+#include "server/config/config_recording.h"
 #include "server/recording/log_catalog.h"
 #include "server/recording/recording.h"
 

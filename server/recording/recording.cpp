@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-#include "server/thread_setup.h"
+#include "server/process/thread_setup.h"
 #include "taclink/v1/frame.pb.h"
 #include "wire/log/picture.h"
 

@@ -10,9 +10,9 @@
 #include <thread>
 #include <vector>
 
-#include "server/arm.h"
-#include "server/config_recording.h"
-#include "server/rate_limit.h"
+#include "server/arm/arm.h"
+#include "server/config/config_recording.h"
+#include "server/hub/rate_limit.h"
 #include "server/recording/arm_recorder.h"
 #include "server/recording/log_file.h"
 #include "server/recording/log_folder.h"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/thread_setup.h"
+#include "server/process/thread_setup.h"
 #include "taclink/v1/log.pb.h"
 
 namespace taclink::server {

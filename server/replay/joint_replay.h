@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "sensing/core/clock.h"
-#include "server/arm_poses.h"
+#include "server/arm/arm_poses.h"
 #include "server/replay/replay_track.h"
 
 namespace taclink::server {

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string_view>
 
-#include "server/link_names.h"
+#include "server/arm/link_names.h"
 
 namespace taclink::server {
 namespace {

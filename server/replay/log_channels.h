@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "mcap/reader.h"
 #include "server/replay/log_player.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/reader.h"
 
 namespace taclink::server {
 

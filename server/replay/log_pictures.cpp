@@ -4,12 +4,12 @@
 #include <map>
 #include <set>
 
-#include "server/link_names.h"
+#include "mcap/cursor.h"
+#include "server/arm/link_names.h"
 #include "server/replay/log_channels.h"
 #include "server/replay/log_player.h"
 #include "wire/log/picture.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/cursor.h"
 
 namespace taclink::server {
 namespace {

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <string>
 
+#include "mcap/reader.h"
 #include "sensing/core/camera_model.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/result.h"
-#include "wire/mcap/reader.h"
 
 namespace taclink::server {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "wire/mcap/cursor.h"
-#include "wire/mcap/reader.h"
+#include "mcap/cursor.h"
+#include "mcap/reader.h"
 
 namespace taclink::server {
 

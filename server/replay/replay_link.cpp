@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/link_outlet.h"
+#include "server/link/link_outlet.h"
 #include "wire/frame_codec.h"
 
 namespace taclink::server {

@@ -5,7 +5,7 @@
 
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
-#include "server/link_processor.h"
+#include "server/link/link_processor.h"
 #include "server/replay/replay_track.h"
 
 namespace taclink::server {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "server/rpc/status.h"
+#include "server/rpc/requests/status.h"
 
 namespace taclink::server {
 namespace {
@@ -46,7 +46,7 @@ std::string_view View(const grpc_slice& slice) {
 
 // gRPC does not tell an address here, so that each connection counts for itself, by a number that does not
 // tell where in memory it is.
-std::string PlaceOf(const grpc_auth_context* connection) {
+std::string ConnectionPlace(const grpc_auth_context* connection) {
   constexpr uint64_t kMixer = 0x9E3779B97F4A7C15;
   return fmt::format("gRPC connection {:04x}", reinterpret_cast<uintptr_t>(connection) * kMixer >> 48);
 }
@@ -60,7 +60,7 @@ void CheckCall(void* state, grpc_auth_context* connection, const grpc_metadata* 
     if (key == ":path") path = View(metadata[i].value);
     if (key == "authorization") authorization = View(metadata[i].value);
   }
-  const auto caller = static_cast<Guard*>(state)->security->Check(path, authorization, PlaceOf(connection));
+  const auto caller = static_cast<Guard*>(state)->security->Check(path, authorization, ConnectionPlace(connection));
   const grpc::Status status = caller ? grpc::Status::OK : ToGrpc(caller.error());
   done(user_data, nullptr, 0, nullptr, 0, static_cast<grpc_status_code>(status.error_code()),
        status.error_message().c_str());

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include "server/process/unix_socket.h"
 #include "server/rpc/credentials.h"
-#include "server/unix_socket.h"
 
 namespace taclink::server {
 namespace {

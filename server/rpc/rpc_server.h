@@ -8,10 +8,10 @@
 #include <string>
 
 #include "sensing/core/result.h"
-#include "server/arm.h"
-#include "server/rpc/operations_service.h"
-#include "server/rpc/recording_service.h"
-#include "server/rpc/tactile_service.h"
+#include "server/arm/arm.h"
+#include "server/rpc/services/operations_service.h"
+#include "server/rpc/services/recording_service.h"
+#include "server/rpc/services/tactile_service.h"
 #include "server/security/security.h"
 
 namespace taclink::server {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sensing/core/result.h"
-#include "server/config.h"
+#include "server/config/config.h"
 
 namespace taclink::server {
 

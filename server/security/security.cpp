@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "sensing/core/utc_time.h"
+#include "server/process/thread_setup.h"
 #include "server/security/secret_file.h"
-#include "server/thread_setup.h"
 
 namespace taclink::server {
 namespace {

@@ -13,7 +13,8 @@
 namespace taclink {
 namespace {
 
-// A row of calculix/results.csv: three-dimensional bricks, solved by another program (docs/calculix.md).
+// A row of calculix/results.csv: three-dimensional bricks, solved by another program
+// (docs/reports/calculix.md).
 struct Judged {
   std::string name, law, quantity;
   double pressure_kpa = 0, depth_mm = 0, value = 0;
@@ -65,7 +66,7 @@ TEST(CalculiX, InflationIsTheSame) {
   for (const Judged& judged : Judgements()) {
     if (judged.name != "tube-inflation" || judged.quantity != "radial_middle:middle") continue;
     const double inflation_mm = Pushed(SkinOf(judged.law), 5, -9, judged.pressure_kpa).inflation_mm;
-    // 1 % of it is the bricks' nu = 0.49 (docs/calculix.md).
+    // 1 % of it is the bricks' nu = 0.49 (docs/reports/calculix.md).
     EXPECT_NEAR(inflation_mm / judged.value, 1, 0.02) << judged.law << " " << judged.pressure_kpa << " kPa";
     std::printf("inflation %s %g kPa: bricks %.3f mm, shell %.3f mm\n", judged.law.c_str(),
                 judged.pressure_kpa, judged.value, inflation_mm);

@@ -8,7 +8,7 @@
 #include <random>
 #include <sstream>
 
-#include "sensing/mechanics/material_fit.h"
+#include "sensing/identification/material_fit.h"
 #include "sensing/model/model_file.h"
 #include "tests/support/inflated_skin.h"
 #include "tests/support/paths.h"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sensing/mechanics/skin_push.h"
+#include "sensing/shell/skin_push.h"
 
 namespace taclink {
 

@@ -1,7 +1,7 @@
 // Every shipped skin inflated and pressed, from good and poor pictures through the whole way.
 #include <gtest/gtest.h>
 
-#include "sensing/evaluation/stability_cases.h"
+#include "bench/stability/stability_cases.h"
 #include "sensing/model/model_file.h"
 
 namespace taclink {

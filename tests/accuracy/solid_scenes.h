@@ -18,7 +18,7 @@ struct SolidContact {
   Vec2 extent_mm = Vec2::Zero();  ///< half widths around and along
 };
 
-/// A scene that another program solved (tests/accuracy/calculix, docs/calculix.md).
+/// A scene that another program solved (tests/accuracy/calculix, docs/reports/calculix.md).
 struct SolidScene {
   std::string name, family;
   bool held_out = false;  ///< no constant may be chosen by it

@@ -6,8 +6,8 @@
 #include <map>
 #include <string>
 
-#include "sensing/evaluation/whole_bench.h"
-#include "sensing/evaluation/whole_report.h"
+#include "bench/whole/whole_bench.h"
+#include "bench/whole/whole_report.h"
 #include "sensing/model/model_file.h"
 
 namespace taclink {

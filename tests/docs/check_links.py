@@ -1,4 +1,5 @@
-"""Every relative link of a Markdown page leads to a file, and to a heading where it names one."""
+"""Every relative link of a Markdown page leads to a file, and to a heading where it names one; every citation in a
+comment, such as [duong2021, (4.27)], has an entry in docs/references.md; docs/architecture.md stays short."""
 
 import pathlib
 import re
@@ -26,5 +27,26 @@ for page in pages:
             wrong.append(f"{page.relative_to(root)}: {target} is not there")
         elif anchor and file.suffix == ".md" and anchor not in anchors(file):
             wrong.append(f"{page.relative_to(root)}: {path or 'the page'} has no heading #{anchor}")
+references = (root / "docs/references.md").read_text(encoding="utf-8")
+keys = re.findall(r"^\*\*\[([a-z0-9]+)\]\*\*", references, re.M)
+wrong += [f"docs/references.md has {key} twice" for key in set(keys) if keys.count(key) > 1]
+cited = set()
+for folder in ("bench", "client", "mcap", "proto", "sensing", "server", "tests", "wire"):
+    for source in (root / folder).rglob("*"):
+        if source.suffix not in {".h", ".cpp", ".proto"} or skipped & set(source.relative_to(root).parts):
+            continue
+        for line in source.read_text(encoding="utf-8").splitlines():
+            comment = line.partition("//")[2]
+            for key in re.findall(r"\[([a-z]+[0-9]{4})[a-z]?(?:, [^\]]*)?\]", comment):
+                cited.add(key)
+                if key not in keys:
+                    wrong.append(f"{source.relative_to(root)} cites {key}, which docs/references.md does not have")
+if len(cited) < 10:
+    wrong.append("comments cite fewer than ten sources: is the pattern right?")
+
+MOST_WORDS = 1800
+words = len((root / "docs/architecture.md").read_text(encoding="utf-8").split())
+if words > MOST_WORDS:
+    wrong.append(f"docs/architecture.md has {words} words; {MOST_WORDS} is the limit")
 print(f"{len(pages)} pages", *wrong, sep="\n")
 sys.exit(bool(wrong) or not pages)

@@ -17,7 +17,7 @@ import yaml
 root, programs = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 skipped = {"node_modules", "build", ".git"}
 pages = [p for p in root.rglob("*.md") if not skipped & set(p.relative_to(root).parts)]
-folders = "client|cmake|deploy|docs|proto|sensing|server|tests|web|wire"
+folders = "bench|client|cmake|deploy|docs|mcap|proto|sensing|server|tests|web|wire"
 wrong = []
 
 
@@ -32,7 +32,7 @@ def help_of(*command: str) -> tuple[str, frozenset[str]]:
 
 def check_command(page: str, line: str) -> bool:
     """One call of a program; what is behind two spaces explains it."""
-    match = re.match(r"(taclinkd?)((?: \S+)*)", line)
+    match = re.match(r"(taclink(?:d|-bench)?)((?: \S+)*)", line)
     if not match:
         return False
     program, words = match[1], re.split(r" [|>&#]", match[2])[0].split()

@@ -6,8 +6,8 @@
 #include <fstream>
 
 #include "tests/end_to_end/support.h"
+#include "tests/mcap/judge.h"
 #include "tests/support/paths.h"
-#include "tests/wire/mcap/judge.h"
 
 namespace taclink::testing {
 namespace {

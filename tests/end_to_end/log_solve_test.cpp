@@ -6,6 +6,8 @@
 #include <memory>
 #include <set>
 
+#include "mcap/cursor.h"
+#include "mcap/file_sink.h"
 #include "sensing/camera/calibration.h"
 #include "sensing/capture/image_io.h"
 #include "sensing/model/model_file.h"
@@ -16,8 +18,6 @@
 #include "tests/support/paths.h"
 #include "wire/log/log_writer.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/cursor.h"
-#include "wire/mcap/file_sink.h"
 
 namespace taclink::testing {
 namespace {

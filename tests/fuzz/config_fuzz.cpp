@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "server/config.h"
+#include "server/config/config.h"
 
 using taclink::server::ConfigText;
 using taclink::server::ParseConfig;

@@ -3,10 +3,10 @@
 #include <cstdlib>
 #include <memory>
 
-#include "wire/mcap/check.h"
-#include "wire/mcap/cursor.h"
-#include "wire/mcap/reader.h"
-#include "wire/mcap/recover.h"
+#include "mcap/check.h"
+#include "mcap/cursor.h"
+#include "mcap/reader.h"
+#include "mcap/recover.h"
 
 namespace {
 

@@ -2,9 +2,9 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "server/rpc/link_calls.h"
-#include "server/rpc/replay_request.h"
-#include "server/rpc/request_check.h"
+#include "server/rpc/requests/request_check.h"
+#include "server/rpc/services/link_calls.h"
+#include "server/rpc/streams/replay_request.h"
 #include "taclink/v1/operations.pb.h"
 #include "taclink/v1/recording.pb.h"
 #include "taclink/v1/tactile.pb.h"

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "server/rpc/stream_request.h"
+#include "server/rpc/streams/stream_request.h"
 
 using namespace taclink::server;
 

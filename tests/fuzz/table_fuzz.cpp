@@ -8,9 +8,9 @@
 #include <sstream>
 #include <string>
 
-#include "client/command/joint_lines.h"
-#include "client/command/marker_csv.h"
-#include "client/command/probe_csv.h"
+#include "client/command/live/joint_lines.h"
+#include "client/command/offline/marker_csv.h"
+#include "client/command/offline/probe_csv.h"
 #include "sensing/model/model_file.h"
 #include "server/pressure/line_reader.h"
 

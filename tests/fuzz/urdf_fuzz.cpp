@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "server/kinematics/arm_kinematics.h"
+#include "server/arm/arm_kinematics.h"
 
 using taclink::server::ArmKinematics;
 

@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/command/contacts_view.h"
-#include "client/command/joint_lines.h"
-#include "client/command/json.h"
+#include "client/command/cli/json.h"
+#include "client/command/live/contacts_view.h"
+#include "client/command/live/joint_lines.h"
 
 namespace taclink::command {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <limits>
 
-#include "client/taclink/arm_contacts.h"
+#include "client/cpp/taclink/arm_contacts.h"
 #include "tests/integration/support.h"
-#include "tests/server/kinematics/arms.h"
+#include "tests/server/arm/arms.h"
 #include "tests/support/times.h"
 
 namespace taclink::server {

@@ -3,10 +3,10 @@
 
 #include <map>
 
-#include "client/command/contacts_view.h"
-#include "client/command/frame_json.h"
-#include "client/command/json.h"
-#include "client/command/watch_view.h"
+#include "client/command/cli/json.h"
+#include "client/command/live/contacts_view.h"
+#include "client/command/live/frame_json.h"
+#include "client/command/live/watch_view.h"
 
 namespace taclink::command {
 namespace {

@@ -1,5 +1,5 @@
 // Streams that outlive their server.
-#include "client/taclink/follow.h"
+#include "client/cpp/taclink/follow.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

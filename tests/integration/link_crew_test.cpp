@@ -1,4 +1,4 @@
-#include "client/command/link_crew.h"
+#include "client/command/cli/link_crew.h"
 
 #include <gtest/gtest.h>
 

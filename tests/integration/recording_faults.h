@@ -10,11 +10,11 @@
 #include <string>
 #include <thread>
 
-#include "client/taclink/recordings.h"
+#include "client/cpp/taclink/recordings.h"
+#include "mcap/file_calls.h"
+#include "mcap/scan.h"
 #include "tests/integration/support.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/file_calls.h"
-#include "wire/mcap/scan.h"
 
 namespace taclink::server {
 

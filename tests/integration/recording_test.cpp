@@ -10,14 +10,14 @@
 #include <sstream>
 #include <thread>
 
-#include "client/taclink/recordings.h"
+#include "client/cpp/taclink/recordings.h"
+#include "mcap/check.h"
+#include "mcap/cursor.h"
+#include "mcap/reader.h"
 #include "taclink/v1/frame.pb.h"
 #include "taclink/v1/log.pb.h"
 #include "tests/integration/support.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/check.h"
-#include "wire/mcap/cursor.h"
-#include "wire/mcap/reader.h"
 
 namespace taclink::server {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "client/taclink/recordings.h"
+#include "client/cpp/taclink/recordings.h"
 #include "sensing/capture/decode.h"
 #include "taclink/v1/recording.grpc.pb.h"
 #include "tests/integration/support.h"

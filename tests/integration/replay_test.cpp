@@ -1,5 +1,5 @@
 // Logs that the recorder made, played over the API. Speeds are real time, so nothing here is judged by it.
-#include "client/taclink/replay.h"
+#include "client/cpp/taclink/replay.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <future>
 #include <thread>
 
-#include "client/taclink/recordings.h"
+#include "client/cpp/taclink/recordings.h"
 #include "taclink/v1/recording.grpc.pb.h"
 #include "tests/integration/support.h"
 #include "tests/support/times.h"

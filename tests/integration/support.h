@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "client/taclink/client.h"
+#include "client/cpp/taclink/client.h"
 #include "sensing/model/model_file.h"
-#include "server/arm.h"
-#include "server/assembly/encoder.h"
+#include "server/arm/arm.h"
+#include "server/hub/encoder.h"
 #include "server/rpc/rpc_server.h"
 #include "tests/server/support.h"
 #include "tests/server/test_state.h"

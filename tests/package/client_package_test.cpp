@@ -60,7 +60,7 @@ class ClientPackageTest : public ScratchFolder {
 
 TEST_F(ClientPackageTest, IsFoundByCMake) {
   const std::string build = Path("build");
-  const Finished built = Shell(std::string(CMAKE) + " -G Ninja -S '" TACLINK_SOURCE "/client/example' -B '" +
+  const Finished built = Shell(std::string(CMAKE) + " -G Ninja -S '" TACLINK_SOURCE "/client/cpp/example' -B '" +
                                build + "' -DCMAKE_PREFIX_PATH='" + prefix_ + "' -DCMAKE_CXX_COMPILER=" CXX +
                                " && " CMAKE " --build '" + build + "'");
   ASSERT_EQ(built.exit_code, 0) << built.out << built.err;
@@ -74,7 +74,7 @@ TEST_F(ClientPackageTest, IsFoundByPkgConfig) {
   const Finished built =
       Shell("PKG_CONFIG_PATH='" + pc +
             "' && export PKG_CONFIG_PATH && " CXX " -std=c++20 -Wall -Wextra -Werror '" TACLINK_SOURCE
-            "/client/example/touch_monitor.cpp' -o '" +
+            "/client/cpp/example/touch_monitor.cpp' -o '" +
             program + "' $(pkg-config --cflags --libs taclink-client) -Wl,-rpath,'" + library + "'");
   ASSERT_EQ(built.exit_code, 0) << built.out << built.err;
   ExpectWorks(program);

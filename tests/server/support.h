@@ -16,8 +16,8 @@
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
 #include "sensing/core/link_state.h"
-#include "server/hub.h"
-#include "server/link_processor.h"
+#include "server/hub/hub.h"
+#include "server/link/link_processor.h"
 
 namespace taclink::server {
 

@@ -13,17 +13,17 @@
 #include <set>
 #include <thread>
 
-#include "client/taclink/client.h"
-#include "client/taclink/recordings.h"
+#include "client/cpp/taclink/client.h"
+#include "client/cpp/taclink/recordings.h"
+#include "mcap/check.h"
+#include "mcap/cursor.h"
+#include "mcap/reader.h"
 #include "server/recording/log_folder.h"
 #include "taclink/v1/frame.pb.h"
 #include "tests/support/paths.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/check.h"
-#include "wire/mcap/cursor.h"
-#include "wire/mcap/reader.h"
 
 namespace taclink {
 namespace {

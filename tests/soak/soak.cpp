@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "sensing/model/model_file.h"
-#include "server/arm.h"
-#include "server/assembly/encoder.h"
+#include "server/arm/arm.h"
+#include "server/hub/encoder.h"
 #include "server/rpc/rpc_server.h"
 #include "tests/server/test_state.h"
 #include "tests/soak/faulty_source.h"

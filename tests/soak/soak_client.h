@@ -8,7 +8,7 @@
 #include <random>
 #include <string>
 
-#include "client/taclink/client.h"
+#include "client/cpp/taclink/client.h"
 
 namespace taclink::server {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "sensing/core/link_model.h"
-#include "sensing/mechanics/material_fit.h"
-#include "sensing/mechanics/pressed_skin.h"
+#include "sensing/identification/material_fit.h"
+#include "sensing/shell/pressed_skin.h"
 #include "tests/support/drawn_vector.h"
 
 namespace taclink {

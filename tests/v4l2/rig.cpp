@@ -5,9 +5,9 @@
 
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/picture_stage.h"
-#include "server/assembly/encoder.h"
 #include "server/assembly/source_factory.h"
-#include "server/config.h"
+#include "server/config/config.h"
+#include "server/hub/encoder.h"
 #include "tests/server/test_state.h"
 
 namespace taclink::testing {

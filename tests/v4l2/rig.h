@@ -10,9 +10,9 @@
 #include <thread>
 #include <vector>
 
-#include "client/taclink/client.h"
+#include "client/cpp/taclink/client.h"
 #include "sensing/core/clock.h"
-#include "server/arm.h"
+#include "server/arm/arm.h"
 #include "server/rpc/rpc_server.h"
 #include "tests/v4l2/emulated_camera.h"
 #include "tests/v4l2/pictures.h"

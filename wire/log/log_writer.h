@@ -8,8 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include "mcap/writer.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/writer.h"
 
 namespace taclink::wire::log {
 

@@ -5,10 +5,10 @@
 #include <set>
 #include <string>
 
+#include "mcap/bytes.h"
 #include "sensing/core/result.h"
 #include "wire/detail.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/bytes.h"
 
 namespace taclink::wire::log {
 

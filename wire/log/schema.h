@@ -2,7 +2,7 @@
 
 #include <google/protobuf/descriptor.h>
 
-#include "wire/mcap/records.h"
+#include "mcap/records.h"
 
 namespace taclink::wire::log {
 

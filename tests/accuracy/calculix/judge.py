@@ -2,7 +2,7 @@
 """CalculiX as an independent judge of a skin's mechanics: runs the cases below with ccx and writes results.csv.
 
 Needs ccx (Debian: calculix-ccx) and Python 3, nothing else. A case that was solved before is read, not solved again.
-docs/calculix.md says what is solved and what came out. Units: mm, N, MPa, rad; kPa only in names and in the table.
+docs/reports/calculix.md says what is solved and what came out. Units: mm, N, MPa, rad; kPa only in names and in the table.
 """
 
 import argparse

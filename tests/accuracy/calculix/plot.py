@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws docs/calculix.svg from results.csv: probe force against pressure, and the pushed path's shape."""
+"""Draws docs/reports/calculix.svg from results.csv: probe force against pressure, and the pushed path's shape."""
 
 import csv
 import os
@@ -83,7 +83,7 @@ def main():
         rows = list(csv.DictReader(table))
     parts = [*forces(rows).parts, *shape(rows).parts]
     size = f'width="{2 * (LEFT + WIDTH) + 60}" height="{TOP + HEIGHT + 50}"'
-    with open(os.path.join(HERE, "../../../docs/calculix.svg"), "w", encoding="ascii") as out:
+    with open(os.path.join(HERE, "../../../docs/reports/calculix.svg"), "w", encoding="ascii") as out:
         out.write(f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="12">\n')
         out.write('<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(parts) + "\n</svg>\n")
 

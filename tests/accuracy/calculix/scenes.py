@@ -2,7 +2,7 @@
 """Scenes of a touched robot skin, solved with ccx as three-dimensional solids: writes scenes.csv, scene_contacts.csv and scene_markers.csv.
 
 Needs ccx (Debian: calculix-ccx) and Python 3, nothing else. A scene that was solved before is read, not solved again.
-docs/calculix.md says what is solved. Units: mm, N, MPa, rad; kPa only in names and in the tables.
+docs/reports/calculix.md says what is solved. Units: mm, N, MPa, rad; kPa only in names and in the tables.
 """
 
 import argparse

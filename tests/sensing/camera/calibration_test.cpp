@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "sensing/markers/detector.h"
-#include "sensing/markers/rest_labels.h"
+#include "sensing/markers/detect/detector.h"
+#include "sensing/markers/label/rest_labels.h"
 #include "sensing/model/model_file.h"
 #include "tests/support/paths.h"
 #include "tests/support/read_jpeg.h"

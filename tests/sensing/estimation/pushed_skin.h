@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "sensing/estimation/skin_estimator.h"
-#include "sensing/mechanics/element_load.h"
-#include "sensing/mechanics/equilibrium.h"
 #include "sensing/model/model_file.h"
+#include "sensing/shell/element_load.h"
+#include "sensing/shell/equilibrium.h"
 
 namespace taclink {
 

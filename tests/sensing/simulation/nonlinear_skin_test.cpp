@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <random>
 
-#include "sensing/mechanics/skin_push.h"
+#include "sensing/shell/skin_push.h"
 #include "tests/sensing/simulation/scene_text.h"
 
 namespace taclink {

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "mcap/reader.h"
 #include "server/recording/log_file.h"
-#include "wire/mcap/reader.h"
 
 namespace taclink::server {
 namespace {

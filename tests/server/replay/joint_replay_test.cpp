@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "taclink/v1/log.pb.h"
-#include "tests/server/kinematics/arms.h"
+#include "tests/server/arm/arms.h"
 #include "tests/server/replay/test_log.h"
 #include "tests/server/support.h"
 

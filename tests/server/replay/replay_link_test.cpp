@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/link_worker.h"
+#include "server/link/link_worker.h"
 #include "tests/server/replay/test_log.h"
 #include "tests/server/support.h"
 #include "tests/server/test_state.h"

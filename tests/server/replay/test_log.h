@@ -6,12 +6,12 @@
 #include <memory>
 #include <string>
 
+#include "mcap/byte_sink.h"
+#include "mcap/reader.h"
 #include "taclink/v1/events.pb.h"
 #include "taclink/v1/frame.pb.h"
 #include "tests/support/times.h"
 #include "wire/log/log_writer.h"
-#include "wire/mcap/byte_sink.h"
-#include "wire/mcap/reader.h"
 
 namespace taclink::server {
 

@@ -5,6 +5,8 @@
 
 #include "foxglove/image.pb.h"
 #include "foxglove/scene.pb.h"
+#include "mcap/cursor.h"
+#include "mcap/reader.h"
 #include "sensing/model/model_file.h"
 #include "taclink/v1/frame.pb.h"
 #include "wire/log/log_writer.h"
@@ -13,8 +15,6 @@
 #include "wire/log/schema.h"
 #include "wire/log/times.h"
 #include "wire/log/topics.h"
-#include "wire/mcap/cursor.h"
-#include "wire/mcap/reader.h"
 
 namespace taclink::wire::log {
 namespace {

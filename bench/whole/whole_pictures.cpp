@@ -1,0 +1,179 @@
+#include "bench/whole/whole_pictures.h"
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <utility>
+
+namespace taclink {
+namespace {
+
+CameraEffects Moved(const WholeScene& whole) {
+  CameraEffects effects = whole.scene.camera;
+  const LinkFault& fault = whole.fault;
+  for (size_t i = 0; i < kCameraCount; ++i) {
+    if (!fault.cameras[i]) continue;
+    if (fault.pictures == PictureFault::kMoved) effects.mount[i].shift_mm.x() += fault.amount;
+    if (fault.pictures == PictureFault::kTurned) effects.mount[i].turn_rad.x() += RadFromDeg(fault.amount);
+  }
+  return effects;
+}
+
+Renderer MakeRenderer(const LinkModel& model, const WholeScene& whole, const CameraEffects& effects) {
+  return {model, MountedRig(model.nominal_rig, effects), effects, whole.scene.seed};
+}
+
+void Warp(cv::Mat& gray, double turn_deg, double scale, double shift_px) {
+  const cv::Point2f middle(static_cast<float>(gray.cols - 1) / 2, static_cast<float>(gray.rows - 1) / 2);
+  cv::Mat by = cv::getRotationMatrix2D(middle, turn_deg, scale);
+  by.at<double>(0, 2) += shift_px;
+  cv::Mat warped;
+  cv::warpAffine(gray, warped, by, gray.size(), cv::INTER_CUBIC, cv::BORDER_CONSTANT);
+  gray = std::move(warped);
+}
+
+// Light by place; x and y from -1 to 1.
+template <typename Light>
+void Shade(cv::Mat& gray, Light light) {
+  for (int row = 0; row < gray.rows; ++row) {
+    for (int column = 0; column < gray.cols; ++column) {
+      uchar& pixel = gray.at<uchar>(row, column);
+      const double x = 2.0 * column / (gray.cols - 1) - 1, y = 2.0 * row / (gray.rows - 1) - 1;
+      pixel = cv::saturate_cast<uchar>(light(x, y, static_cast<double>(pixel)));
+    }
+  }
+}
+
+void AddNoise(cv::Mat& gray, double levels, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> normal(0, static_cast<float>(levels));
+  Shade(gray, [&](double, double, double level) { return level + normal(random); });
+}
+
+}  // namespace
+
+// Its skin is pressed elsewhere.
+Scene OtherLinksScene(const WholeScene& whole) {
+  Scene scene = whole.scene;
+  scene.name += ", another link";
+  scene.contacts.clear();
+  SceneContact& contact = scene.contacts.emplace_back();
+  contact.at = {.path = 0, .ring = 0, .angle_rad = RadFromDeg(-60), .z_mm = 80};
+  contact.patch_diameter_mm = 11;
+  contact.force_n = 0.4;
+  contact.begin_s = 2;
+  contact.end_s = scene.duration_s + 1;
+  contact.ramp_s = 0.5;
+  contact.where = scene.name;
+  return scene;
+}
+
+WholePictures::WholePictures(const LinkModel& model, const WholeScene& whole, SimulatedSkin& skin,
+                             SimulatedSkin* other)
+    : whole_(whole),
+      skin_(skin),
+      other_(whole.fault.pictures == PictureFault::kCrossed ? other : nullptr),
+      aging_(model, whole.fault.aging, whole.scene.duration_s),
+      renderer_(MakeRenderer(model, whole, whole.scene.camera)),
+      moved_(MakeRenderer(model, whole, Moved(whole))) {}
+
+void WholePictures::Draw(Renderer& renderer, int frame, const SkinTruth& truth, CameraId id) {
+  cv::Mat& gray = gray_[Index(id)];
+  SkinTruth seen = truth;
+  seen.frame = static_cast<uint64_t>(frame);  // which picks the noise: a late picture has its own
+  renderer.Render(seen, id, gray);
+}
+
+// What happens to the light, or after the lens.
+void WholePictures::Spoil(int frame, CameraId id, cv::Mat& gray) {
+  const LinkFault& fault = whole_.fault;
+  const double amount = fault.amount;
+  const auto seed = static_cast<unsigned>(2 * frame + static_cast<int>(Index(id)));
+  switch (fault.pictures) {
+    case PictureFault::kRolled:
+      return Warp(gray, amount, 1, 0);
+    case PictureFault::kShifted:
+      return Warp(gray, 0, 1, amount);
+    case PictureFault::kScaled:
+      return Warp(gray, 0, amount, 0);
+    case PictureFault::kHazed: {
+      const double mean = cv::mean(gray)[0];
+      return Shade(gray,
+                   [&](double, double, double level) { return (1 - amount) * level + amount * (mean + 40); });
+    }
+    case PictureFault::kBlurred:
+      cv::GaussianBlur(gray, gray, {}, amount);
+      return AddNoise(gray, whole_.scene.camera.sensor_noise_levels, seed);
+    case PictureFault::kCovered:
+      return Shade(gray,
+                   [&](double x, double, double level) { return x < 2 * amount - 1 ? 0.05 * level : level; });
+    case PictureFault::kDark:
+      Shade(gray, [&](double, double, double level) { return amount * level; });
+      return AddNoise(gray, whole_.scene.camera.sensor_noise_levels, seed);
+    case PictureFault::kNoisy:
+      return AddNoise(gray, amount, seed);
+    case PictureFault::kDarkSide:
+      return Shade(gray, [&](double x, double, double level) {
+        return level * (amount + (1 - amount) * std::min(1.0, std::max(0.0, (x + 0.7) / 1.4)));
+      });
+    case PictureFault::kFalloff:
+      return Shade(gray, [&](double x, double y, double level) {
+        return level * std::pow(amount, std::max(0.0, 1 - std::hypot(x, y)));
+      });
+    case PictureFault::kGlow:
+      return Shade(gray, [&](double x, double y, double level) {
+        const double px = std::hypot(x * gray.cols, y * gray.rows) / 2;
+        return level + 180 * std::exp(-0.5 * px * px / (amount * amount));
+      });
+    case PictureFault::kRim:
+      return Shade(gray, [&](double x, double y, double level) {
+        const double around = std::abs(std::atan2(y, x)) / kPi, off = (std::hypot(x, y) - 0.93) / 0.015;
+        return around < amount ? level + 200 * std::exp(-0.5 * off * off) : level;
+      });
+    default:
+      return;
+  }
+}
+
+void WholePictures::Take(int frame, StereoFrame& pictures, SkinTruth& truth) {
+  const double time_s = frame / whole_.scene.frame_rate_hz;
+  const LinkFault& fault = whole_.fault;
+  const bool is_on = fault.pictures != PictureFault::kNone && time_s >= fault.begin_s;
+  skin_.Evaluate(time_s, truth);
+  aging_.Move(truth);
+  if (is_on && fault.pictures == PictureFault::kLate)
+    skin_.Evaluate(std::max(0.0, time_s - fault.amount), then_);
+  else if (is_on && other_)
+    other_->Evaluate(time_s, then_);
+  for (const CameraId id : kBothCameras) {
+    const auto i = Index(id);
+    const bool is_spoiled = is_on && fault.cameras[i];
+    if (is_spoiled && fault.pictures == PictureFault::kFrozen && frame > 0) continue;
+    const bool has_then = fault.pictures == PictureFault::kLate || other_;
+    Draw(is_spoiled ? moved_ : renderer_, frame, is_spoiled && has_then ? then_ : truth, id);
+    if (is_spoiled) Spoil(frame, id, gray_[i]);
+  }
+  const bool is_swapped = is_on && fault.pictures == PictureFault::kSwapped;
+  for (size_t i = 0; i < kCameraCount; ++i) {
+    const cv::Mat& gray = gray_[is_swapped ? 1 - i : i];
+    RawImage& image = pictures.images[i];
+    if (is_on && fault.cameras[i] && fault.pictures == PictureFault::kJpeg) {
+      image.format = PixelFormat::kMjpeg;
+      image.width_px = gray.cols;
+      image.height_px = gray.rows;
+      image.valid = encoder_.Encode(gray, static_cast<int>(fault.amount), image.bytes).ok();
+    } else {
+      PackYuyv(gray, {}, image);
+    }
+  }
+  pictures.sequence = static_cast<uint64_t>(frame);
+  pictures.times.exposure_monotonic_ns =
+      static_cast<int64_t>((frame + 1) / whole_.scene.frame_rate_hz * 1e9);  // 0 would be none
+  pictures.pressure_mpa.reset();
+  pictures.pressure.origin = PressureOrigin::kNone;
+  if (!fault.is_pressure_told) return;
+  pictures.pressure.origin = PressureOrigin::kSerial;
+  pictures.pressure_mpa = ExactInPascals(truth.pressure_mpa + fault.pressure_off_mpa);
+}
+
+}  // namespace taclink

@@ -1,0 +1,66 @@
+#include "client/command/live/calibrate_link.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+
+#include "client/command/cli/json.h"
+#include "client/command/cli/units.h"
+#include "client/command/live/connect.h"
+
+namespace taclink::command {
+namespace {
+
+void PrintText(const client::CalibrationResult& result) {
+  fmt::print(
+      "{} markers seen by both cameras, RMS {:.3f} px per axis\n"
+      "Rest markers, triangulated, against the model: RMSE R {:.3f} mm, phi*R {:.3f} mm, Z {:.3f} mm\n",
+      result.markers_used, result.rms_px, result.rmse_r_m * kMmPerMetre,
+      result.rmse_tangential_m * kMmPerMetre, result.rmse_z_m * kMmPerMetre);
+  if (!result.saved_to.empty()) fmt::print("saved on the server: {}\n", result.saved_to);
+}
+
+void PrintCalibrationJson(const std::string& link, const client::CalibrationResult& result) {
+  const Json json = {{"link", link},
+                     {"markers_used", result.markers_used},
+                     {"rms_px", result.rms_px},
+                     {"rmse_mm",
+                      {{"r", result.rmse_r_m * kMmPerMetre},
+                       {"phi_r", result.rmse_tangential_m * kMmPerMetre},
+                       {"z", result.rmse_z_m * kMmPerMetre}}},
+                     {"saved_to", result.saved_to}};
+  fmt::print("{}\n", json.dump());
+}
+
+}  // namespace
+
+Result<void> CalibrateLink(const LinkCalibration& calibration) {
+  auto connection = ConnectTo(calibration.server);
+  if (!connection) return connection.error();
+  bool told = false;
+  const auto result = connection->Calibrate(calibration.options, [&told](int taken, int wanted) {
+    told = true;
+    fmt::print(stderr, "\r{} of {} rest pairs", taken, wanted);
+    return true;
+  });
+  if (told) fmt::print(stderr, "\n");
+  if (!result) return result.error();
+  if (!calibration.out.empty()) {
+    std::ofstream file(calibration.out, std::ios::trunc);
+    file << result->file_text;
+    file.close();
+    if (!file)
+      return Error{ErrorCode::kUnavailable,
+                   "cannot write '" + calibration.out + "'; the link uses the result"};
+  }
+  if (calibration.json) {
+    PrintCalibrationJson(calibration.options.link, *result);
+  } else {
+    PrintText(*result);
+  }
+  return {};
+}
+
+}  // namespace taclink::command

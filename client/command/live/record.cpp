@@ -1,0 +1,237 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/command/cli/commands.h"
+#include "client/command/cli/interrupt.h"
+#include "client/command/cli/json.h"
+#include "client/command/cli/log_text.h"
+#include "client/command/live/connect.h"
+#include "client/cpp/taclink/recordings.h"
+#include "sensing/core/printable.h"
+
+namespace taclink::command {
+namespace {
+
+using client::LogCompression;
+using client::RecorderStatus;
+using client::Recordings;
+
+struct RecordOptions {
+  std::string server = "127.0.0.1:50051";
+  client::RecordingOptions recording;
+  std::string compression = "configured";
+  std::string log, output;
+  double duration_s = 0;
+  bool json = false;
+};
+
+Result<Recordings> Connect(const RecordOptions& options) {
+  auto connection = ConnectTo(options.server);
+  if (!connection) return connection.error();
+  return connection->RecordingCalls();
+}
+
+Json RecorderJson(const RecorderStatus& status) {
+  return {{"state", client::Name(status.state)},
+          {"trouble", status.trouble},
+          {"last_trouble", status.last_trouble},
+          {"last_trouble_utc_ns", status.last_trouble_utc_ns},
+          {"log", status.log},
+          {"folder", status.folder},
+          {"started_utc_ns", status.started_utc_ns},
+          {"synced_utc_ns", status.synced_utc_ns},
+          {"bytes", status.bytes},
+          {"logs", status.logs},
+          {"frames", status.frames},
+          {"events", status.events},
+          {"frames_lost", status.frames_lost},
+          {"free_bytes", status.free_bytes},
+          {"pictures", status.pictures}};
+}
+
+void Print(const RecorderStatus& status, bool json) {
+  if (json) {
+    fmt::print("{}\n", RecorderJson(status).dump());
+    return;
+  }
+  fmt::print("{}{}{}\n", client::Name(status.state), status.log.empty() ? "" : ": ", status.log);
+  if (!status.trouble.empty()) fmt::print("  {}\n", status.trouble);
+  if (status.last_trouble != status.trouble && !status.last_trouble.empty())
+    fmt::print("  before, at {}: {}\n", UtcText(status.last_trouble_utc_ns), status.last_trouble);
+  if (status.started_utc_ns != 0) {
+    fmt::print("  {} frames, {} lost, {} events, {} in {} logs\n", status.frames, status.frames_lost,
+               status.events, SizeText(status.bytes), status.logs);
+  }
+  if (status.folder.empty()) {
+    fmt::print("  no folder is configured (recording.folder): nothing can be recorded\n");
+  } else {
+    fmt::print("  folder {} on the server, {} free\n", status.folder, SizeText(status.free_bytes));
+  }
+}
+
+Result<void> PrintStatus(const Result<RecorderStatus>& status, const RecordOptions& options) {
+  if (!status) return status.error();
+  Print(*status, options.json);
+  return {};
+}
+
+void WaitFor(double duration_s) {
+  CatchInterrupts();
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(duration_s);
+  while (!IsInterrupted() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+}
+
+Result<void> Start(const RecordOptions& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  client::RecordingOptions recording = options.recording;
+  if (options.compression == "none") recording.compression = LogCompression::kNone;
+  if (options.compression == "zstd") recording.compression = LogCompression::kZstd;
+  if (options.compression == "lz4") recording.compression = LogCompression::kLz4;
+  const auto started = recordings->Start(recording);
+  if (!started || options.duration_s <= 0) return PrintStatus(started, options);
+  WaitFor(options.duration_s);
+  return PrintStatus(recordings->Stop(), options);
+}
+
+Result<void> Stop(const RecordOptions& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  return PrintStatus(recordings->Stop(), options);
+}
+
+Result<void> Status(const RecordOptions& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  return PrintStatus(recordings->Status(), options);
+}
+
+Json LogJson(const client::Log& log) {
+  return {{"name", log.name},
+          {"bytes", log.bytes},
+          {"start_utc_ns", log.start_utc_ns},
+          {"end_utc_ns", log.end_utc_ns},
+          {"links", log.links},
+          {"frames", log.frames},
+          {"contacts", log.contacts ? Json(*log.contacts) : Json()},
+          {"pictures", log.pictures},
+          {"open", log.open},
+          {"problem", log.problem},
+          {"note", log.note}};
+}
+
+void PrintRow(const client::Log& log) {
+  fmt::print("{:<44} {:>9}", log.name, SizeText(log.bytes));
+  if (log.open) {
+    fmt::print("  being written");
+  } else if (log.start_utc_ns != 0) {
+    fmt::print("  {}  {:>8.1f} s  {} links, {} frames", UtcText(static_cast<uint64_t>(log.start_utc_ns)),
+               static_cast<double>(log.end_utc_ns - log.start_utc_ns) * 1e-9, log.links.size(), log.frames);
+    if (log.contacts) fmt::print(", {} contacts", *log.contacts);
+    if (log.pictures) fmt::print(", pictures");
+  }
+  fmt::print("{}{}\n", log.note.empty() ? "" : "  ", Printable(log.note));
+  if (!log.problem.empty()) fmt::print("  {}\n", Printable(log.problem));
+}
+
+Result<void> List(const RecordOptions& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  const auto logs = recordings->List();
+  if (!logs) return logs.error();
+  if (!options.json && logs->empty()) fmt::print("no logs\n");
+  for (const client::Log& log : *logs) {
+    if (options.json) {
+      fmt::print("{}\n", LogJson(log).dump());
+    } else {
+      PrintRow(log);
+    }
+  }
+  return {};
+}
+
+// What is there already stays, and the rest is fetched.
+Result<void> Download(const RecordOptions& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  std::string path = options.output.empty() ? options.log : options.output;
+  if (std::filesystem::is_directory(path)) path += "/" + options.log;
+  std::error_code none;
+  const uint64_t there = std::filesystem::exists(path) ? std::filesystem::file_size(path, none) : 0;
+  std::ofstream out(path, std::ios::binary | std::ios::app);
+  if (!out) return Error{ErrorCode::kPermissionDenied, path + " cannot be written"};
+  bool written = true;
+  uint64_t end = there;
+  const auto done =
+      recordings->Download(options.log, there, [&](std::string_view data, uint64_t offset, uint64_t) {
+        written = offset == end && out.write(data.data(), static_cast<std::streamsize>(data.size())).good();
+        end += data.size();
+        return written;
+      });
+  out.close();
+  if (!written || !out)
+    return Error{ErrorCode::kResourceExhausted, path + " cannot be written; is the disk full?"};
+  if (!done && done.error().code == ErrorCode::kUnavailable)
+    return Error{ErrorCode::kUnavailable, done.error().message + "; the same command again fetches the rest"};
+  if (!done) return done.error();
+  fmt::print("{}: {}{}\n", path, SizeText(end),
+             there > 0 ? ", of which " + SizeText(there) + " were there" : "");
+  return {};
+}
+
+Result<void> Delete(const RecordOptions& options) {
+  auto recordings = Connect(options);
+  if (!recordings) return recordings.error();
+  return recordings->Delete(options.log);
+}
+
+Arguments AddOne(const Arguments& record, const char* name, const char* what,
+                 const std::shared_ptr<RecordOptions>& options, Selected& selected,
+                 Result<void> (*run)(const RecordOptions&)) {
+  const Arguments command = record.AddCommand(name, what);
+  AddServerOption(command, options->server);
+  command.OnChosen([options, run, &selected] { selected = [options, run] { return run(*options); }; });
+  return command;
+}
+
+}  // namespace
+
+void AddRecord(const Arguments& app, Selected& selected) {
+  const Arguments record = app.AddCommand("record", "Record what a server's links feel, on the server");
+  record.RequireCommand();
+  auto options = std::make_shared<RecordOptions>();
+  const Arguments start = AddOne(record, "start", "Begin a recording", options, selected, Start);
+  start.AddOption("--name", options->recording.name, "Part of the logs' names (default: the arm's name)");
+  start.AddOption("--link", options->recording.links, "Names of links (default: all)");
+  start.AddFlag("--pictures", options->recording.pictures, "Also the cameras' pictures, as they sent them");
+  start.AddOption("--compression", options->compression, "Of the logs")
+      .Must(OneOf({"configured", "none", "zstd", "lz4"}));
+  start.AddOption("--note", options->recording.note, "Text kept in the logs");
+  start
+      .AddOption("--duration", options->duration_s,
+                 "Stop after so many seconds, or with ^C; 0: later, by 'stop'")
+      .Must(Within(0, 1e9));
+  const Arguments stop = AddOne(record, "stop", "End it", options, selected, Stop);
+  const Arguments status =
+      AddOne(record, "status", "How the server's recorder does", options, selected, Status);
+  const Arguments list = AddOne(record, "list", "The server's logs", options, selected, List);
+  for (const Arguments& command : {start, stop, status, list})
+    command.AddFlag("--json", options->json, "JSON");
+  const Arguments fetch = AddOne(record, "fetch", "Copy a log from the server; goes on where it broke off",
+                                 options, selected, Download);
+  fetch.AddOption("-o,--output", options->output, "File or folder (default: its name, here)");
+  const Arguments remove = AddOne(record, "delete", "Delete a log on the server", options, selected, Delete);
+  for (const Arguments& command : {fetch, remove})
+    command.AddOption("log", options->log, "Name of the log, as 'list' shows it").Required();
+  AddPlay(record, selected);
+}
+
+}  // namespace taclink::command

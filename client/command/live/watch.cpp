@@ -1,0 +1,99 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+#include "client/command/cli/commands.h"
+#include "client/command/cli/interrupt.h"
+#include "client/command/live/connect.h"
+#include "client/command/live/frame_output.h"
+#include "client/cpp/taclink/client.h"
+
+namespace taclink::command {
+namespace {
+
+struct WatchOptions {
+  std::string server = "127.0.0.1:50051";
+  std::vector<std::string> links;
+  std::string detail = "contacts";
+  double rate_hz = 0;
+  double deadband_n = 0, deadband_mm = 0;
+  std::optional<double> patience_s;
+  bool every = false;
+  bool json = false;
+  uint64_t count = 0;
+};
+
+client::StreamOptions ToStream(const WatchOptions& options) {
+  return {.links = options.links,
+          .detail = options.detail == "full"       ? client::Detail::kFull
+                    : options.detail == "geometry" ? client::Detail::kGeometry
+                                                   : client::Detail::kContacts,
+          .max_rate_hz = options.rate_hz,
+          .delivery = options.every ? client::Delivery::kEvery : client::Delivery::kLatest,
+          .deadband_force_n = options.deadband_n,
+          .deadband_move_m = options.deadband_mm * 1e-3};
+}
+
+Result<void> RunWatch(const WatchOptions& options) {
+  auto connection = ConnectTo(options.server);
+  if (!connection) return connection.error();
+  auto reader = connection->StreamFrames(ToStream(options));
+  if (!reader) return reader.error();
+  CatchInterrupts();
+  FrameOutput output("taclink watch " + options.server + "   (Ctrl-C ends)", options.json);
+  // Every link says something once a second, so silence means a server or a network that hangs.
+  const double chosen_s =
+      options.patience_s.value_or(std::chrono::duration<double>(SilencePatience()).count());
+  const double patience_s = std::max(chosen_s, options.rate_hz > 0 ? 3 / options.rate_hz : 0);
+  double silence_s = 0;
+  for (uint64_t taken = 0; !IsInterrupted() && (options.count == 0 || taken < options.count);) {
+    const auto frame = (*reader)->Next(kInterruptPoll);
+    if (frame) {
+      silence_s = 0;
+      output.Take(*frame, (*reader)->counts());
+      ++taken;
+    } else if (frame.error().code != ErrorCode::kTimeout) {
+      return frame.error();
+    } else if (silence_s += std::chrono::duration<double>(kInterruptPoll).count(); silence_s > patience_s) {
+      return Error{ErrorCode::kUnavailable,
+                   fmt::format("nothing from the server at {} for {:.0f} s; check server and "
+                               "network",
+                               options.server, patience_s)};
+    }
+    if (std::ferror(stdout) != 0) break;  // main reports it
+    output.Refresh((*reader)->counts());
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddWatch(const Arguments& app, Selected& selected) {
+  auto options = std::make_shared<WatchOptions>();
+  const Arguments command = app.AddCommand("watch", "Show contacts and forces live");
+  AddServerOption(command, options->server);
+  command.AddOption("--links", options->links, "Names of links, separated by commas (all)").Delimiter(',');
+  command.AddOption("--rate", options->rate_hz, "At most so many frames a second of each link (all)")
+      .Must(Positive());
+  command.AddOption("--detail", options->detail, "contacts, geometry or full")
+      .Must(OneOf({"contacts", "geometry", "full"}))
+      .ShowDefault();
+  command.AddOption("--deadband-force", options->deadband_n, "Pass over forces that change by less, N")
+      .Must(Positive());
+  command.AddOption("--deadband-move", options->deadband_mm, "Pass over markers that move by less, mm")
+      .Must(Positive());
+  command.AddFlag("--every", options->every, "Every frame in order, not only the newest");
+  command.AddFlag("--json", options->json, "One JSON object a line for each frame");
+  command
+      .AddOption("--patience", options->patience_s,
+                 "Seconds without any word before it gives up (5, or TACLINK_PATIENCE_S if that is more)")
+      .Must(Positive());
+  command.AddOption("--count", options->count, "End after so many frames").Must(Positive());
+  command.OnChosen([options, &selected] { selected = [options] { return RunWatch(*options); }; });
+}
+
+}  // namespace taclink::command

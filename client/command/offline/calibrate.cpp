@@ -1,0 +1,251 @@
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/command/cli/commands.h"
+#include "client/command/cli/json.h"
+#include "client/command/live/calibrate_link.h"
+#include "client/command/offline/calibrate_material.h"
+#include "client/command/offline/calibrate_picture.h"
+#include "sensing/capture/image_io.h"
+#include "sensing/model/model_file.h"
+#include "sensing/pipeline/picture_calibration.h"
+
+namespace taclink::command {
+namespace {
+
+struct CalibrateOptions {
+  std::string model;
+  std::vector<std::string> rest;  // top and bottom by turns
+  std::string lens;
+  std::string out;
+  std::string residuals;
+  double mould_tolerance_mm = BuildTolerance{}.marker_mm;
+  bool json = false;
+  LinkCalibration live;  // instead, if it names a link
+};
+
+// Names and units of what a CameraStep holds, for people.
+struct Row {
+  std::string name;
+  double value = 0, sigma = 0;
+};
+
+std::vector<Row> Rows(const CameraModel& camera, const CameraModel& nominal, const CameraStep& sigmas) {
+  const Vec3 place = camera.camera_from_link.Inverse().translation;
+  CameraModel designed = nominal;
+  designed.lens.kind = camera.lens.kind;
+  const Vec3 turn = StepBetween(designed, camera).head<3>() * DegFromRad(1);
+  const Vec3 turn_sigma = sigmas.head<3>() * DegFromRad(1);
+  std::vector<Row> rows = {{"position x      mm", place.x(), sigmas[3]},
+                           {"position y      mm", place.y(), sigmas[4]},
+                           {"position z      mm", place.z(), sigmas[5]},
+                           {"tilt about x   deg", turn.x(), turn_sigma.x()},
+                           {"tilt about y   deg", turn.y(), turn_sigma.y()},
+                           {"roll           deg", turn.z(), turn_sigma.z()},
+                           {"principal pt x  px", camera.lens.principal_point_px.x(), sigmas[6]},
+                           {"principal pt y  px", camera.lens.principal_point_px.y(), sigmas[7]},
+                           {"focal length    px", camera.lens.focal_px, sigmas[8]}};
+  const LensParameters lens = ParametersOf(camera.lens);
+  for (int i = 1; i < LensParameterCount(camera.lens.kind); ++i) {
+    const bool division = camera.lens.kind == LensKind::kDivision;
+    const char* unit = !division ? "  " : i == 1 ? "/px2" : "/px4";
+    char name[32];
+    std::snprintf(name, sizeof name, "lens k%d %11s", i, unit);
+    rows.push_back({name, lens[i], sigmas[8 + i]});
+  }
+  return rows;
+}
+
+std::string Cell(const Row& row) {
+  char text[64];
+  const bool tiny = row.sigma > 0 && row.sigma < 5e-4;  // the k's per px2 and px4
+  std::snprintf(text, sizeof text, tiny ? "%11.3e \u00b1 %-9.1e" : "%11.3f \u00b1 %-9.3f", row.value,
+                row.sigma);
+  return text;
+}
+
+void PrintText(const LinkModel& model, const CalibrationSummary& summary) {
+  const auto& [top, bottom] = summary.cameras;
+  std::printf("%s, %d rest pair%s, lens model %s\n\n", model.name.c_str(), summary.pairs,
+              summary.pairs == 1 ? "" : "s", Name(top.camera.lens.kind));
+  std::printf("                          top        bottom     both\n");
+  std::printf("markers used       %10d    %10d %8d of %d\n", top.markers_used, bottom.markers_used,
+              summary.markers_used, model.markers.count());
+  std::printf("left out           %10d    %10d\n", top.outliers, bottom.outliers);
+  std::printf("RMS, per axis   px %10.3f    %10.3f %8.3f\n\n", top.rms_px, bottom.rms_px, summary.rms_px);
+  std::printf("Rest markers, triangulated, against the model: RMSE\n");
+  std::printf("  R %.3f mm    phi*R %.3f mm    Z %.3f mm    3-D %.3f mm\n\n", summary.rmse_r_mm,
+              summary.rmse_phi_r_mm, summary.rmse_z_mm, summary.rmse_3d_mm);
+  std::printf("Parameter, \u00b1 standard deviation; tilt and roll against the model's nominal camera\n");
+  std::printf("%-18s %24s   %24s\n", "", "top          ", "bottom        ");
+  std::array<std::vector<Row>, kCameraCount> rows;
+  for (const CameraId id : kBothCameras) {
+    rows[Index(id)] = Rows(summary.rig[id], model.nominal_rig[id], summary.cameras[Index(id)].sigmas);
+  }
+  for (size_t i = 0; i < rows[0].size(); ++i) {
+    std::printf("%s %s   %s\n", rows[0][i].name.c_str(), Cell(rows[0][i]).c_str(), Cell(rows[1][i]).c_str());
+  }
+}
+
+Json CameraJson(const CameraCalibration& one) {
+  const CameraModel& camera = one.camera;
+  const CameraStep& s = one.sigmas;
+  const int count = LensParameterCount(camera.lens.kind);
+  const LensParameters lens = ParametersOf(camera.lens);
+  Json k = Json::array(), k_sigma = Json::array();
+  for (int i = 1; i < count; ++i) {
+    k.push_back(lens[i]);
+    k_sigma.push_back(s[8 + i]);
+  }
+  const Vec2& center = camera.lens.principal_point_px;
+  return {{"markers_used", one.markers_used},
+          {"outliers", one.outliers},
+          {"rms_px", one.rms_px},
+          {"lens", Name(camera.lens.kind)},
+          {"position_mm", ToJson(Vec3(camera.camera_from_link.Inverse().translation))},
+          {"focal_px", camera.lens.focal_px},
+          {"principal_point_px", {center.x(), center.y()}},
+          {"k", k},
+          {"standard_deviations",
+           {{"position_mm", ToJson(Vec3(s.segment<3>(3)))},
+            {"rotation_deg", ToJson(Vec3(s.head<3>() * DegFromRad(1)))},
+            {"principal_point_px", {s[6], s[7]}},
+            {"focal_px", s[8]},
+            {"k", k_sigma}}}};
+}
+
+Json MarkersJson(const LinkModel& model, const CalibrationSummary& summary) {
+  Json markers = Json::array();
+  for (int m = 0; m < model.markers.count(); ++m) {
+    const auto i = static_cast<size_t>(m);
+    Json marker = {{"path", model.PathOf(m) + 1}, {"ring", model.RingOf(m) + 1}};
+    for (const CameraId id : kBothCameras) {
+      const MarkerResidual& one = summary.cameras[Index(id)].residuals[i];
+      const char* names[] = {"unseen", "left out", "used"};
+      marker[Name(id)] = {{"state", names[static_cast<int>(one.kind)]}};
+      if (one.kind != MarkerResidual::Kind::kUnseen)
+        marker[Name(id)]["residual_px"] = {one.residual_px.x(), one.residual_px.y()};
+    }
+    const auto& shift = summary.shifts_mm[i];
+    marker["off_mm"] = shift ? ToJson(*shift) : Json(nullptr);
+    markers.push_back(std::move(marker));
+  }
+  return markers;
+}
+
+void PrintJson(const LinkModel& model, const CalibrationSummary& summary) {
+  const Json out = {{"model", model.name},
+                    {"pairs", summary.pairs},
+                    {"markers_used", summary.markers_used},
+                    {"rms_px", summary.rms_px},
+                    {"rmse_mm",
+                     {{"r", summary.rmse_r_mm},
+                      {"phi_r", summary.rmse_phi_r_mm},
+                      {"z", summary.rmse_z_mm},
+                      {"3d", summary.rmse_3d_mm}}},
+                    {"cameras",
+                     {{"top", CameraJson(summary.cameras[Index(CameraId::kTop)])},
+                      {"bottom", CameraJson(summary.cameras[Index(CameraId::kBottom)])}}},
+                    {"markers", MarkersJson(model, summary)}};
+  std::puts(out.dump().c_str());
+}
+
+Result<std::vector<RestPictures>> ReadPairs(const std::vector<std::string>& paths) {
+  std::vector<RestPictures> pairs(paths.size() / kCameraCount);
+  for (size_t i = 0; i < paths.size(); ++i) {
+    auto picture = ReadGrayImage(paths[i]);
+    if (!picture) return picture.error();
+    pairs[i / kCameraCount][i % kCameraCount] = *std::move(picture);
+  }
+  return pairs;
+}
+
+Result<void> Calibrate(const CalibrateOptions& options) {
+  if (!options.live.options.link.empty()) {
+    LinkCalibration live = options.live;
+    live.out = options.out;
+    live.json = options.json;
+    return CalibrateLink(live);
+  }
+  if (options.model.empty() || options.rest.empty() || options.out.empty())
+    return Error{ErrorCode::kInvalidArgument, "give --model, --rest and --out, or the --link of a server"};
+  const auto model = LoadLinkModel(options.model);
+  if (!model) return model.error();
+  const auto pairs = ReadPairs(options.rest);
+  if (!pairs) return pairs.error();
+  CalibrationOptions how;
+  how.tolerance.marker_mm = options.mould_tolerance_mm;
+  for (const LensKind kind : {LensKind::kDivision, LensKind::kKannalaBrandt}) {
+    if (options.lens == Name(kind)) how.lens = kind;
+  }
+  const auto summary = CalibrateFromPictures(*model, *pairs, how);
+  if (!summary) return summary.error();
+  const std::string residuals =
+      options.residuals.empty()
+          ? std::filesystem::path(options.out).replace_extension(".residuals.png").string()
+          : options.residuals;
+  if (auto written = WritePng(residuals, ResidualPicture(pairs->front(), *summary)); !written)
+    return written.error();
+  if (auto saved = SaveCalibration(options.out, model->name, *summary); !saved) return saved.error();
+  if (options.json) {
+    PrintJson(*model, *summary);
+  } else {
+    PrintText(*model, *summary);
+    std::printf("\nwritten: %s, residuals drawn in %s\n", options.out.c_str(), residuals.c_str());
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddCalibrate(const Arguments& app, Selected& selected) {
+  auto options = std::make_shared<CalibrateOptions>();
+  const Arguments command = app.AddCommand("calibrate",
+                                           "Camera parameters from pictures of the untouched skin, or of a "
+                                           "server's link as it is now; `material`: "
+                                           "the skin's");
+  command.AddOption("--model", options->model, "Link model: a shipped name or a YAML file");
+  command
+      .AddOption(
+          "--rest", options->rest,
+          "TOP and BOTTOM picture of the untouched, unpressurised skin; again for more pairs, which are "
+          "averaged")
+      .Expected(2, 2 * 1000);
+  command.AddOption("--lens", options->lens, "Lens model to fit; without, the link model's")
+      .Must(OneOf({"division", "kannala_brandt"}));
+  command.AddOption("-o,--out", options->out, "Calibration file to write (YAML)");
+  const Option link =
+      command.AddOption("--link", options->live.options.link,
+                        "Instead of pictures: a link of a running server, which then uses the result");
+  AddServerOption(command, options->live.server);
+  command.AddOption("--pairs", options->live.options.pairs, "Rest pairs that the server takes")
+      .Must(Within(1, 300))
+      .ShowDefault()
+      .Needs(link);
+  command
+      .AddFlag("--save", options->live.options.save,
+               "The server writes the link's configured calibration file")
+      .Needs(link);
+  command.AddFlag("--force", options->live.options.force, "Even while the link shows contacts").Needs(link);
+  command.AddOption("--residuals", options->residuals,
+                    "Picture of the residuals to write (PNG); without, beside the calibration file");
+  command
+      .AddOption("--mould-tolerance-mm", options->mould_tolerance_mm,
+                 "How far markers may be off the model, standard deviation per axis")
+      .Must(Within(0.001, 5))
+      .ShowDefault();
+  command.AddFlag("--json", options->json, "One JSON object, with every marker's residuals");
+  AddCalibrateMaterial(command, selected);
+  command.OnChosen([options, command, &selected] {
+    if (command.HasCommand()) return;
+    if (options->rest.size() % kCameraCount != 0)
+      RefuseOption("--rest", "needs a TOP and a BOTTOM picture each time");
+    selected = [options] { return Calibrate(*options); };
+  });
+}
+
+}  // namespace taclink::command

@@ -1,0 +1,229 @@
+#include "client/cpp/taclink/client.h"
+
+#include <utility>
+
+#include "client/cpp/channel.h"
+#include "client/cpp/connection.h"
+#include "client/cpp/messages.h"
+#include "client/cpp/patience.h"
+#include "client/cpp/stream_call.h"
+#include "taclink/v1/operations.grpc.pb.h"
+#include "taclink/v1/tactile.grpc.pb.h"
+
+namespace taclink::client {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::system_clock;
+
+constexpr milliseconds kConnectPatience{3000};
+
+int64_t UtcNowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+Error NoServer(const std::string& address) {
+  return {ErrorCode::kUnavailable,
+          "no server answers at " + address +
+              "; start taclinkd there or choose another with --server; a server with TLS needs --tls-ca, one "
+              "with client_ca also --tls-certificate and --tls-key"};
+}
+
+// A raised patience applies to a server that is slow to answer, not to one that does not exist.
+bool WaitForServer(grpc::Channel& channel, milliseconds patience) {
+  const auto begin = system_clock::now();
+  if (channel.WaitForConnected(begin + kConnectPatience)) return true;
+  auto state = channel.GetState(true);
+  while ((state == GRPC_CHANNEL_IDLE || state == GRPC_CHANNEL_CONNECTING) &&
+         channel.WaitForStateChange(state, begin + patience))
+    state = channel.GetState(true);
+  return state == GRPC_CHANNEL_READY;
+}
+
+ErrorCode CodeOf(grpc::StatusCode code) {
+  switch (code) {
+    case grpc::StatusCode::INVALID_ARGUMENT:
+      return ErrorCode::kInvalidArgument;
+    case grpc::StatusCode::NOT_FOUND:
+      return ErrorCode::kNotFound;
+    case grpc::StatusCode::UNAVAILABLE:
+      return ErrorCode::kUnavailable;
+    case grpc::StatusCode::DEADLINE_EXCEEDED:
+      return ErrorCode::kTimeout;
+    case grpc::StatusCode::FAILED_PRECONDITION:
+      return ErrorCode::kFailedPrecondition;
+    case grpc::StatusCode::OUT_OF_RANGE:
+      return ErrorCode::kEndOfData;
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+      return ErrorCode::kResourceExhausted;
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return ErrorCode::kUnsupported;
+    case grpc::StatusCode::UNAUTHENTICATED:
+      return ErrorCode::kUnauthenticated;
+    case grpc::StatusCode::PERMISSION_DENIED:
+      return ErrorCode::kPermissionDenied;
+    case grpc::StatusCode::CANCELLED:
+      return ErrorCode::kEndOfData;
+    default:
+      return ErrorCode::kInternal;
+  }
+}
+
+}  // namespace
+
+Error FromStatus(const grpc::Status& status, const std::string& address) {
+  const ErrorCode code = CodeOf(status.error_code());
+  if (code == ErrorCode::kUnavailable) {
+    return {code, "lost the server at " + address + " (" + status.error_message() + "); check that it runs"};
+  }
+  if (code == ErrorCode::kTimeout)
+    return {code, "the server at " + address + " did not answer in time; try again"};
+  if (code == ErrorCode::kUnsupported) {
+    return {code, "the server at " + address + " does not offer this (" + status.error_message() +
+                      "); use programs of the same version"};
+  }
+  return {code, status.error_message().empty()
+                    ? "the server at " + address + " ended the call without a reason"
+                    : status.error_message()};
+}
+
+struct FrameReader::Call : StreamCall<v1::StreamFramesResponse> {
+  using StreamCall::StreamCall;
+  std::vector<StreamCounts> counts;
+
+  void TakeStatus() {
+    counts = FromMessage(response.status());
+    end_reason = response.status().end_reason();
+  }
+};
+
+FrameReader::FrameReader(std::unique_ptr<Call> call) : call_(std::move(call)) {}
+FrameReader::~FrameReader() = default;
+
+Result<Frame> FrameReader::Next(milliseconds timeout) {
+  const auto deadline = system_clock::now() + timeout;
+  while (true) {
+    const auto read = call_->Read(deadline);
+    if (!read) return read.error();
+    if (call_->response.has_status()) call_->TakeStatus();
+    if (!call_->response.has_frame()) continue;
+    Frame frame = FromMessage(call_->response.frame());
+    frame.times.client_utc_ns = UtcNowNs();
+    return frame;
+  }
+}
+
+void FrameReader::Cancel() {
+  call_->Cancel();
+}
+
+const std::vector<StreamCounts>& FrameReader::counts() const {
+  return call_->counts;
+}
+
+milliseconds Patience(milliseconds usual) {
+  const auto patience = PatienceFromEnvironment(usual);
+  return patience ? *patience : usual;  // Connect reports the error
+}
+
+Client::Client(std::shared_ptr<Connection> connection) : connection_(std::move(connection)) {}
+Client::~Client() = default;
+Client::Client(Client&&) noexcept = default;
+Client& Client::operator=(Client&&) noexcept = default;
+
+Result<Client> Client::Connect(const std::string& address, const Credentials& credentials) {
+  auto channel = MakeChannel(address, credentials);
+  if (!channel) return channel.error();
+  if (!WaitForServer(**channel, Patience(kConnectPatience))) return NoServer(address);
+  return Client(std::make_shared<Connection>(address, *std::move(channel)));
+}
+
+Result<Client> Client::Connect(const std::string& address, milliseconds timeout,
+                               const Credentials& credentials) {
+  auto channel = MakeChannel(address, credentials);
+  if (!channel) return channel.error();
+  if (!(*channel)->WaitForConnected(system_clock::now() + timeout)) return NoServer(address);
+  return Client(std::make_shared<Connection>(address, *std::move(channel)));
+}
+
+Result<Arm> Client::GetArm(milliseconds timeout) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + timeout);
+  v1::GetArmResponse response;
+  const grpc::Status status = connection_->stub->GetArm(&context, {}, &response);
+  if (!status.ok()) return FromStatus(status, connection_->address);
+  return FromMessage(response.arm());
+}
+
+Result<void> Client::RestartLink(const std::string& link, milliseconds timeout) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + timeout);
+  v1::RestartLinkRequest request;
+  request.set_link(link);
+  v1::RestartLinkResponse response;
+  const grpc::Status status =
+      v1::OperationsService::NewStub(connection_->channel)->RestartLink(&context, request, &response);
+  if (!status.ok()) return FromStatus(status, connection_->address);
+  return {};
+}
+
+Result<void> Client::SetCamera(const std::string& link, const std::string& camera,
+                               const CameraSettings& settings, milliseconds timeout) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + timeout);
+  v1::SetCameraRequest request;
+  request.set_link(link);
+  request.set_camera(camera);
+  if (settings.automatic_exposure) request.set_automatic(true);
+  if (settings.exposure_s) request.set_exposure_s(*settings.exposure_s);
+  if (settings.gain) request.set_gain(*settings.gain);
+  v1::SetCameraResponse response;
+  const grpc::Status status = connection_->stub->SetCamera(&context, request, &response);
+  return status.ok() ? Result<void>() : FromStatus(status, connection_->address);
+}
+
+Result<void> Client::SetForceModel(const std::string& link, ForceModel model, milliseconds timeout) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + timeout);
+  v1::SetForceModelRequest request;
+  request.set_link(link);
+  request.set_model(ToMessage(model));
+  v1::SetForceModelResponse response;
+  const grpc::Status status = connection_->stub->SetForceModel(&context, request, &response);
+  return status.ok() ? Result<void>() : FromStatus(status, connection_->address);
+}
+
+Result<CalibrationResult> Client::Calibrate(const CalibrateOptions& options,
+                                            const CalibrateProgress& progress, milliseconds timeout) {
+  grpc::ClientContext context;
+  context.set_deadline(system_clock::now() + timeout);
+  const auto reader = connection_->stub->Calibrate(&context, ToMessage(options));
+  v1::CalibrateResponse response;
+  std::optional<CalibrationResult> result;
+  bool cancelled = false;
+  while (reader->Read(&response)) {
+    if (response.has_result()) result = FromMessage(response.result());
+    if (!response.has_progress() || !progress || cancelled) continue;
+    const auto& counts = response.progress();
+    cancelled = !progress(static_cast<int>(counts.pairs_taken()), static_cast<int>(counts.pairs_wanted()));
+    if (cancelled) context.TryCancel();
+  }
+  const grpc::Status status = reader->Finish();
+  if (!status.ok()) return FromStatus(status, connection_->address);
+  if (!result) return Error{ErrorCode::kInternal, "the server ended the calibration without a result"};
+  return *std::move(result);
+}
+
+Result<std::unique_ptr<FrameReader>> Client::StreamFrames(const StreamOptions& options,
+                                                          milliseconds timeout) {
+  using Call = FrameReader::Call;
+  auto call = std::make_unique<Call>(connection_->address, connection_->channel);
+  call->reader = connection_->stub->AsyncStreamFrames(&call->context, ToMessage(options), &call->queue,
+                                                      Call::AsPointer(Call::kStart));
+  // A stream begins with its status.
+  if (const auto accepted = call->ReadFirst(timeout); !accepted) return accepted.error();
+  call->TakeStatus();
+  return std::unique_ptr<FrameReader>(new FrameReader(std::move(call)));
+}
+
+}  // namespace taclink::client

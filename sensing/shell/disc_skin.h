@@ -1,0 +1,124 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "sensing/core/link_model.h"
+#include "sensing/shell/pressed_skin.h"
+
+namespace taclink {
+
+/// A flat round disc that presses along a link's inward normal; the skin slides on it without friction.
+struct SkinDisc {
+  bool on = false;                 ///< otherwise it is not there
+  double angle_rad = 0, z_mm = 0;  ///< where on the link's profile
+  /// Of its face, from the undeformed outer surface; of one with a force: the most.
+  double depth_mm = 0;
+  std::optional<double> force_n;  ///< along its axis, positive; its depth is found
+};
+
+struct SkinLoad {
+  double pressure_mpa = 0;
+  std::vector<SkinDisc> discs;
+};
+
+/// Depth of a disc that is not there.
+inline constexpr double kOffMm = std::numeric_limits<double>::quiet_NaN();
+
+/// A skin in equilibrium with a SkinLoad, or a guess at it.
+struct SkinBalance {
+  ShellState state;
+  std::vector<double> depth_mm;  ///< by disc
+  std::vector<bool> limited;     ///< by disc: its force is not reached at its most depth
+};
+
+/// How a balance changes as the load does, per unit of what the load depends on.
+struct SkinRates {
+  std::vector<Vec3> mids_mm, directors;
+  std::vector<double> depth_mm;
+};
+
+enum class BalanceStop {
+  kConverged,
+  kMaxIterations,
+  kNotFinite,
+  kUnstable,  ///< the state is no minimum of the energy at the discs' depths: the skin would snap
+};
+const char* Name(BalanceStop stop);
+
+struct BalanceSummary {
+  BalanceStop stop = BalanceStop::kConverged;
+  int iterations = 0;
+  int factorizations = 0;
+  double residual_n = 0;  ///< largest entry, N or N mm, at the end
+  bool ok() const { return stop == BalanceStop::kConverged; }
+};
+
+/// A link's skin as the nonlinear shell between pressure, discs and the inner tube. For many states near one
+/// another: Newton's method with a matrix that is kept while it serves, with Broyden's updates
+/// [broyden1965], [kelley2003, chapter 4], and the discs' unknown depths solved along with the skin, which
+/// holds where a force alone would let it snap. No line search: a guess that is too far fails. One thread.
+class DiscSkin {
+ public:
+  DiscSkin(const LinkModel& model, const std::vector<double>& disc_diameters_mm,
+           const PressedSkinOptions& options);
+  ~DiscSkin();
+
+  SkinBalance Rest() const;
+
+  /// From a guess to the equilibrium, which is stable if it was found; `balance` is spoilt if not.
+  BalanceSummary Balance(const SkinLoad& load, SkinBalance& balance);
+
+  /// Of the equilibrium that Balance found last, `span` apart from `before` to `after` it.
+  SkinRates RatesAt(const SkinLoad& before, const SkinLoad& after, double span, const SkinBalance& balance);
+
+  /// By disc, of a balance; the force's entries are zero where there is none.
+  std::vector<RigidContact::Summary> Contacts(const SkinLoad& load, const SkinBalance& balance);
+
+  /// Largest entry of the residual with the discs where the balance has them, N or N mm.
+  double Residual(const SkinLoad& load, const SkinBalance& balance);
+
+  const ShellMesh& mesh() const { return mesh_; }
+  int factorizations() const { return factorizations_; }
+
+ private:
+  struct Factor;
+
+  RigidBody BodyOf(size_t disc, const SkinDisc& place, double depth_mm) const;
+  void Apply(const SkinLoad& load, const SkinBalance& balance);
+  double Misfit(const SkinLoad& load, const SkinBalance& balance);
+  bool Factorize(const ShellState& state);
+  void LearnDepths(const SkinLoad& load, const SkinBalance& balance);
+  Eigen::VectorXd DepthGradient(size_t disc, const SkinDisc& place, double depth_mm, const ShellState& state);
+  void Solve(const Eigen::VectorXd& forces, const Eigen::VectorXd& disc_forces);
+  void Improve();
+  double StepLimit() const;
+  void Advance(const SkinLoad& load, double share, SkinBalance& balance);
+  bool ReleaseLimits(const SkinLoad& load, SkinBalance& balance) const;
+
+  LinkModel model_;
+  PressedSkinOptions options_;
+  ShellMesh mesh_;
+  NonlinearShell shell_;
+  FollowerPressure pressure_;
+  std::unique_ptr<RigidContact> tube_;
+  std::deque<RigidContact> discs_;
+  std::vector<double> radii_mm_;
+  std::vector<const ElementLoad*> loads_;
+  std::unique_ptr<Factor> factor_;
+  int factorizations_ = 0;
+  int learnt_with_ = -1;  // which of them
+  // Of the current iteration.
+  std::vector<size_t> searched_;       // discs whose depth is unknown
+  Eigen::VectorXd gradient_, excess_;  // of their forces over what is asked
+  Eigen::MatrixXd by_depth_, answer_;  // gradient by depth, a column a searched disc; and solved
+  Eigen::MatrixXd stiffness_;          // of the discs against the skin
+  Eigen::VectorXd step_, depth_step_;
+  std::vector<Eigen::VectorXd> taken_;  // steps, with the matrix at hand
+};
+
+}  // namespace taclink

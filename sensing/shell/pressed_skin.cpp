@@ -1,0 +1,201 @@
+#include "sensing/shell/pressed_skin.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+namespace taclink {
+namespace {
+
+constexpr double kTolerance = 1e-7;  // of E t^2
+constexpr double kMostSteps = 1000;  // of one motion; who asks for more has the wrong unit
+
+PressSummary Refused(EquilibriumStop stop) {
+  PressSummary summary;
+  summary.stop = stop;
+  summary.reached = 0;
+  return summary;
+}
+
+EquilibriumOptions SolverOptions(const LinkModel& model) {
+  EquilibriumOptions options;
+  options.tolerance_n =
+      kTolerance * model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm;
+  return options;
+}
+
+RigidContactOptions ContactOptions(const LinkModel& model, const PressedSkinOptions& options, bool sticks) {
+  return {.spacing_mm = options.spacing_mm,
+          .stiffness_n_mm3 = options.stiffness * model.material.youngs_modulus_mpa / model.thickness_mm,
+          .sticks = sticks};
+}
+
+double LongestMotion(const ShellState& from, const ShellState& to) {
+  double longest = 0;
+  for (size_t i = 0; i < from.mids_mm.size(); ++i) {
+    longest = std::max(longest, (to.mids_mm[i] - from.mids_mm[i]).norm());
+  }
+  return longest;
+}
+
+}  // namespace
+
+std::string PressSummary::Text() const {
+  if (ok()) {
+    std::string text = "converged in " + std::to_string(steps) + " steps";
+    char snap[64];
+    std::snprintf(snap, sizeof snap, ", snapped %d time%s, by up to %.2g mm", snaps, snaps == 1 ? "" : "s",
+                  snapped_mm);
+    return snaps > 0 ? text + snap : text;
+  }
+  return "stopped at " + std::to_string(static_cast<int>(100 * reached)) + " % of the way: " + Name(stop);
+}
+
+PressedSkin::PressedSkin(const LinkModel& model, const PressedSkinOptions& options)
+    : model_(model),
+      options_(options),
+      mesh_(MakeShellMesh(model, options.refinement)),
+      markers_(model, mesh_),
+      shell_(SkinSurface(mesh_), model.material),
+      solver_(shell_, SolverOptions(model)),
+      pressure_(0),
+      state_(shell_.Rest()) {
+  if (model.tube_outer_radius_mm > 0) {
+    tube_ = std::make_unique<RigidContact>(shell_, ContactOptions(model, options, false));
+    tube_->SetBody(RigidBar{Vec3::Zero(), Vec3::UnitZ(), model.tube_outer_radius_mm});
+  }
+}
+
+int PressedSkin::AddBody(const RigidBody& body, bool sticks) {
+  bodies_.emplace_back(shell_, ContactOptions(model_, options_, sticks));
+  bodies_.back().SetBody(body);
+  return static_cast<int>(bodies_.size()) - 1;
+}
+
+RigidContact::Summary PressedSkin::TubeContact() const {
+  return tube_ ? tube_->Summarize(state_) : RigidContact::Summary{};
+}
+
+Vec3 PressedSkin::Marker(int marker) const {
+  return markers_.Position(state_.mids_mm, state_.directors, marker);
+}
+
+EquilibriumSummary PressedSkin::Settle(ShellState& state) {
+  std::vector<const ElementLoad*> loads = {&pressure_};
+  if (tube_) loads.push_back(tube_.get());
+  for (const RigidContact& body : bodies_) loads.push_back(&body);
+  return solver_.Solve(loads, {}, state);
+}
+
+ShellState PressedSkin::Extrapolated(const Point& before, const Point& last, double at) {
+  const double share = (at - last.at) / (last.at - before.at);
+  ShellState guess = last.state;
+  for (size_t i = 0; i < guess.mids_mm.size(); ++i) {
+    guess.mids_mm[i] += share * (last.state.mids_mm[i] - before.state.mids_mm[i]);
+    Vec3& d = guess.directors[i];
+    Vec3& t = guess.tangents[i];
+    d = (d + share * (d - before.state.directors[i])).normalized();
+    t = (t - t.dot(d) * d).normalized();
+  }
+  return guess;
+}
+
+// `advance` sets the loads for a share of the way, on all of which a node moves by `usual_mm` or so. Steps
+// grow where they are easy and halve where they fail, or where the skin moves far over states that are not
+// stable.
+template <typename Advance>
+PressSummary PressedSkin::Follow(double longest, double least, double usual_mm, Advance advance) {
+  constexpr int kEasy = 6, kMostSettlings = 4;
+  constexpr double kFar = 1.5, kLittle = 0.01;  // times usual, and of the thickness
+  PressSummary summary;
+  Point last{0, state_};
+  std::optional<Point> before;
+  double step = longest;
+  while (last.at < 1) {
+    const double at = last.at + step > 1 - 1e-9 ? 1 : last.at + step;
+    advance(at);
+    ShellState guess = before ? Extrapolated(*before, last, at) : last.state;
+    std::vector<RigidContact::Grip> grips;
+    for (const RigidContact& body : bodies_) grips.push_back(body.GripNow());
+    EquilibriumSummary settled;
+    int iterations = 0, shifted = 0;
+    for (int settling = 0; settling < kMostSettlings; ++settling) {
+      settled = Settle(guess);
+      iterations += settled.iterations;
+      shifted += settled.shifted;
+      if (!settled.ok()) break;
+      bool let_go = false;
+      for (RigidContact& body : bodies_) let_go = body.Hold(guess) || let_go;
+      if (!let_go) break;
+    }
+    summary.iterations += iterations;
+    summary.shifted += shifted;
+    const double moved_mm = settled.ok() ? LongestMotion(last.state, guess) : 0;
+    const bool snapped =
+        shifted > 0 && moved_mm > kFar * usual_mm * (at - last.at) + kLittle * model_.thickness_mm;
+    if (!settled.ok() || (snapped && step / 2 >= least)) {
+      for (size_t i = 0; i < bodies_.size(); ++i) bodies_[i].Restore(grips[i]);
+      step /= 2;
+      if (step >= least) continue;
+      advance(last.at);
+      summary.stop = settled.stop;
+      summary.residual_n = settled.residual_n;
+      summary.reached = last.at;
+      break;
+    }
+    ++summary.steps;
+    summary.residual_n = settled.residual_n;
+    summary.stable = settled.stable;
+    if (snapped) {
+      ++summary.snaps;
+      summary.snapped_mm = std::max(summary.snapped_mm, moved_mm);
+    }
+    before = snapped ? std::nullopt : std::optional(std::move(last));
+    last = {at, std::move(guess)};
+    if (iterations <= kEasy) step = std::min(longest, 1.5 * step);
+  }
+  state_ = std::move(last.state);
+  return summary;
+}
+
+double PressureScale(const LinkModel& model) {
+  const double radius = model.PointAtDepth(0, model.length_mm / 2, model.thickness_mm / 2).head<2>().norm();
+  return model.material.youngs_modulus_mpa * model.thickness_mm / radius;
+}
+
+PressSummary PressedSkin::Inflate(double pressure_mpa) {
+  if (!std::isfinite(pressure_mpa)) return Refused(EquilibriumStop::kNotFinite);
+  const double from = pressure_mpa_, change = pressure_mpa - from;
+  if (change == 0) return {};
+  const double step = options_.pressure_step * PressureScale(model_);
+  const double radius =
+      model_.PointAtDepth(0, model_.length_mm / 2, model_.thickness_mm / 2).head<2>().norm();
+  if (std::abs(change) > kMostSteps * step) return Refused(EquilibriumStop::kMaxIterations);
+  const double longest = std::min(1.0, step / std::abs(change));
+  // A linear skin's growth: the radius times the pressure over its scale.
+  const double usual_mm = radius * std::abs(change) / PressureScale(model_);
+  return Follow(longest, longest / 256, usual_mm, [&](double at) {
+    pressure_mpa_ = from + at * change;
+    pressure_ = FollowerPressure(pressure_mpa_);
+  });
+}
+
+PressSummary PressedSkin::Move(std::span<const Vec3> by_mm) {
+  double distance = 0;
+  for (const Vec3& by : by_mm) {
+    if (!by.allFinite()) return Refused(EquilibriumStop::kNotFinite);
+    distance = std::max(distance, by.norm());
+  }
+  if (distance == 0) return {};
+  if (distance > kMostSteps * options_.step_mm) return Refused(EquilibriumStop::kMaxIterations);
+  std::vector<RigidBody> from;
+  from.reserve(bodies_.size());
+  for (const RigidContact& body : bodies_) from.push_back(body.body());
+  return Follow(std::min(1.0, options_.step_mm / distance), options_.least_step_mm / distance, distance,
+                [&](double at) {
+                  for (size_t i = 0; i < by_mm.size(); ++i) bodies_[i].SetBody(Moved(from[i], at * by_mm[i]));
+                });
+}
+
+}  // namespace taclink

@@ -1,0 +1,68 @@
+#include "server/arm/arm.h"
+
+#include <utility>
+
+#include "server/arm/link_names.h"
+
+namespace taclink::server {
+
+Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, Clock& clock,
+         const ArmOptions& options, std::unique_ptr<ArmPoses> poses)
+    : name_(std::move(name)),
+      clock_(clock),
+      poses_(std::move(poses)),
+      hub_(links.size(), std::move(encoder)),
+      watchdog_(clock, options.watchdog.interval) {
+  if (!poses_) {
+    std::vector<LinkMount> mounts;
+    for (const LinkParts& parts : links)
+      mounts.push_back({.frame = {}, .frame_from_link = parts.description.base_from_link});
+    poses_ = std::make_unique<ArmPoses>(std::move(mounts));
+  }
+  contacts_ = std::make_unique<ArmContacts>(*poses_);
+  std::vector<WatchedLink> watched;
+  for (LinkParts& parts : links) {
+    const size_t link = links_.size();
+    links_.push_back(std::move(parts.description));
+    watched.push_back({links_.back().name, links_.back().rules, links_.back().model.markers});
+    pressures_.push_back(parts.pressure ? std::move(parts.pressure) : MakeAssumedPressure(std::nullopt));
+    LinkWorkerOptions worker = options.worker;
+    worker.realtime = parts.realtime;
+    worker.pressure = pressures_.back();
+    workers_.push_back(std::make_unique<LinkSupervisor>(
+        link, links_.back().name, std::move(parts.source), std::move(parts.processor),
+        std::move(parts.factories), hub_, clock, worker, options.watchdog));
+  }
+  events_ = std::make_unique<EventEngine>(hub_, std::move(watched), options.events, clock);
+}
+
+std::vector<std::string> Arm::link_names() const {
+  std::vector<std::string> names;
+  for (const LinkDescription& link : links_) names.push_back(link.name);
+  return names;
+}
+
+Result<size_t> Arm::FindLink(const std::string& name) const {
+  return server::FindLink(link_names(), name);
+}
+
+void Arm::Start() {
+  events_->Start();
+  for (const auto& pressure : pressures_) pressure->Start();
+  std::vector<LinkSupervisor*> workers;
+  for (const auto& worker : workers_) {
+    worker->Start();
+    workers.push_back(worker.get());
+  }
+  watchdog_.Start(std::move(workers));
+}
+
+void Arm::Stop() {
+  watchdog_.Stop();
+  for (const auto& worker : workers_) worker->RequestStop();  // all at once, then wait for each
+  for (const auto& worker : workers_) worker->Stop();
+  for (const auto& pressure : pressures_) pressure->Stop();
+  events_->Stop();
+}
+
+}  // namespace taclink::server

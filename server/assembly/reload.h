@@ -1,0 +1,49 @@
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "server/config/config.h"
+
+namespace taclink::server {
+
+/// What of a changed configuration is taken over while the server runs. The rest is named, for it needs a
+/// restart.
+class Reloader {
+ public:
+  using Apply = std::function<Result<void>(const Config& next)>;
+  struct Outcome {
+    std::vector<std::string> applied;        ///< sections that changed and are in use now
+    std::vector<std::string> needs_restart;  ///< sections that changed and are not
+    std::vector<std::string> errors;         ///< what could not be taken over; the old stays in use
+    std::vector<std::string> keys;           ///< that changed since the last reload, see ChangedKeys
+  };
+
+  explicit Reloader(const Config& running);
+
+  /// How a top-level section of the configuration is taken over when it changed.
+  void Add(const std::string& section, Apply apply);
+  /// Called by every reload, for files that may have changed under the same name.
+  void AddAlways(const std::string& what, Apply apply);
+  /// Any thread; the hooks run within.
+  Outcome Reload(const Config& next);
+
+ private:
+  struct Hook {
+    std::string name;
+    Apply apply;
+  };
+
+  std::mutex mutex_;
+  // Guarded by mutex_.
+  std::vector<Hook> sections_, always_;
+  std::string running_;  // text of the configuration in use; where a section was not taken over, the old one
+  std::string last_;     // text of the last one that was read
+};
+
+/// Top-level sections of a printed configuration: name and text, in their order.
+std::vector<std::pair<std::string, std::string>> Sections(const std::string& config_text);
+
+}  // namespace taclink::server

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "sensing/core/clock.h"
+#include "sensing/core/link_state.h"
+#include "server/hub/hub.h"
+#include "server/hub/state_pool.h"
+#include "server/link/link_histograms.h"
+#include "server/link/link_statistics.h"
+
+namespace taclink::server {
+
+/// Clears all of `state` and sets its status and the reason; its buffers stay.
+void ResetTo(LinkState& state, LinkStatus status, std::string reason, std::optional<ReasonId> id = {});
+
+/// Where a link's states leave. It outlasts the workers that the link has one after the other: only the
+/// newest may publish, so that one that was given up can do no harm when it comes back. Also the hub may go
+/// before it.
+class LinkOutlet {
+ public:
+  LinkOutlet(size_t link, Hub& hub, Clock& clock) : link_(link), clock_(clock), hub_(&hub) {}
+
+  /// A new worker: from now on its states are taken and no other's.
+  uint64_t NewLife() { return ++life_; }
+  bool IsCurrent(uint64_t life) const { return life_ == life; }
+  /// Nothing leaves any more; the hub is not touched afterwards.
+  void Close();
+
+  /// Stamps and publishes what worker `life` made of a frame, and counts it. Where somebody wants the
+  /// pictures too, those of `frame` are taken and old buffers left in their place, with a copy of `labels`
+  /// (null: none). False: refused, for there is a newer worker.
+  bool PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, StereoFrame& frame,
+                    const LabelledMarkers* labels = nullptr);
+  /// The same for a mere report of the worker's, which bears the last frame's number.
+  bool PublishReport(uint64_t life, std::unique_ptr<LinkState> state);
+  /// In place of the worker. False: the worker is publishing at this moment.
+  bool PublishLost(const Reason& reason);
+
+  /// While somebody else reports the link's trouble its worker sends no mere reports.
+  void SetTrouble(bool trouble) { trouble_ = trouble; }
+  bool trouble() const { return trouble_; }
+
+  int64_t last_published_ns() const { return last_published_ns_; }  ///< monotonic; 0: nothing yet
+  std::unique_ptr<LinkState> Acquire() { return pool_.Acquire(); }
+  LinkStatistics Statistics() const { return statistics_.Snapshot(clock_.MonotonicNs()); }
+  const LinkHistograms& histograms() const { return histograms_; }
+
+ private:
+  void Send(std::unique_ptr<LinkState> state, const PicturesPtr& pictures = nullptr);  // with the lock held
+
+  // Constant after construction.
+  const size_t link_;
+  Clock& clock_;
+
+  StatePool pool_;
+  SharedPool<FramePictures> picture_pool_;
+  LinkStatisticsCollector statistics_;
+  LinkHistograms histograms_;
+  std::atomic<uint64_t> life_ = 0;
+  std::atomic<bool> trouble_ = false;
+  std::atomic<int64_t> last_published_ns_ = 0;
+
+  std::mutex mutex_;
+  // Guarded by mutex_.
+  Hub* hub_;  // null: closed
+  uint64_t last_sequence_ = 0;
+};
+
+}  // namespace taclink::server

@@ -1,0 +1,96 @@
+#include "server/rpc/streams/calibrate_stream.h"
+
+#include <utility>
+
+#include "server/rpc/requests/status.h"
+#include "wire/units.h"
+
+namespace taclink::server {
+namespace {
+
+void Fill(const CalibrationProgress& progress, v1::CalibrateResponse& out) {
+  if (!progress.end) {
+    out.mutable_progress()->set_pairs_taken(static_cast<uint32_t>(progress.taken));
+    out.mutable_progress()->set_pairs_wanted(static_cast<uint32_t>(progress.wanted));
+    return;
+  }
+  const CalibrationResult& result = **progress.end;
+  v1::CalibrationResult& message = *out.mutable_result();
+  message.set_markers_used(static_cast<uint32_t>(result.markers_used));
+  message.set_rms_px(result.rms_px);
+  message.set_rmse_r_m(result.rmse_r_mm * wire::kMetresPerMm);
+  message.set_rmse_tangential_m(result.rmse_tangential_mm * wire::kMetresPerMm);
+  message.set_rmse_z_m(result.rmse_z_mm * wire::kMetresPerMm);
+  message.set_file_text(result.file_text);
+  message.set_saved_to(result.saved_to);
+}
+
+}  // namespace
+
+std::shared_ptr<CalibrateStream> CalibrateStream::Make() {
+  std::shared_ptr<CalibrateStream> stream(new CalibrateStream);
+  stream->self_ = stream;
+  return stream;
+}
+
+void CalibrateStream::End(const Error& error) {
+  Tell({.end = error});
+}
+
+bool CalibrateStream::Tell(const CalibrationProgress& progress) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (cancelled_ || finished_) return false;
+    if (waiting_ && waiting_->end) return false;  // the server ends the call: nothing may take that back
+    waiting_ = progress;
+  }
+  Pump();
+  return true;
+}
+
+void CalibrateStream::OnWriteDone(bool ok) {
+  {
+    const std::lock_guard lock(mutex_);
+    writing_ = false;
+    cancelled_ = cancelled_ || !ok;
+  }
+  Pump();
+}
+
+void CalibrateStream::OnCancel() {
+  {
+    const std::lock_guard lock(mutex_);
+    cancelled_ = true;
+  }
+  Pump();
+}
+
+void CalibrateStream::OnDone() {
+  const auto last = [this] {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(self_, nullptr);
+  }();
+}
+
+void CalibrateStream::Pump() {
+  std::optional<CalibrationProgress> next;
+  bool cancelled = false;
+  {
+    const std::lock_guard lock(mutex_);
+    if (writing_ || finished_) return;
+    cancelled = cancelled_;
+    if (!cancelled && !waiting_) return;
+    next = std::exchange(waiting_, std::nullopt);
+    finished_ = cancelled || next->end;
+    writing_ = !finished_;
+  }
+  // Outside the lock: writing_ or finished_ now keep every other thread from coming here.
+  if (cancelled) return Finish(grpc::Status::CANCELLED);
+  if (next->end && !*next->end) return Finish(ToGrpc(next->end->error()));
+  message_.Clear();
+  Fill(*next, message_);
+  if (next->end) return StartWriteAndFinish(&message_, grpc::WriteOptions(), grpc::Status::OK);
+  StartWrite(&message_);
+}
+
+}  // namespace taclink::server

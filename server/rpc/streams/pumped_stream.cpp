@@ -1,0 +1,99 @@
+#include "server/rpc/streams/pumped_stream.h"
+
+#include <boost/asio/post.hpp>
+#include <utility>
+
+#include "server/rpc/streams/stream_registry.h"
+
+namespace taclink::server {
+
+PumpedStream::PumpedStream(StreamRegistry& registry, std::shared_ptr<boost::asio::thread_pool> senders)
+    : registry_(registry), senders_(std::move(senders)) {}
+
+void PumpedStream::Open() {
+  {
+    const std::lock_guard lock(mutex_);
+    open_ = true;
+  }
+  Pump();
+}
+
+std::function<void()> PumpedStream::Notifier() {
+  return [weak = weak_from_this(), senders = senders_] {
+    boost::asio::post(*senders, [weak] {
+      if (const auto stream = weak.lock()) stream->Pump();
+    });
+  };
+}
+
+void PumpedStream::End(const std::string& reason) {
+  {
+    const std::lock_guard lock(mutex_);
+    end_reason_ = reason;
+  }
+  Pump();
+}
+
+void PumpedStream::OnWriteDone(bool ok) {
+  {
+    const std::lock_guard lock(mutex_);
+    writing_ = false;
+    cancelled_ = cancelled_ || !ok;
+  }
+  Pump();
+}
+
+void PumpedStream::OnCancel() {
+  {
+    const std::lock_guard lock(mutex_);
+    cancelled_ = true;
+  }
+  Pump();
+}
+
+void PumpedStream::OnDone() {
+  registry_.Remove(shared_from_this());
+}
+
+void PumpedStream::Pump() {
+  Step step;
+  grpc::Status status;
+  {
+    const std::lock_guard lock(mutex_);
+    step = Decide();
+    // Also where the server gave up on a client that does not read: it may still get to see the reason.
+    status = end_reason_.empty() ? end_.value_or(grpc::Status::CANCELLED)
+                                 : grpc::Status(grpc::StatusCode::UNAVAILABLE, end_reason_);
+  }
+  // Outside the lock: writing_ or finished_ now keep every other thread from coming here.
+  switch (step) {
+    case Step::kNothing:
+      break;
+    case Step::kWrite:
+      StartWrite(&message_);
+      break;
+    case Step::kWriteLast:
+      StartWriteAndFinish(&message_, grpc::WriteOptions(), status);
+      break;
+    case Step::kFinish:
+      Finish(status);
+      break;
+  }
+}
+
+PumpedStream::Step PumpedStream::Decide() {
+  if (writing_ || finished_ || !open_) return Step::kNothing;
+  if (cancelled_) {
+    finished_ = true;
+    return Step::kFinish;
+  }
+  finished_ = !end_reason_.empty();
+  auto message = finished_ ? Last(end_reason_) : Next();
+  if (!message && end_) finished_ = true;
+  if (!message) return finished_ ? Step::kFinish : Step::kNothing;
+  message_ = std::move(*message);
+  writing_ = !finished_;
+  return finished_ ? Step::kWriteLast : Step::kWrite;
+}
+
+}  // namespace taclink::server

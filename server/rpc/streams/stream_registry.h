@@ -1,0 +1,53 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "sensing/core/result.h"
+#include "server/hub/byte_budget.h"
+#include "server/rpc/streams/pumped_stream.h"
+#include "server/security/shares.h"
+
+namespace taclink::server {
+
+struct StreamLimits {
+  ShareLimits streams = {};
+  size_t queue_bytes_per_party = 0;
+};
+
+/// All streams of a server; bounds their number, of all and of each party, and the memory of each party's
+/// queues. Holds each stream until gRPC is done with it.
+class StreamRegistry {
+ public:
+  explicit StreamRegistry(const StreamLimits& limits);
+
+  /// Errors: kResourceExhausted (which limit, and what to do), kUnavailable (closed).
+  Result<void> Admit(std::shared_ptr<PumpedStream> stream, const Party& party);
+  void Remove(const std::shared_ptr<PumpedStream>& stream);
+  /// Ends all and takes no more.
+  void Close(const std::string& reason);
+
+  /// Streams that are open stay so.
+  void SetLimits(const StreamLimits& limits);
+
+  size_t streams() const;
+  /// Waits until gRPC is done with all of them, for `patience` at most.
+  void WaitUntilEmpty(std::chrono::milliseconds patience) const;
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::condition_variable empty_;
+  // Guarded by mutex_.
+  Shares shares_;
+  size_t queue_bytes_per_party_;
+  std::map<std::shared_ptr<PumpedStream>, Party> streams_;
+  std::map<std::string, std::shared_ptr<ByteBudget>> queue_bytes_;  // by party that has streams
+  bool closed_ = false;
+};
+
+}  // namespace taclink::server
