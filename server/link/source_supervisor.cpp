@@ -46,7 +46,8 @@ bool SourceSupervisor::Next(StereoFrame& frame, milliseconds timeout) {
 }
 
 void SourceSupervisor::Wait(int64_t until_ns, milliseconds timeout) {
-  clock_.SleepUntilMonotonicNs(std::min(until_ns, clock_.MonotonicNs() + std::chrono::nanoseconds(timeout).count()));
+  clock_.SleepUntilMonotonicNs(
+      std::min(until_ns, clock_.MonotonicNs() + std::chrono::nanoseconds(timeout).count()));
 }
 
 void SourceSupervisor::TryStart() {
@@ -122,7 +123,8 @@ void SourceSupervisor::Failed(const Error& error) {
 
 int64_t SourceSupervisor::FramesOr(milliseconds least, double frames) const {
   const double rate_hz = condition().info.frame_rate_hz;
-  return std::max(std::chrono::nanoseconds(least).count(), rate_hz > 0 ? static_cast<int64_t>(frames * 1e9 / rate_hz) : 0);
+  return std::max(std::chrono::nanoseconds(least).count(),
+                  rate_hz > 0 ? static_cast<int64_t>(frames * 1e9 / rate_hz) : 0);
 }
 
 void SourceSupervisor::SetCondition(SourceCondition::State state, std::string reason) {

@@ -60,7 +60,8 @@ void CheckCall(void* state, grpc_auth_context* connection, const grpc_metadata* 
     if (key == ":path") path = View(metadata[i].value);
     if (key == "authorization") authorization = View(metadata[i].value);
   }
-  const auto caller = static_cast<Guard*>(state)->security->Check(path, authorization, ConnectionPlace(connection));
+  const auto caller =
+      static_cast<Guard*>(state)->security->Check(path, authorization, ConnectionPlace(connection));
   const grpc::Status status = caller ? grpc::Status::OK : ToGrpc(caller.error());
   done(user_data, nullptr, 0, nullptr, 0, static_cast<grpc_status_code>(status.error_code()),
        status.error_message().c_str());

@@ -71,7 +71,8 @@ TEST_F(VisionBenchTest, ASceneWithoutItsModelIsRefused) {
 TEST(TruthRefinement, IsFinerThanAnyEstimate) {
   for (const char* name : {"cylinder", "barrel"}) {
     const LinkModel model = LoadLinkModel(name).value();
-    EXPECT_GT(MakeShellMesh(model, kVisionTruthRefinement).refinement, MakeShellMesh(model, 2).refinement) << name;
+    EXPECT_GT(MakeShellMesh(model, kVisionTruthRefinement).refinement, MakeShellMesh(model, 2).refinement)
+        << name;
   }
 }
 

@@ -60,9 +60,10 @@ class ClientPackageTest : public ScratchFolder {
 
 TEST_F(ClientPackageTest, IsFoundByCMake) {
   const std::string build = Path("build");
-  const Finished built = Shell(std::string(CMAKE) + " -G Ninja -S '" TACLINK_SOURCE "/client/cpp/example' -B '" +
-                               build + "' -DCMAKE_PREFIX_PATH='" + prefix_ + "' -DCMAKE_CXX_COMPILER=" CXX +
-                               " && " CMAKE " --build '" + build + "'");
+  const Finished built =
+      Shell(std::string(CMAKE) + " -G Ninja -S '" TACLINK_SOURCE "/client/cpp/example' -B '" + build +
+            "' -DCMAKE_PREFIX_PATH='" + prefix_ + "' -DCMAKE_CXX_COMPILER=" CXX + " && " CMAKE " --build '" +
+            build + "'");
   ASSERT_EQ(built.exit_code, 0) << built.out << built.err;
   ExpectWorks(build + "/touch_monitor");
 }

@@ -76,7 +76,6 @@ from taclink.messages.recording import (
 from taclink.names import (
     AcquireReason,
     BaselineOrigin,
-    Compression,
     Detail,
     DriftState,
     EventKind,
@@ -84,6 +83,7 @@ from taclink.names import (
     ForceModel,
     JointKind,
     LinkStatus,
+    LogCompression,
     LossReason,
     MarkerSource,
     PoseValidity,
@@ -104,6 +104,8 @@ from taclink.streams import (
     PreviewStream,
     Replay,
 )
+
+Compression = LogCompression  # deprecated: use LogCompression
 
 __all__ = [
     "AcquireReason",
@@ -156,6 +158,7 @@ __all__ = [
     "Log",
     "LogAttachment",
     "LogChannel",
+    "LogCompression",
     "LogDescription",
     "LossReason",
     "MarkerRange",

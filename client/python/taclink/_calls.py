@@ -20,7 +20,7 @@ from taclink.messages.recording import (
     logs_from,
     recorder_from,
 )
-from taclink.names import Compression, ForceModel, number_of
+from taclink.names import ForceModel, LogCompression, number_of
 from taclink.v1 import events_pb2, operations_pb2, recording_pb2, tactile_pb2, tare_pb2
 
 T = TypeVar("T")
@@ -111,7 +111,7 @@ def start_recording(
         name=name,
         links=names(links),
         pictures=pictures,
-        compression=number_of(Compression, compression, "compression"),
+        compression=number_of(LogCompression, compression, "compression"),
         note=note,
     )
     return Call("recording", "StartRecording", request, _status_of, chosen_s(timeout, SLOW_S))
