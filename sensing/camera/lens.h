@@ -40,7 +40,6 @@ class Lens {
   LensParameters RadiusByParameters(double theta_rad, double radius_px) const;
 
   double max_theta_rad() const { return max_theta_rad_; }
-  double max_radius_px() const { return max_radius_px_; }
 
  private:
   // Division model: tan(theta) = r / Depth(r). Solved by guarded Newton steps [press2007, section 9.4].

@@ -22,12 +22,6 @@ LinkWorker::LinkWorker(std::string name, std::unique_ptr<FrameSource> source,
       supervisor_(name_, std::move(source), clock, options_.supervisor, &capture_mark_),
       processor_(std::move(processor)) {}
 
-LinkWorker::LinkWorker(size_t link, std::string name, std::unique_ptr<FrameSource> source,
-                       std::unique_ptr<LinkProcessor> processor, Hub& hub, Clock& clock,
-                       LinkWorkerOptions options)
-    : LinkWorker(std::move(name), std::move(source), std::move(processor),
-                 std::make_shared<LinkOutlet>(link, hub, clock), clock, std::move(options)) {}
-
 LinkWorker::~LinkWorker() {
   Stop();
 }

@@ -55,9 +55,6 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
  public:
   LinkWorker(std::string name, std::unique_ptr<FrameSource> source, std::unique_ptr<LinkProcessor> processor,
              std::shared_ptr<LinkOutlet> outlet, Clock& clock, LinkWorkerOptions options = {});
-  LinkWorker(size_t link, std::string name, std::unique_ptr<FrameSource> source,
-             std::unique_ptr<LinkProcessor> processor, Hub& hub, Clock& clock,
-             LinkWorkerOptions options = {});
   ~LinkWorker();
 
   void Start();

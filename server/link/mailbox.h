@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <condition_variable>
-#include <cstdint>
 #include <mutex>
 #include <utility>
 
@@ -18,7 +17,6 @@ class Mailbox {
     {
       const std::lock_guard lock(mutex_);
       std::swap(value, place_);
-      overwritten_ += full_ ? 1 : 0;
       full_ = true;
     }
     filled_.notify_one();
@@ -42,19 +40,12 @@ class Mailbox {
     return true;
   }
 
-  /// Values that were replaced before anyone took them.
-  uint64_t overwritten() const {
-    const std::lock_guard lock(mutex_);
-    return overwritten_;
-  }
-
  private:
-  mutable std::mutex mutex_;
+  std::mutex mutex_;
   std::condition_variable filled_, taken_;
   // Guarded by mutex_.
   T place_{};
   bool full_ = false;
-  uint64_t overwritten_ = 0;
 };
 
 }  // namespace taclink::server

@@ -1,7 +1,7 @@
 import { create } from "@bufbuild/protobuf";
 import { describe, expect, test } from "vitest";
 import { Supervision } from "../src/api/gen/taclink/v1/arm_pb";
-import { EventKind, EventSchema, ForceLevel } from "../src/api/gen/taclink/v1/events_pb";
+import { EventKind, EventKindSchema, EventSchema, ForceLevel } from "../src/api/gen/taclink/v1/events_pb";
 import { LinkStatus } from "../src/api/gen/taclink/v1/frame_pb";
 import { LogSchema } from "../src/api/gen/taclink/v1/recording_pb";
 import { formatAddress, parseAddress } from "../src/model/address";
@@ -69,6 +69,16 @@ describe("events", () => {
       detail: { case: "operation", value: { who: "otto", accepted: false, outcome: "the skin is touched" } },
     });
     expect(eventText(event)).toBe("tare refused by otto: the skin is touched");
+  });
+  test("every kind of operation has its name", () => {
+    for (const { number } of EventKindSchema.values.slice(1)) {
+      const event = create(EventSchema, {
+        kind: number,
+        detail: { case: "operation", value: { who: "otto" } },
+      });
+      expect(eventText(event)).toMatch(/^[a-z ]+ refused by otto$/);
+      expect(eventText(event)).not.toMatch(/unknown|unspecified/);
+    }
   });
   test("the end of a contact tells its peak", () => {
     const event = create(EventSchema, {

@@ -12,8 +12,4 @@ inline void Fill(int64_t utc_ns, google::protobuf::Timestamp& out) {
   out.set_nanos(static_cast<int32_t>(utc_ns % 1'000'000'000));
 }
 
-inline int64_t FromTimestamp(const google::protobuf::Timestamp& time) {
-  return time.seconds() * 1'000'000'000 + time.nanos();
-}
-
 }  // namespace taclink::wire::log

@@ -16,15 +16,4 @@ Result<std::vector<MarkerObservation>> LabelRestPicture(const LinkModel& model, 
   return seen;
 }
 
-Result<LabelledMarkers> LabelRestPair(const LinkModel& model,
-                                      std::array<Detections, kCameraCount> detections) {
-  LabelledMarkers labelled;
-  for (const CameraId id : kBothCameras) {
-    auto seen = LabelRestPicture(model, id, detections[Index(id)]);
-    if (!seen) return seen.error();
-    labelled.cameras[Index(id)] = *std::move(seen);
-  }
-  return labelled;
-}
-
 }  // namespace taclink

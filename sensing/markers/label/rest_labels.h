@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -16,9 +15,5 @@ namespace taclink {
 /// kInvalidArgument, with what does not fit. For calibration, not for every frame: it allocates.
 Result<std::vector<MarkerObservation>> LabelRestPicture(const LinkModel& model, CameraId id,
                                                         Detections& detections, const cv::Mat& gray = {});
-
-/// The same for both pictures; fails if either does, and names the camera.
-Result<LabelledMarkers> LabelRestPair(const LinkModel& model,
-                                      std::array<Detections, kCameraCount> detections);
 
 }  // namespace taclink

@@ -11,6 +11,7 @@
 #include "sensing/model/model_file.h"
 #include "tests/support/paths.h"
 #include "tests/support/read_jpeg.h"
+#include "tests/support/rest_pair.h"
 #include "tests/support/synthetic_markers.h"
 #include "tests/support/temporary_folder.h"
 

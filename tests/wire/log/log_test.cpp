@@ -88,7 +88,7 @@ TEST(Pictures, AreFoxglovesMessages) {
   EXPECT_EQ(raw.step(), 8u);
   EXPECT_EQ(raw.data().size(), 24u);
   EXPECT_EQ(raw.frame_id(), "link/a/top");
-  EXPECT_EQ(FromTimestamp(raw.timestamp()), kUtcNs);
+  EXPECT_EQ(raw.timestamp().seconds() * 1'000'000'000 + raw.timestamp().nanos(), kUtcNs);
   foxglove::CompressedImage jpeg;
   ASSERT_TRUE(jpeg.ParseFromString(*EncodePicture(Picture(PixelFormat::kMjpeg), "link/a/top", kUtcNs).bytes));
   EXPECT_EQ(jpeg.format(), "jpeg");

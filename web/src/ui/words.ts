@@ -1,8 +1,15 @@
+import type { DescEnum } from "@bufbuild/protobuf";
 import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
-import { EventKind, ForceLevel, type Event } from "../api/gen/taclink/v1/events_pb";
+import { EventKind, EventKindSchema, ForceLevel, type Event } from "../api/gen/taclink/v1/events_pb";
 import { ForceModel, LinkStatus, type LinkFrame } from "../api/gen/taclink/v1/frame_pb";
 import { lengthOf } from "../model/vectors";
 import { newtons } from "./format";
+
+/** The name of a value as the protocol has it: "force model" of EVENT_KIND_FORCE_MODEL. */
+export function nameOf(schema: DescEnum, value: number): string {
+  const name = value === 0 ? undefined : schema.value[value]?.localName;
+  return name?.toLowerCase().replaceAll("_", " ") ?? "unknown";
+}
 
 export const STATUS_WORDS: Record<LinkStatus, string> = {
   [LinkStatus.UNSPECIFIED]: "unknown",
@@ -84,23 +91,14 @@ export function eventText(event: Event): string {
     case "linkStatus":
       return `${STATUS_WORDS[detail.value.status]}${detail.value.reason ? `: ${detail.value.reason}` : ""}`;
     case "operation": {
-      const what = OPERATIONS[event.kind] ?? "operation";
       const end = detail.value.accepted ? "done" : "refused";
-      return `${what} ${end} by ${detail.value.who}${detail.value.outcome ? `: ${detail.value.outcome}` : ""}`;
+      return `${nameOf(EventKindSchema, event.kind)} ${end} by ${detail.value.who}${detail.value.outcome ? `: ${detail.value.outcome}` : ""}`;
     }
     case "drift":
       return `baseline has followed the skin by ${(detail.value.driftM * 1e3).toFixed(2)} mm`;
     case "framesLost":
       return `${detail.value.frames} frames without events: the server was too busy`;
     default:
-      return EventKind[event.kind] ?? "event";
+      return nameOf(EventKindSchema, event.kind);
   }
 }
-
-const OPERATIONS: Partial<Record<EventKind, string>> = {
-  [EventKind.TARE]: "tare",
-  [EventKind.CALIBRATION]: "calibration",
-  [EventKind.BASELINE]: "baseline",
-  [EventKind.THRESHOLDS]: "thresholds",
-  [EventKind.RECORDING]: "recording",
-};

@@ -3,7 +3,7 @@ import type { JSX } from "preact";
 import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
 import type { Camera } from "../api/gen/taclink/v1/camera_pb";
 import type { ForceLevelState } from "../api/gen/taclink/v1/events_pb";
-import { ForceModel } from "../api/gen/taclink/v1/frame_pb";
+import { ForceModel, ForceModelSchema } from "../api/gen/taclink/v1/frame_pb";
 import type { CalibrationResult } from "../api/gen/taclink/v1/tactile_pb";
 import type { LinkTare } from "../api/gen/taclink/v1/tare_pb";
 import { messageOf } from "../api/session";
@@ -12,6 +12,12 @@ import { Dialog } from "../ui/dialog";
 import { duration, fixed } from "../ui/format";
 import { OperatorButton } from "../ui/operator_button";
 import { MODEL_WORDS } from "../ui/words";
+
+/** All that can be chosen, the most exact ones first. */
+const MODELS = ForceModelSchema.values
+  .slice(1)
+  .reverse()
+  .map(({ number }) => number as ForceModel);
 
 /** What can be done to a link. */
 export function SettingsView({ link }: { link: Link }) {
@@ -186,13 +192,7 @@ function Model({ link }: { link: Link }) {
             value={chosen.value ?? now}
             onChange={(event) => (chosen.value = Number(event.currentTarget.value) as ForceModel)}
           >
-            {[
-              ForceModel.AUTO,
-              ForceModel.NONLINEAR,
-              ForceModel.PRESSURISED,
-              ForceModel.LINEAR,
-              ForceModel.LITERAL,
-            ].map((model) => (
+            {MODELS.map((model) => (
               <option value={model}>{MODEL_WORDS[model]}</option>
             ))}
           </select>

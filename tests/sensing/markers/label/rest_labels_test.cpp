@@ -10,6 +10,7 @@
 #include "tests/support/drawn_vector.h"
 #include "tests/support/paths.h"
 #include "tests/support/read_jpeg.h"
+#include "tests/support/rest_pair.h"
 #include "tests/support/synthetic_markers.h"
 
 namespace taclink {
