@@ -85,8 +85,8 @@ folder(client/cpp/example client/cpp/taclink)
 folder(client/command/cli sensing/core mcap)
 folder(client/command/live sensing/core sensing/model sensing/capture sensing/simulation client/cpp/taclink client/command/cli)
 folder(client/command/offline sensing/core sensing/model sensing/camera sensing/capture sensing/markers/detect
-       sensing/markers/label sensing/shell sensing/identification sensing/pipeline sensing/simulation client/command/cli
-       client/command/live)
+       sensing/markers/label sensing/shell sensing/identification sensing/pipeline sensing/simulation client/cpp/taclink
+       client/command/cli client/command/live)
 folder(client/command/logs sensing/core sensing/model sensing/camera sensing/capture sensing/contact sensing/pipeline mcap wire
        wire/log client/command/cli)
 folder(bench/tools sensing/core)

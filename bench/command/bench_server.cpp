@@ -18,7 +18,7 @@
 namespace taclink::command {
 namespace {
 
-using client::Detail;
+constexpr v1::Detail kDetails[] = {v1::DETAIL_CONTACTS, v1::DETAIL_GEOMETRY, v1::DETAIL_FULL};
 
 struct BenchServerOptions {
   bool quick = false;
@@ -47,21 +47,9 @@ std::vector<Series> AllSeries(bool quick) {
     all[1].loads.push_back({.links = links});
   for (const int clients : quick ? std::vector<int>{1, 8} : std::vector<int>{1, 2, 4, 8, 16, 32, 64})
     all[2].loads.push_back({.links = 6, .clients = clients});
-  for (const Detail detail : {Detail::kContacts, Detail::kGeometry, Detail::kFull})
+  for (const v1::Detail detail : kDetails)
     all[3].loads.push_back({.links = 6, .clients = quick ? 8 : 32, .detail = detail});
   return all;
-}
-
-const char* Word(Detail detail) {
-  switch (detail) {
-    case Detail::kContacts:
-      return "contacts";
-    case Detail::kGeometry:
-      return "geometry";
-    case Detail::kFull:
-      break;
-  }
-  return "full";
 }
 
 std::string Number(const char* format, double value) {
@@ -85,7 +73,7 @@ ReportTable Table(const std::string& title, const std::vector<LoadResult>& resul
     const double rate = static_cast<double>(r.received) / r.seconds;
     table.rows.push_back(
         {std::to_string(r.load.links), Number("%g", r.load.rate_hz), std::to_string(r.load.clients),
-         Word(r.load.detail), Number("%.0f", rate), Number("%.1f %%", 100 * rate / Asked(r.load)),
+         client::Name(r.load.detail), Number("%.0f", rate), Number("%.1f %%", 100 * rate / Asked(r.load)),
          std::to_string(r.skipped), std::to_string(r.dropped), Number("%.1f", r.exposure_p50_ms),
          Number("%.1f", r.exposure_p99_ms), Number("%.1f", r.memory_p50_ms), Number("%.1f", r.memory_p99_ms),
          Number("%.1f", r.stages_p99_ms), Number("%.1f", r.beside_p99_ms), Number("%.2f", r.server_cores),
@@ -98,7 +86,7 @@ Json LoadJson(const LoadResult& r) {
   return {{"links", r.load.links},
           {"rate_hz", r.load.rate_hz},
           {"clients", r.load.clients},
-          {"detail", Word(r.load.detail)},
+          {"detail", client::Name(r.load.detail)},
           {"seconds", r.seconds},
           {"received", r.received},
           {"skipped", r.skipped},
@@ -143,9 +131,7 @@ std::string Settings(const BenchServerOptions& options) {
 std::vector<Series> ChooseSeries(const BenchServerOptions& options) {
   if (options.one.links == 0) return AllSeries(options.quick);
   ServerLoad load = options.one;
-  for (const Detail detail : {Detail::kContacts, Detail::kGeometry, Detail::kFull}) {
-    if (options.detail == Word(detail)) load.detail = detail;
-  }
+  load.detail = *client::ValueOf<v1::Detail>(options.detail);
   return {{"One load", "", {load}}};
 }
 
@@ -205,7 +191,7 @@ void AddBenchServer(const Arguments& bench, Selected& selected) {
       .Needs(links)
       .ShowDefault();
   server.AddOption("--detail", options->detail, "Of the one load: contacts, geometry or full")
-      .Must(OneOf({"contacts", "geometry", "full"}))
+      .Must(OneOf(client::Names<v1::Detail>()))
       .Needs(links)
       .ShowDefault();
   server.AddOption("--taclinkd", options->taclinkd, "The server's program (the one beside this)");

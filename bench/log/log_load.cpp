@@ -288,7 +288,9 @@ Result<std::vector<RecordResult>> MeasureRecording(const LoadPictures& pictures,
     const auto skipped = FramesSkipped(*connection);
     const double cpu_s = (*server)->Usage().cpu_s;
     const auto begin = steady_clock::now();
-    if (const auto started = recordings.Start({.pictures = with_pictures}); !started) return started.error();
+    v1::StartRecordingRequest request;
+    request.set_pictures(with_pictures);
+    if (const auto started = recordings.Start(request); !started) return started.error();
     pause();
     const auto status = recordings.Stop();
     if (!status) return status.error();
@@ -296,11 +298,11 @@ Result<std::vector<RecordResult>> MeasureRecording(const LoadPictures& pictures,
     result.server_cores = ((*server)->Usage().cpu_s - cpu_s) / result.seconds;
     const auto skipped_after = FramesSkipped(*connection);
     if (!skipped || !skipped_after) return skipped ? skipped_after.error() : skipped.error();
-    result.frames = status->frames;
-    result.lost = status->frames_lost;
+    result.frames = status->frames();
+    result.lost = status->frames_lost();
     result.skipped = *skipped_after - *skipped;
-    result.mb_s = static_cast<double>(status->bytes) * 1e-6 / result.seconds;
-    if (const auto removed = recordings.Delete(status->log); !removed) return removed.error();
+    result.mb_s = static_cast<double>(status->bytes()) * 1e-6 / result.seconds;
+    if (const auto removed = recordings.Delete(status->log()); !removed) return removed.error();
     results.push_back(result);
   }
   return results;

@@ -51,10 +51,13 @@ int64_t MonotonicNs() {
 /// One client with a connection and a thread of its own.
 class LoadClient {
  public:
-  static Result<std::unique_ptr<LoadClient>> Start(const std::string& address, client::Detail detail) {
+  static Result<std::unique_ptr<LoadClient>> Start(const std::string& address, v1::Detail detail) {
     auto connection = client::Client::Connect(address, client::Patience(std::chrono::seconds(10)));
     if (!connection) return connection.error();
-    auto reader = connection->StreamFrames({.detail = detail, .delivery = client::Delivery::kEvery});
+    v1::StreamFramesRequest request;
+    request.set_detail(detail);
+    request.set_delivery(v1::DELIVERY_EVERY);
+    auto reader = connection->StreamFrames(request);
     if (!reader) return reader.error();
     return std::unique_ptr<LoadClient>(new LoadClient(std::move(*connection), std::move(*reader)));
   }
@@ -91,21 +94,21 @@ class LoadClient {
       const auto frame = reader_->Next(kPoll);
       const int64_t now_ns = MonotonicNs();
       uint64_t dropped = 0;
-      for (const auto& link : reader_->counts()) dropped += link.frames_dropped;
+      for (const auto& link : reader_->status().links()) dropped += link.frames_dropped();
       dropped_ = dropped;
       if (!frame && frame.error().code == ErrorCode::kTimeout) continue;
       if (!frame) {
         if (frame.error().code != ErrorCode::kEndOfData) error_ = frame.error();
         return;
       }
-      if (!measuring_ || frame->times.exposure_ns == 0) continue;
+      if (!measuring_ || frame->times().exposure_ns() == 0) continue;
       exposure_ms_.push_back(
-          static_cast<float>(static_cast<double>(now_ns - frame->times.exposure_ns) * 1e-6));
-      memory_ms_.push_back(static_cast<float>(static_cast<double>(now_ns - frame->times.received_ns) * 1e-6));
-      const client::StageTimes& stages = frame->stage_times;
+          static_cast<float>(static_cast<double>(now_ns - frame->times().exposure_ns()) * 1e-6));
+      memory_ms_.push_back(
+          static_cast<float>(static_cast<double>(now_ns - frame->times().received_ns()) * 1e-6));
+      const v1::StageTimes& stages = frame->stage_times();
       stages_ms_.push_back(static_cast<float>(
-          (stages.decode_s + stages.detect_s + stages.register_s + stages.reconstruct_s + stages.force_s) *
-          1e3));
+          (stages.decode_s() + stages.detect_s() + stages.register_s() + stages.force_s()) * 1e3));
     }
   }
 
@@ -185,12 +188,12 @@ Result<void> WaitUntilMeasuring(client::Client& connection) {
   while (steady_clock::now() < give_up) {
     const auto arm = connection.GetArm();
     if (!arm) return arm.error();
-    const bool all = std::all_of(arm->links.begin(), arm->links.end(), [](const client::Link& link) {
-      return link.status == client::LinkStatus::kOk || link.status == client::LinkStatus::kDegraded;
+    const bool all = std::all_of(arm->links().begin(), arm->links().end(), [](const v1::Link& link) {
+      return link.status() == v1::LINK_STATUS_OK || link.status() == v1::LINK_STATUS_DEGRADED;
     });
     if (all) return {};
-    for (const client::Link& link : arm->links) {
-      if (!link.status_reason.empty()) reason = link.name + " says: " + link.status_reason;
+    for (const v1::Link& link : arm->links()) {
+      if (!link.status_reason().empty()) reason = link.name() + " says: " + link.status_reason();
     }
     std::this_thread::sleep_for(kPoll);
   }
@@ -201,7 +204,7 @@ Result<uint64_t> FramesSkipped(client::Client& connection) {
   const auto arm = connection.GetArm();
   if (!arm) return arm.error();
   uint64_t skipped = 0;
-  for (const client::Link& link : arm->links) skipped += link.frames_skipped;
+  for (const v1::Link& link : arm->links()) skipped += link.statistics().frames_skipped();
   return skipped;
 }
 

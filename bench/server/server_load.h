@@ -14,7 +14,7 @@ struct ServerLoad {
   int links = 1;
   double rate_hz = 30;
   int clients = 1;
-  client::Detail detail = client::Detail::kFull;
+  v1::Detail detail = v1::DETAIL_FULL;
 };
 
 /// What came of it, over `seconds`.

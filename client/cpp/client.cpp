@@ -1,10 +1,10 @@
 #include "client/cpp/taclink/client.h"
 
+#include <optional>
 #include <utility>
 
 #include "client/cpp/channel.h"
 #include "client/cpp/connection.h"
-#include "client/cpp/messages.h"
 #include "client/cpp/patience.h"
 #include "client/cpp/stream_call.h"
 #include "taclink/v1/operations.grpc.pb.h"
@@ -18,9 +18,7 @@ using std::chrono::system_clock;
 
 constexpr milliseconds kConnectPatience{3000};
 
-int64_t UtcNowNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(system_clock::now().time_since_epoch()).count();
-}
+using TactileStub = v1::TactileService::Stub;
 
 Error NoServer(const std::string& address) {
   return {ErrorCode::kUnavailable,
@@ -89,27 +87,24 @@ Error FromStatus(const grpc::Status& status, const std::string& address) {
 
 struct FrameReader::Call : StreamCall<v1::StreamFramesResponse> {
   using StreamCall::StreamCall;
-  std::vector<StreamCounts> counts;
-
   void TakeStatus() {
-    counts = FromMessage(response.status());
-    end_reason = response.status().end_reason();
+    status = response.status();
+    end_reason = status.end_reason();
   }
+
+  v1::StreamStatus status;
 };
 
 FrameReader::FrameReader(std::unique_ptr<Call> call) : call_(std::move(call)) {}
 FrameReader::~FrameReader() = default;
 
-Result<Frame> FrameReader::Next(milliseconds timeout) {
+Result<v1::LinkFrame> FrameReader::Next(milliseconds timeout) {
   const auto deadline = system_clock::now() + timeout;
   while (true) {
     const auto read = call_->Read(deadline);
     if (!read) return read.error();
     if (call_->response.has_status()) call_->TakeStatus();
-    if (!call_->response.has_frame()) continue;
-    Frame frame = FromMessage(call_->response.frame());
-    frame.times.client_utc_ns = UtcNowNs();
-    return frame;
+    if (call_->response.has_frame()) return std::move(*call_->response.mutable_frame());
   }
 }
 
@@ -117,8 +112,8 @@ void FrameReader::Cancel() {
   call_->Cancel();
 }
 
-const std::vector<StreamCounts>& FrameReader::counts() const {
-  return call_->counts;
+const v1::StreamStatus& FrameReader::status() const {
+  return call_->status;
 }
 
 milliseconds Patience(milliseconds usual) {
@@ -146,66 +141,58 @@ Result<Client> Client::Connect(const std::string& address, milliseconds timeout,
   return Client(std::make_shared<Connection>(address, *std::move(channel)));
 }
 
-Result<Arm> Client::GetArm(milliseconds timeout) {
-  grpc::ClientContext context;
-  context.set_deadline(system_clock::now() + timeout);
-  v1::GetArmResponse response;
-  const grpc::Status status = connection_->stub->GetArm(&context, {}, &response);
-  if (!status.ok()) return FromStatus(status, connection_->address);
-  return FromMessage(response.arm());
+Result<v1::Arm> Client::GetArm(milliseconds timeout) {
+  auto response = connection_->Ask(&TactileStub::GetArm, v1::GetArmRequest(), timeout);
+  if (!response) return response.error();
+  return std::move(*response->mutable_arm());
 }
 
 Result<void> Client::RestartLink(const std::string& link, milliseconds timeout) {
-  grpc::ClientContext context;
-  context.set_deadline(system_clock::now() + timeout);
+  const auto operations = v1::OperationsService::NewStub(connection_->channel);
   v1::RestartLinkRequest request;
   request.set_link(link);
-  v1::RestartLinkResponse response;
-  const grpc::Status status =
-      v1::OperationsService::NewStub(connection_->channel)->RestartLink(&context, request, &response);
-  if (!status.ok()) return FromStatus(status, connection_->address);
-  return {};
+  return WithoutValue(
+      Ask(*operations, &v1::OperationsService::Stub::RestartLink, request, timeout, connection_->address));
 }
 
-Result<void> Client::SetCamera(const std::string& link, const std::string& camera,
-                               const CameraSettings& settings, milliseconds timeout) {
-  grpc::ClientContext context;
-  context.set_deadline(system_clock::now() + timeout);
-  v1::SetCameraRequest request;
-  request.set_link(link);
-  request.set_camera(camera);
-  if (settings.automatic_exposure) request.set_automatic(true);
-  if (settings.exposure_s) request.set_exposure_s(*settings.exposure_s);
-  if (settings.gain) request.set_gain(*settings.gain);
-  v1::SetCameraResponse response;
-  const grpc::Status status = connection_->stub->SetCamera(&context, request, &response);
-  return status.ok() ? Result<void>() : FromStatus(status, connection_->address);
+Result<void> Client::SetCamera(const v1::SetCameraRequest& request, milliseconds timeout) {
+  return WithoutValue(connection_->Ask(&TactileStub::SetCamera, request, timeout));
 }
 
-Result<void> Client::SetForceModel(const std::string& link, ForceModel model, milliseconds timeout) {
-  grpc::ClientContext context;
-  context.set_deadline(system_clock::now() + timeout);
+Result<void> Client::SetForceModel(const std::string& link, v1::ForceModel model, milliseconds timeout) {
   v1::SetForceModelRequest request;
   request.set_link(link);
-  request.set_model(ToMessage(model));
-  v1::SetForceModelResponse response;
-  const grpc::Status status = connection_->stub->SetForceModel(&context, request, &response);
-  return status.ok() ? Result<void>() : FromStatus(status, connection_->address);
+  request.set_model(model);
+  return WithoutValue(connection_->Ask(&TactileStub::SetForceModel, request, timeout));
 }
 
-Result<CalibrationResult> Client::Calibrate(const CalibrateOptions& options,
-                                            const CalibrateProgress& progress, milliseconds timeout) {
+Result<v1::TareResponse> Client::Tare(const v1::TareRequest& request, milliseconds timeout) {
+  return connection_->Ask(&TactileStub::Tare, request, timeout);
+}
+
+Result<v1::ForceLevelState> Client::SetThresholds(const std::string& link, const std::string& region,
+                                                  const v1::Thresholds& thresholds, milliseconds timeout) {
+  v1::SetThresholdsRequest request;
+  request.set_link(link);
+  request.set_region(region);
+  *request.mutable_thresholds() = thresholds;
+  auto response = connection_->Ask(&TactileStub::SetThresholds, request, timeout);
+  if (!response) return response.error();
+  return std::move(*response->mutable_state());
+}
+
+Result<v1::CalibrationResult> Client::Calibrate(const v1::CalibrateRequest& request,
+                                                const CalibrateProgress& progress, milliseconds timeout) {
   grpc::ClientContext context;
   context.set_deadline(system_clock::now() + timeout);
-  const auto reader = connection_->stub->Calibrate(&context, ToMessage(options));
+  const auto reader = connection_->stub->Calibrate(&context, request);
   v1::CalibrateResponse response;
-  std::optional<CalibrationResult> result;
+  std::optional<v1::CalibrationResult> result;
   bool cancelled = false;
   while (reader->Read(&response)) {
-    if (response.has_result()) result = FromMessage(response.result());
+    if (response.has_result()) result = std::move(*response.mutable_result());
     if (!response.has_progress() || !progress || cancelled) continue;
-    const auto& counts = response.progress();
-    cancelled = !progress(static_cast<int>(counts.pairs_taken()), static_cast<int>(counts.pairs_wanted()));
+    cancelled = !progress(response.progress());
     if (cancelled) context.TryCancel();
   }
   const grpc::Status status = reader->Finish();
@@ -214,11 +201,11 @@ Result<CalibrationResult> Client::Calibrate(const CalibrateOptions& options,
   return *std::move(result);
 }
 
-Result<std::unique_ptr<FrameReader>> Client::StreamFrames(const StreamOptions& options,
+Result<std::unique_ptr<FrameReader>> Client::StreamFrames(const v1::StreamFramesRequest& request,
                                                           milliseconds timeout) {
   using Call = FrameReader::Call;
   auto call = std::make_unique<Call>(connection_->address, connection_->channel);
-  call->reader = connection_->stub->AsyncStreamFrames(&call->context, ToMessage(options), &call->queue,
+  call->reader = connection_->stub->AsyncStreamFrames(&call->context, request, &call->queue,
                                                       Call::AsPointer(Call::kStart));
   // A stream begins with its status.
   if (const auto accepted = call->ReadFirst(timeout); !accepted) return accepted.error();

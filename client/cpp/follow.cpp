@@ -131,19 +131,20 @@ bool Subscription::ended() const {
   return worker_->ended();
 }
 
-std::unique_ptr<Subscription> FollowFrames(FollowOptions options, StreamOptions stream,
-                                           std::function<void(const Frame&)> on_frame) {
-  auto read = [stream = std::move(stream), on_frame = std::move(on_frame)](Subscription::Worker& worker,
-                                                                           Client& client) {
-    const auto reader = client.StreamFrames(stream);
+std::unique_ptr<Subscription> FollowFrames(FollowOptions options, v1::StreamFramesRequest request,
+                                           std::function<void(const v1::LinkFrame&)> on_frame) {
+  auto read = [request = std::move(request), on_frame = std::move(on_frame)](Subscription::Worker& worker,
+                                                                             Client& client) {
+    const auto reader = client.StreamFrames(request);
     return reader ? worker.ReadAll(**reader, on_frame) : reader.error();
   };
   return std::make_unique<Subscription>(
       std::make_unique<Subscription::Worker>(std::move(options), std::move(read)));
 }
 
-std::unique_ptr<Subscription> FollowContacts(FollowOptions options, double max_rate_hz,
-                                             std::function<void(const ArmContacts&)> on_contacts) {
+std::unique_ptr<Subscription> FollowContacts(
+    FollowOptions options, double max_rate_hz,
+    std::function<void(const v1::StreamContactsResponse&)> on_contacts) {
   auto read = [max_rate_hz, on_contacts = std::move(on_contacts)](Subscription::Worker& worker,
                                                                   Client& client) {
     const auto reader = client.StreamContacts(max_rate_hz);
@@ -153,14 +154,15 @@ std::unique_ptr<Subscription> FollowContacts(FollowOptions options, double max_r
       std::make_unique<Subscription::Worker>(std::move(options), std::move(read)));
 }
 
-std::unique_ptr<Subscription> FollowEvents(FollowOptions options, EventOptions events,
-                                           std::function<void(const Event&)> on_event) {
-  auto read = [events = std::move(events), on_event = std::move(on_event)](Subscription::Worker& worker,
-                                                                           Client& client) mutable {
-    const auto reader = client.StreamEvents(events);
+std::unique_ptr<Subscription> FollowEvents(FollowOptions options, v1::StreamEventsRequest request,
+                                           std::function<void(const v1::Event&)> on_event) {
+  auto read = [request = std::move(request), on_event = std::move(on_event)](Subscription::Worker& worker,
+                                                                             Client& client) mutable {
+    const auto reader = client.StreamEvents(request);
     if (!reader) return reader.error();
     const Error ended = worker.ReadAll(**reader, on_event);
-    events.resume = (*reader)->place();
+    request.set_run_id((*reader)->status().run_id());
+    request.set_after_sequence((*reader)->status().position());
     return ended;
   };
   return std::make_unique<Subscription>(

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <grpcpp/channel.h>
-#include <grpcpp/client_context.h>
 
 #include <chrono>
 #include <memory>
@@ -23,14 +22,12 @@ struct Recordings::Connection {
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<v1::RecordingService::Stub> stub;
 
-  /// One call; `call` gets the context.
-  template <typename F>
-  Result<void> Ask(const F& call) const {
-    grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + Patience(kPatience));
-    const grpc::Status status = call(context);
-    if (!status.ok()) return FromStatus(status, address);
-    return {};
+  /// One unary call of RecordingService.
+  template <typename Request, typename Response>
+  Result<Response> Ask(grpc::Status (v1::RecordingService::Stub::*method)(grpc::ClientContext*,
+                                                                          const Request&, Response*),
+                       const Request& request) const {
+    return client::Ask(*stub, method, request, Patience(kPatience), address);
   }
 };
 

@@ -5,6 +5,7 @@
 #include "client/command/cli/json.h"
 #include "client/command/live/contacts_view.h"
 #include "client/command/live/joint_lines.h"
+#include "tests/integration/messages.h"
 
 namespace taclink::command {
 namespace {
@@ -79,20 +80,20 @@ TEST(JointLines, MistakesAreNamedWithTheirLine) {
   EXPECT_THAT(Complaint({R"({"positions": ["x"]})"}), HasSubstr("must be"));
 }
 
-client::ArmContacts MakeArm() {
-  client::ArmContacts arm;
-  client::ArmContact contact;
-  contact.id = (uint64_t{1} << 40) + 3;
-  contact.link = "forearm";
-  contact.center_m = {0.1, 0.2, 0.3};
-  contact.force_n = {-1, 0, 0.5};
-  contact.force_covariance_n2 = {0.0625, 0, 0, 0.25, 0, 4};
-  contact.normal_force_n = 1;
-  contact.validity = client::PoseValidity::kStale;
-  arm.contacts = {contact};
-  arm.joints = {{.joint = "elbow", .torque_nm = -0.25, .sigma_nm = 0.125},
-                {.joint = "lift", .torque_nm = 2, .sigma_nm = {}}};
-  arm.validity = client::PoseValidity::kStale;
+v1::StreamContactsResponse MakeArm() {
+  v1::StreamContactsResponse arm;
+  v1::ArmContact& contact = *arm.add_contacts();
+  contact.set_id((uint64_t{1} << 40) + 3);
+  contact.set_link("forearm");
+  Set({0.1, 0.2, 0.3}, *contact.mutable_center_m());
+  Set({-1, 0, 0.5}, *contact.mutable_wrench()->mutable_force_n());
+  for (const double number : {0.0625, 0., 0., 0.25, 0., 4.}) contact.add_force_covariance_n2(number);
+  contact.set_normal_force_n(1);
+  contact.set_validity(v1::POSE_VALIDITY_STALE);
+  for (const char* joint : {"elbow", "lift"}) arm.add_joint_names(joint);
+  for (const double torque : {-0.25, 2.}) arm.add_joint_torques(torque);
+  for (const double sigma : {0.125, 0.5}) arm.add_joint_torque_sigmas(sigma);
+  arm.set_validity(v1::POSE_VALIDITY_STALE);
   return arm;
 }
 
@@ -105,14 +106,18 @@ TEST(ContactsView, JsonHasEverything) {
   EXPECT_TRUE(contact.at("center_sigma_mm").is_null());
   EXPECT_EQ(contact.at("pose"), "stale");
   EXPECT_EQ(json.at("joints").at("elbow").at("torque_nm"), -0.25);
-  EXPECT_TRUE(json.at("joints").at("lift").at("sigma_nm").is_null());
+  EXPECT_EQ(json.at("joints").at("lift").at("sigma_nm"), 0.5);
+  auto unknown = MakeArm();
+  unknown.clear_joint_torque_sigmas();
+  const Json joints = Json::parse(ContactsJson(unknown)).at("joints");
+  EXPECT_TRUE(joints.at("elbow").at("sigma_nm").is_null());
 }
 
 TEST(ContactsView, TableNamesContactsAndTorques) {
   const std::string table = ContactsTable(MakeArm());
   EXPECT_THAT(table, HasSubstr("forearm"));
   EXPECT_THAT(table, HasSubstr("stale"));
-  EXPECT_THAT(table, HasSubstr("elbow -0.250 ±0.125  lift 2.000"));
+  EXPECT_THAT(table, HasSubstr("elbow -0.250 ±0.125  lift 2.000 ±0.500"));
   EXPECT_THAT(ContactsTable({}), HasSubstr("no contacts"));
 }
 

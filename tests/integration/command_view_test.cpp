@@ -7,6 +7,7 @@
 #include "client/command/live/contacts_view.h"
 #include "client/command/live/frame_json.h"
 #include "client/command/live/watch_view.h"
+#include "tests/integration/messages.h"
 
 namespace taclink::command {
 namespace {
@@ -15,29 +16,28 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-client::Frame MakeFrame(double force_n) {
-  client::Frame frame;
-  frame.link = "upper";
-  frame.sequence = 9;
-  frame.status = client::LinkStatus::kOk;
+v1::LinkFrame MakeFrame(double force_n) {
+  v1::LinkFrame frame;
+  frame.set_link("upper");
+  frame.set_sequence(9);
+  frame.set_status(v1::LINK_STATUS_OK);
   if (force_n > 0) {
-    client::Contact contact;
-    contact.id = 3;
-    contact.center_m = {0.0365, 0, 0.09};
-    contact.force_n = {-force_n, 0, 0};
-    contact.normal = {1, 0, 0};
-    contact.normal_force_n = force_n;
-    contact.force_covariance_n2 = {0.0625, 0, 0, 0.25, 0, 4};
-    contact.area_m2 = 1e-4;
-    frame.contacts = {contact};
-    frame.total_force_n = contact.force_n;
+    v1::Contact& contact = *frame.add_contacts();
+    contact.set_id(3);
+    Set({0.0365, 0, 0.09}, *contact.mutable_center_m());
+    Set({-force_n, 0, 0}, *contact.mutable_force_n());
+    Set({1, 0, 0}, *contact.mutable_normal());
+    contact.set_normal_force_n(force_n);
+    for (const double number : {0.0625, 0., 0., 0.25, 0., 4.}) contact.add_force_covariance_n2(number);
+    contact.set_area_m2(1e-4);
+    *frame.mutable_total_force_n() = contact.force_n();
   }
   return frame;
 }
 
 TEST(FrameJson, UsesTheKeysAndUnitsOfSolve) {
   auto frame = MakeFrame(0.25);
-  frame.positions_m = {{0.5, 0.25, 0.125}};
+  for (const float number : {0.5f, 0.25f, 0.125f}) frame.add_positions_m(number);
   const auto json = Json::parse(FrameJson(frame));
   EXPECT_EQ(json.at("link"), "upper");
   EXPECT_TRUE(json.at("latency_ms").is_null());
@@ -54,24 +54,24 @@ TEST(FrameJson, UsesTheKeysAndUnitsOfSolve) {
 }
 
 TEST(FrameJson, TellsWhatIsKnownOfTheForces) {
-  client::Frame frame = MakeFrame(0.25);
-  const std::map<std::string, std::optional<double>*> numbers = {
-      {"detection_limit_n", &frame.detection_limit_n},
-      {"detection_limit_around_n", &frame.detection_limit_around_n},
-      {"force_residual", &frame.force_residual},
+  v1::LinkFrame frame = MakeFrame(0.25);
+  const std::map<std::string, void (v1::LinkFrame::*)(double)> numbers = {
+      {"detection_limit_n", &v1::LinkFrame::set_detection_limit_n},
+      {"detection_limit_around_n", &v1::LinkFrame::set_detection_limit_around_n},
+      {"force_residual", &v1::LinkFrame::set_force_residual},
   };
   double place = 0;
-  for (const auto& [name, number] : numbers) {
+  for (const auto& [name, set_number] : numbers) {
     EXPECT_TRUE(Json::parse(FrameJson(frame)).at(name).is_null()) << name;
-    *number = ++place;
+    (frame.*set_number)(++place);
     EXPECT_EQ(Json::parse(FrameJson(frame)).at(name), place) << name;
   }
 }
 
 TEST(ContactsJson, ASumOverNothingIsNoZero) {
-  client::ArmContacts arm;
+  v1::StreamContactsResponse arm;
   EXPECT_TRUE(Json::parse(ContactsJson(arm)).at("total_force_n").is_null());
-  arm.total_force_n = {1, 2, 3};
+  Set({1, 2, 3}, *arm.mutable_total()->mutable_force_n());
   EXPECT_EQ(Json::parse(ContactsJson(arm)).at("total_force_n"), Json::array({1.0, 2.0, 3.0}));
 }
 
@@ -83,8 +83,8 @@ TEST(ChangeLog, OneLineForEachChange) {
   EXPECT_THAT(log.Take(MakeFrame(0.7)), ElementsAre(HasSubstr("contact 3 changes")));
   EXPECT_THAT(log.Take(MakeFrame(0)), ElementsAre("upper contact 3 ends"));
   auto lost = MakeFrame(0);
-  lost.status = client::LinkStatus::kLost;
-  lost.status_reason = "unplugged";
+  lost.set_status(v1::LINK_STATUS_LOST);
+  lost.set_status_reason("unplugged");
   EXPECT_THAT(log.Take(lost), ElementsAre("upper is lost: unplugged"));
   EXPECT_THAT(log.Take(lost), IsEmpty());
 }
@@ -92,7 +92,9 @@ TEST(ChangeLog, OneLineForEachChange) {
 TEST(LiveView, ShowsLinkForceAndDrops) {
   LiveView view("title");
   view.Take(MakeFrame(0.2));
-  const auto text = view.Draw({{"upper", 5, 4}}, std::chrono::steady_clock::now());
+  v1::StreamStatus status;
+  status.add_links()->set_frames_dropped(4);
+  const auto text = view.Draw(status, std::chrono::steady_clock::now());
   EXPECT_THAT(text, HasSubstr("upper"));
   EXPECT_THAT(text, HasSubstr("0.20 N"));
   EXPECT_THAT(text, HasSubstr("dropped for this client: 4"));

@@ -14,7 +14,6 @@ namespace taclink::server {
 namespace {
 
 using client::Disconnection;
-using client::Frame;
 using std::chrono::milliseconds;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -66,7 +65,7 @@ class FollowTest : public ::testing::Test {
 };
 
 TEST_F(FollowTest, FramesGoOnAfterABreak) {
-  Heard<Frame> frames;
+  Heard<v1::LinkFrame> frames;
   const auto subscription = client::FollowFrames(options_, Every(), frames.Listener());
   connected_.Wait(1);
   server_->Publish(0, 1);
@@ -85,13 +84,13 @@ TEST_F(FollowTest, FramesGoOnAfterABreak) {
   other.Publish(0, 7);
   const auto all = frames.Wait(2);
   ASSERT_EQ(all.size(), 2U);
-  EXPECT_EQ(all[0].sequence, 1U);
-  EXPECT_EQ(all[1].sequence, 7U);
+  EXPECT_EQ(all[0].sequence(), 1U);
+  EXPECT_EQ(all[1].sequence(), 7U);
   EXPECT_FALSE(subscription->ended());
 }
 
 TEST_F(FollowTest, ARefusalIsTheEnd) {
-  const auto subscription = client::FollowFrames(options_, {.links = {"elbow"}}, {});
+  const auto subscription = client::FollowFrames(options_, OfLinks({"elbow"}), {});
   const auto refusals = refused_.Wait(1);
   ASSERT_EQ(refusals.size(), 1U);
   EXPECT_EQ(refusals[0].code, ErrorCode::kNotFound);
@@ -101,19 +100,19 @@ TEST_F(FollowTest, ARefusalIsTheEnd) {
 }
 
 TEST_F(FollowTest, ContactsAndEventsCome) {
-  Heard<client::ArmContacts> contacts;
+  Heard<v1::StreamContactsResponse> contacts;
   const auto all_contacts = client::FollowContacts(options_, 0, contacts.Listener());
   connected_.Wait(1);
   server_->Publish(0, 1);
   EXPECT_FALSE(contacts.Wait(1).empty());
   server_->arm().events().Start();
-  Heard<client::Event> events;
+  Heard<v1::Event> events;
   const auto all_events = client::FollowEvents(options_, {}, events.Listener());
   connected_.Wait(2);
-  ASSERT_TRUE(server_->Connect().SetThresholds("upper", "", {.warning_n = 3}).ok());
+  ASSERT_TRUE(server_->Connect().SetThresholds("upper", "", MakeThresholds(3)).ok());
   const auto heard = events.Wait(1);
   ASSERT_FALSE(heard.empty());
-  EXPECT_EQ(heard[0].kind, client::EventKind::kThresholds);
+  EXPECT_EQ(heard[0].kind(), v1::EVENT_KIND_THRESHOLDS);
 }
 
 TEST_F(FollowTest, StopsWhileNobodyAnswersAndFromItsOwnCallback) {

@@ -79,7 +79,7 @@ class Hostile : public ::testing::Test {
       server_.Publish(0, ++sequence_);
       const auto frame = witness_->Next(kForever);
       ASSERT_TRUE(frame.ok()) << frame.error().message;
-      ASSERT_EQ(frame->sequence, sequence_);
+      ASSERT_EQ(frame->sequence(), sequence_);
     }
   }
   // `harm` over and over takes no more memory than the first times.
@@ -93,7 +93,7 @@ class Hostile : public ::testing::Test {
     if (!testing::kSanitized) {
       EXPECT_LT(testing::ResidentMb(), before_mb + kGrowthMb);
     }
-    EXPECT_EQ(witness_->counts().at(0).frames_dropped, 0u);
+    EXPECT_EQ(witness_->status().links(0).frames_dropped(), 0u);
   }
   void WaitForStreams(size_t count) { WaitForStreams(server_.server(), count); }
   void WaitForStreams(const RpcServer& server, size_t count) {
@@ -117,7 +117,7 @@ class Hostile : public ::testing::Test {
 
   TestServer server_{PatientLimits()};
   client::Client client_ = server_.Connect();
-  std::unique_ptr<client::FrameReader> witness_ = Stream(client_, Every(client::Detail::kFull));
+  std::unique_ptr<client::FrameReader> witness_ = Stream(client_, Every(v1::DETAIL_FULL));
   uint64_t sequence_ = 0;
 };
 
@@ -185,7 +185,7 @@ TEST_F(Hostile, ClientsThatComeAndGo) {
   ExpectFlatMemory(60, [&] {
     auto client = server_.Connect();
     WaitForStreams(1);  // the one before has gone
-    const auto reader = client.StreamFrames(Every(client::Detail::kFull));
+    const auto reader = client.StreamFrames(Every(v1::DETAIL_FULL));
     Frames(2);
     EXPECT_TRUE(reader.ok() && (*reader)->Next(kForever).ok());
   });
@@ -198,7 +198,7 @@ TEST_F(Hostile, ClientsThatNeverRead) {
     std::vector<std::unique_ptr<client::FrameReader>> readers;
     for (int i = 0; i < 10; ++i) {
       clients.push_back(server_.Connect());
-      readers.push_back(Stream(clients.back(), Every(client::Detail::kFull)));
+      readers.push_back(Stream(clients.back(), Every(v1::DETAIL_FULL)));
     }
     Frames(500);
     EXPECT_LE(server_.states_alive(), 64 + 32);

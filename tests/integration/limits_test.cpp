@@ -46,10 +46,10 @@ TEST(Limits, AMessageThatIsTooLargeIsRefused) {
   limits.max_message_bytes = 1000;
   TestServer server(limits);
   auto client = server.Connect();
-  const auto huge = client.StreamFrames({.links = {std::string(2000, 'x')}});
+  const auto huge = client.StreamFrames(OfLinks({std::string(2000, 'x')}));
   ASSERT_FALSE(huge.ok());
   EXPECT_EQ(huge.error().code, ErrorCode::kResourceExhausted);
-  EXPECT_EQ(client.StreamFrames({.links = {std::string(500, 'x')}}).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(client.StreamFrames(OfLinks({std::string(500, 'x')})).error().code, ErrorCode::kNotFound);
 }
 
 TEST(Limits, WhatWaitsIsBoundedInBytes) {
@@ -58,7 +58,7 @@ TEST(Limits, WhatWaitsIsBoundedInBytes) {
   limits.queue_bytes = size_t{2} << 20;
   TestServer server(limits);
   auto client = server.Connect();
-  const auto stopped = Stream(client, Every(client::Detail::kFull));
+  const auto stopped = Stream(client, Every(v1::DETAIL_FULL));
   constexpr uint64_t kFrames = 3000;
   int most_alive = 0;
   for (uint64_t i = 1; i <= kFrames; ++i) {
@@ -71,10 +71,10 @@ TEST(Limits, WhatWaitsIsBoundedInBytes) {
   uint64_t received = 0;
   while (stopped->Next(kForever).ok()) ++received;
   stop.join();
-  const auto counts = stopped->counts().at(0);
-  EXPECT_EQ(counts.frames_sent, received);
-  EXPECT_GT(counts.frames_dropped, 0u);
-  EXPECT_EQ(counts.frames_dropped_for_bytes, counts.frames_dropped);
+  const v1::LinkStreamCounts& counts = stopped->status().links(0);
+  EXPECT_EQ(counts.frames_sent(), received);
+  EXPECT_GT(counts.frames_dropped(), 0u);
+  EXPECT_EQ(counts.frames_dropped_for_bytes(), counts.frames_dropped());
 }
 
 TEST(Limits, WhatWaitsForAllStreamsOfAPartyIsBoundedInBytes) {
@@ -83,13 +83,12 @@ TEST(Limits, WhatWaitsForAllStreamsOfAPartyIsBoundedInBytes) {
   limits.queue_bytes_per_peer = size_t{2} << 20;
   TestServer server(limits);
   auto greedy = server.Connect(), other = server.Connect();
-  const auto a = Stream(greedy, Every(client::Detail::kFull)),
-             b = Stream(greedy, Every(client::Detail::kFull));
-  const auto reader = Stream(other, Every(client::Detail::kFull));
+  const auto a = Stream(greedy, Every(v1::DETAIL_FULL)), b = Stream(greedy, Every(v1::DETAIL_FULL));
+  const auto reader = Stream(other, Every(v1::DETAIL_FULL));
   int most_alive = 0;
   for (uint64_t i = 1; i <= 2000; ++i) {
     server.Publish(0, i);
-    EXPECT_EQ(NextOf(*reader).sequence, i) << "others lose nothing";
+    EXPECT_EQ(NextOf(*reader).sequence(), i) << "others lose nothing";
     most_alive = std::max(most_alive, server.states_alive());
   }
   // A state of 256 markers takes more than 32 kB.

@@ -43,12 +43,13 @@ class PressureTest : public ::testing::Test {
     writer->WritesDone();
     return writer->Finish();
   }
-  client::Frame FrameOf(size_t link) {
+  v1::LinkFrame FrameOf(size_t link) {
     server_.script(link).Push(++sequence_, server_.clock().MonotonicNs());
     while (true) {
       auto frame = reader_->Next(kForever);
       EXPECT_TRUE(frame.ok()) << frame.error().message;
-      if (!frame || (frame->sequence == sequence_ && frame->times.exposure_ns != 0)) return std::move(*frame);
+      if (!frame || (frame->sequence() == sequence_ && frame->times().exposure_ns() != 0))
+        return std::move(*frame);
     }
   }
 
@@ -62,28 +63,28 @@ class PressureTest : public ::testing::Test {
 
 TEST_F(PressureTest, ReachesTheFramesAndGrowsStale) {
   auto frame = FrameOf(0);
-  EXPECT_EQ(frame.pressure.origin, "client");
-  EXPECT_TRUE(frame.pressure.stale);
-  EXPECT_FALSE(frame.pressure.assumed);
-  EXPECT_THAT(frame.pressure.trouble, HasSubstr("no reading yet"));
-  EXPECT_FALSE(frame.pressure_pa.has_value());
+  EXPECT_EQ(frame.pressure().origin(), v1::PRESSURE_ORIGIN_CLIENT);
+  EXPECT_TRUE(frame.pressure().stale());
+  EXPECT_FALSE(frame.pressure().assumed());
+  EXPECT_THAT(frame.pressure().trouble(), HasSubstr("no reading yet"));
+  EXPECT_FALSE(frame.has_pressure_pa());
 
   EXPECT_TRUE(Tell("upper", {1500, 2500}, server_.clock().UtcNs()).ok());
   EXPECT_EQ(response_.accepted(), 1u);
   EXPECT_EQ(response_.refused(), 1u) << "of the same time";
   server_.clock().Advance(std::chrono::milliseconds(250));
   frame = FrameOf(0);
-  EXPECT_FALSE(frame.pressure.stale);
-  EXPECT_NEAR(frame.pressure_pa.value(), 1500, 1e-6);
-  EXPECT_NEAR(frame.pressure.age_s.value(), 0.25, 1e-9);
+  EXPECT_FALSE(frame.pressure().stale());
+  EXPECT_NEAR(frame.pressure_pa(), 1500, 1e-6);
+  EXPECT_NEAR(frame.pressure().age_s(), 0.25, 1e-9);
 
   server_.clock().Advance(std::chrono::seconds(1));
   frame = FrameOf(0);
-  EXPECT_TRUE(frame.pressure.stale);
-  EXPECT_FALSE(frame.pressure_pa.has_value());
-  EXPECT_NEAR(frame.pressure.pressure_pa, 1500, 1e-6) << "what was known last";
+  EXPECT_TRUE(frame.pressure().stale());
+  EXPECT_FALSE(frame.has_pressure_pa());
+  EXPECT_NEAR(frame.pressure().pressure_pa(), 1500, 1e-6) << "what was known last";
 
-  EXPECT_TRUE(FrameOf(1).pressure.assumed);
+  EXPECT_TRUE(FrameOf(1).pressure().assumed());
 }
 
 TEST_F(PressureTest, BadReadingsAreRefusedWithTheReason) {

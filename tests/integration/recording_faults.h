@@ -98,12 +98,17 @@ class RecordingFaultsTest : public ::testing::Test {
   ~RecordingFaultsTest() override { std::filesystem::remove_all(folder_); }
 
   void Start() {
-    const auto started = recordings_.Start({.compression = client::LogCompression::kNone});
+    const auto started = recordings_.Start(Uncompressed());
     ASSERT_TRUE(started.ok()) << started.error().message;
     Publish(10);
-    WaitFor([this](const auto& status) { return status.frames == published_; });
+    WaitFor([this](const auto& status) { return status.frames() == published_; });
     Pass(2);
-    WaitFor([](const auto& status) { return status.synced_utc_ns != 0; });
+    WaitFor([](const auto& status) { return status.synced_utc_ns() != 0; });
+  }
+  static v1::StartRecordingRequest Uncompressed() {
+    v1::StartRecordingRequest request;
+    request.set_compression(v1::LOG_COMPRESSION_NONE);
+    return request;
   }
   void Publish(int frames) {
     for (int i = 0; i < frames; ++i) server_.Publish(0, ++published_, server_.clock().MonotonicNs());
@@ -112,18 +117,18 @@ class RecordingFaultsTest : public ::testing::Test {
     server_.clock().Advance(std::chrono::milliseconds(static_cast<int64_t>(1e3 * seconds)));
   }
   template <typename F>
-  client::RecorderStatus WaitFor(const F& condition) {
+  v1::RecorderStatus WaitFor(const F& condition) {
     const auto give_up = std::chrono::steady_clock::now() + kForever;
-    client::RecorderStatus last;
+    v1::RecorderStatus last;
     while (std::chrono::steady_clock::now() < give_up) {
       const auto status = recordings_.Status();
       if (status.ok() && condition(*status)) return *status;
       if (status.ok()) last = *status;
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-    ADD_FAILURE() << "not in time: " << client::Name(last.state) << " " << last.trouble
-                  << "; before: " << last.last_trouble << "; frames " << last.frames << ", lost "
-                  << last.frames_lost;
+    ADD_FAILURE() << "not in time: " << client::Name(last.state()) << " " << last.trouble()
+                  << "; before: " << last.last_trouble() << "; frames " << last.frames() << ", lost "
+                  << last.frames_lost();
     return last;
   }
   // Time passes, and the recording has had a round since.
@@ -134,17 +139,17 @@ class RecordingFaultsTest : public ::testing::Test {
   }
   // Time passes until it is so.
   template <typename F>
-  client::RecorderStatus PassUntil(const F& condition) {
+  v1::RecorderStatus PassUntil(const F& condition) {
     return WaitFor([&](const auto& status) {
       if (condition(status)) return true;
       PassARound();
       return false;
     });
   }
-  client::RecorderStatus Stop() {
+  v1::RecorderStatus Stop() {
     const auto status = recordings_.Stop();
     EXPECT_TRUE(status.ok()) << status.error().message;
-    return status.ok() ? *status : client::RecorderStatus();
+    return status.ok() ? *status : v1::RecorderStatus();
   }
   std::multiset<uint64_t> FramesIn(const std::string& folder) const {
     std::multiset<uint64_t> frames;

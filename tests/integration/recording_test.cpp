@@ -23,7 +23,6 @@ namespace taclink::server {
 namespace {
 
 namespace fs = std::filesystem;
-using client::RecorderState;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using wire::log::TopicKind;
@@ -57,6 +56,19 @@ std::vector<T> Read(const std::string& path, TopicKind kind, const std::string& 
   return out;
 }
 
+v1::StartRecordingRequest RecordingOf(const std::string& link, const std::string& name = "") {
+  v1::StartRecordingRequest request;
+  request.set_name(name);
+  if (!link.empty()) request.add_links(link);
+  return request;
+}
+
+v1::StartRecordingRequest Uncompressed() {
+  v1::StartRecordingRequest request;
+  request.set_compression(v1::LOG_COMPRESSION_NONE);
+  return request;
+}
+
 class RecordingTest : public ::testing::Test {
  protected:
   explicit RecordingTest(const RecordingConfig& config = {})
@@ -71,18 +83,18 @@ class RecordingTest : public ::testing::Test {
     for (uint64_t sequence = first; sequence <= last; ++sequence)
       server_.Publish(link, sequence, server_.clock().MonotonicNs());
   }
-  client::RecorderStatus Start(const client::RecordingOptions& options = {}) {
-    const auto status = recordings_.Start(options);
+  v1::RecorderStatus Start(const v1::StartRecordingRequest& request = {}) {
+    const auto status = recordings_.Start(request);
     EXPECT_TRUE(status.ok()) << status.error().message;
-    return status.ok() ? *status : client::RecorderStatus();
+    return status.ok() ? *status : v1::RecorderStatus();
   }
-  client::RecorderStatus Stop() {
+  v1::RecorderStatus Stop() {
     const auto status = recordings_.Stop();
     EXPECT_TRUE(status.ok()) << status.error().message;
-    return status.ok() ? *status : client::RecorderStatus();
+    return status.ok() ? *status : v1::RecorderStatus();
   }
   template <typename F>
-  client::RecorderStatus WaitFor(const F& condition) {
+  v1::RecorderStatus WaitFor(const F& condition) {
     const auto give_up = std::chrono::steady_clock::now() + kForever;
     while (std::chrono::steady_clock::now() < give_up) {
       const auto status = recordings_.Status();
@@ -102,65 +114,67 @@ class RecordingTest : public ::testing::Test {
 };
 
 TEST_F(RecordingTest, HoldsEveryFrameAsItWasSent) {
-  EXPECT_EQ(recordings_.Status()->state, RecorderState::kIdle);
-  const auto started = Start({.note = "first"});
-  EXPECT_EQ(started.state, RecorderState::kRecording);
+  EXPECT_EQ(recordings_.Status()->state(), v1::RECORDER_STATE_IDLE);
+  v1::StartRecordingRequest request;
+  request.set_note("first");
+  const auto started = Start(request);
+  EXPECT_EQ(started.state(), v1::RECORDER_STATE_RECORDING);
   Publish(0, 1, 50);
   Publish(1, 100, 120);
   const auto stopped = Stop();
-  EXPECT_EQ(stopped.state, RecorderState::kIdle);
-  EXPECT_EQ(stopped.frames, 71u);
-  EXPECT_EQ(stopped.frames_lost, 0u);
-  const auto frames = Read<v1::LinkFrame>(PathOf(stopped.log), TopicKind::kFrame, "upper");
+  EXPECT_EQ(stopped.state(), v1::RECORDER_STATE_IDLE);
+  EXPECT_EQ(stopped.frames(), 71u);
+  EXPECT_EQ(stopped.frames_lost(), 0u);
+  const auto frames = Read<v1::LinkFrame>(PathOf(stopped.log()), TopicKind::kFrame, "upper");
   ASSERT_EQ(frames.size(), 50u);
   const auto live = server_.arm().hub().Latest(0)->Encoded(Detail::kFull);
   EXPECT_EQ(frames.back().SerializeAsString(), *live);
   for (size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].sequence(), i + 1);
-  EXPECT_EQ(Read<v1::LinkFrame>(PathOf(stopped.log), TopicKind::kFrame, "lower").size(), 21u);
-  EXPECT_GE(Read<v1::Arm>(PathOf(stopped.log), TopicKind::kArm).size(), 1u);
-  EXPECT_EQ(Read<v1::RecordingLoss>(PathOf(stopped.log), TopicKind::kLosses).size(), 0u);
+  EXPECT_EQ(Read<v1::LinkFrame>(PathOf(stopped.log()), TopicKind::kFrame, "lower").size(), 21u);
+  EXPECT_GE(Read<v1::Arm>(PathOf(stopped.log()), TopicKind::kArm).size(), 1u);
+  EXPECT_EQ(Read<v1::RecordingLoss>(PathOf(stopped.log()), TopicKind::kLosses).size(), 0u);
 
   const auto logs = recordings_.List();
-  ASSERT_TRUE(logs.ok() && logs->size() == 1);
-  const client::Log& log = logs->front();
-  EXPECT_EQ(log.frames, 71u);
-  EXPECT_THAT(log.links, ::testing::UnorderedElementsAre("upper", "lower"));
-  EXPECT_EQ(log.note, "first");
-  EXPECT_FALSE(log.open);
-  EXPECT_EQ(log.problem, "");
-  EXPECT_EQ(log.bytes, fs::file_size(PathOf(log.name)));
+  ASSERT_TRUE(logs.ok() && logs->logs_size() == 1);
+  const v1::Log& log = logs->logs(0);
+  EXPECT_EQ(log.frames(), 71u);
+  EXPECT_THAT(log.links(), ::testing::UnorderedElementsAre("upper", "lower"));
+  EXPECT_EQ(log.note(), "first");
+  EXPECT_FALSE(log.open());
+  EXPECT_EQ(log.problem(), "");
+  EXPECT_EQ(log.bytes(), fs::file_size(PathOf(log.name())));
 }
 
 TEST_F(RecordingTest, OnlyTheLinksAskedFor) {
-  Start({.name = "only", .links = {"lower"}});
+  Start(RecordingOf("lower", "only"));
   Publish(0, 1, 5);
   Publish(1, 1, 3);
   const auto stopped = Stop();
-  EXPECT_THAT(stopped.log, HasSubstr("only-"));
-  EXPECT_EQ(stopped.frames, 3u);
+  EXPECT_THAT(stopped.log(), HasSubstr("only-"));
+  EXPECT_EQ(stopped.frames(), 3u);
 }
 
 TEST_F(RecordingTest, OrdersThatMakeNoSenseAreRefused) {
   EXPECT_EQ(recordings_.Stop().error().code, ErrorCode::kFailedPrecondition);
-  EXPECT_EQ(recordings_.Start({.name = "../x"}).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_EQ(recordings_.Start({.links = {"nose"}}).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(recordings_.Start(RecordingOf("", "../x")).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(recordings_.Start(RecordingOf("nose")).error().code, ErrorCode::kNotFound);
   Start();
   const auto second = recordings_.Start({});
   EXPECT_EQ(second.error().code, ErrorCode::kFailedPrecondition);
   EXPECT_THAT(second.error().message, HasSubstr("stop that first"));
-  const auto open = recordings_.List()->front();
-  EXPECT_TRUE(open.open);
-  EXPECT_EQ(recordings_.Delete(open.name).error().code, ErrorCode::kFailedPrecondition);
+  const v1::Log open = recordings_.List()->logs(0);
+  EXPECT_TRUE(open.open());
+  EXPECT_EQ(recordings_.Delete(open.name()).error().code, ErrorCode::kFailedPrecondition);
   const auto stopped = Stop();
-  EXPECT_TRUE(recordings_.Delete(stopped.log).ok());
-  EXPECT_EQ(recordings_.Delete(stopped.log).error().code, ErrorCode::kNotFound);
-  EXPECT_EQ(recordings_.List()->size(), 0u);
+  EXPECT_TRUE(recordings_.Delete(stopped.log()).ok());
+  EXPECT_EQ(recordings_.Delete(stopped.log()).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(recordings_.List()->logs_size(), 0);
 }
 
 TEST_F(RecordingTest, ALogIsDownloadedInPieces) {
-  Start({.compression = client::LogCompression::kNone});
+  Start(Uncompressed());
   Publish(0, 1, 400);
-  const std::string log = Stop().log;
+  const std::string log = Stop().log();
   const std::string whole = Content(PathOf(log));
   ASSERT_GT(whole.size(), size_t{1} << 20);
   std::string got;
@@ -187,7 +201,9 @@ TEST_F(RecordingTest, ALogIsDownloadedInPieces) {
 
 TEST_F(RecordingTest, PicturesAreThoseOfTheFrames) {
   server_.arm().Start();
-  Start({.links = {"upper"}, .pictures = true});
+  auto request = RecordingOf("upper");
+  request.set_pictures(true);
+  Start(request);
   for (uint64_t i = 1; i <= 20; ++i) {
     server_.script(0).Push([i](StereoFrame& frame) -> Result<void> {
       frame.sequence = i;
@@ -206,7 +222,7 @@ TEST_F(RecordingTest, PicturesAreThoseOfTheFrames) {
     });
   }
   server_.arm().Stop();  // the last one is with all subscribers then
-  const std::string path = PathOf(Stop().log);
+  const std::string path = PathOf(Stop().log());
   EXPECT_FALSE(server_.arm().hub().WantsPictures(0)) << "nobody reads them any more";
   auto source = mcap::FileSource::Open(path);
   const auto reader = mcap::Reader::Open(std::shared_ptr<const mcap::ByteSource>(std::move(*source)));
@@ -230,23 +246,23 @@ TEST_F(RecordingTest, ItsStatusIsToldAlsoWhileFramesComeFasterThanTheyAreWritten
   std::jthread flood([&](const std::stop_token& stop) {
     while (!stop.stop_requested()) Publish(0, published + 1, published + 1), ++published;
   });
-  const uint64_t first = WaitFor([](const auto& status) { return status.frames > 0; }).frames;
+  const uint64_t first = WaitFor([](const auto& status) { return status.frames() > 0; }).frames();
   server_.clock().Advance(std::chrono::seconds(2));
-  EXPECT_NE(WaitFor([](const auto& status) { return status.synced_utc_ns != 0; }).synced_utc_ns, 0);
+  EXPECT_NE(WaitFor([](const auto& status) { return status.synced_utc_ns() != 0; }).synced_utc_ns(), 0);
   const auto behind = WaitFor([first](const auto& status) {
-    return status.frames > first && status.state == RecorderState::kTrouble;
+    return status.frames() > first && status.state() == v1::RECORDER_STATE_TROUBLE;
   });
-  EXPECT_GT(behind.frames_lost, 0u);
-  EXPECT_THAT(behind.trouble, HasSubstr("recording.queue_mb"));
+  EXPECT_GT(behind.frames_lost(), 0u);
+  EXPECT_THAT(behind.trouble(), HasSubstr("recording.queue_mb"));
   flood.request_stop();
   flood.join();
   WaitFor([this](const auto& status) {
     server_.clock().Advance(std::chrono::seconds(2));
-    return status.state == RecorderState::kRecording;
+    return status.state() == v1::RECORDER_STATE_RECORDING;
   });
   const auto stopped = Stop();
-  EXPECT_EQ(Read<v1::LinkFrame>(PathOf(stopped.log), TopicKind::kFrame, "upper").size(), stopped.frames);
-  EXPECT_EQ(stopped.frames + stopped.frames_lost, published);
+  EXPECT_EQ(Read<v1::LinkFrame>(PathOf(stopped.log()), TopicKind::kFrame, "upper").size(), stopped.frames());
+  EXPECT_EQ(stopped.frames() + stopped.frames_lost(), published);
 }
 
 class SplitTest : public RecordingTest {
@@ -257,17 +273,18 @@ class SplitTest : public RecordingTest {
 TEST_F(SplitTest, ALogIsClosedAndTheNextBegun) {
   Start();
   Publish(0, 1, 5);
-  WaitFor([](const auto& status) { return status.frames == 5; });
+  WaitFor([](const auto& status) { return status.frames() == 5; });
   server_.clock().Advance(std::chrono::seconds(11));
-  WaitFor([](const auto& status) { return status.logs == 2; });
+  WaitFor([](const auto& status) { return status.logs() == 2; });
   Publish(0, 6, 8);
   const auto stopped = Stop();
-  EXPECT_EQ(stopped.frames, 8u);
+  EXPECT_EQ(stopped.frames(), 8u);
   const auto logs = recordings_.List();
-  ASSERT_EQ(logs->size(), 2u);
-  EXPECT_EQ((*logs)[0].frames, 5u);
-  EXPECT_EQ((*logs)[1].frames, 3u);
-  for (const auto& log : *logs) EXPECT_GE(Read<v1::Arm>(PathOf(log.name), TopicKind::kArm).size(), 1u);
+  ASSERT_EQ(logs->logs_size(), 2);
+  EXPECT_EQ(logs->logs(0).frames(), 5u);
+  EXPECT_EQ(logs->logs(1).frames(), 3u);
+  for (const auto& log : logs->logs())
+    EXPECT_GE(Read<v1::Arm>(PathOf(log.name()), TopicKind::kArm).size(), 1u);
 }
 
 /// Files of this process can't grow beyond a limit: as a full disk, but for the error's name.
@@ -287,28 +304,29 @@ class FileLimit {
 };
 
 TEST_F(RecordingTest, WhatTheDiskDoesNotTakeIsNamed) {
-  Start({.compression = client::LogCompression::kNone});
+  Start(Uncompressed());
   Publish(0, 1, 10);
-  WaitFor([](const auto& status) { return status.frames == 10; });
+  WaitFor([](const auto& status) { return status.frames() == 10; });
   server_.clock().Advance(std::chrono::seconds(2));
-  const auto synced = WaitFor([](const auto& status) { return status.synced_utc_ns != 0; });
+  const auto synced = WaitFor([](const auto& status) { return status.synced_utc_ns() != 0; });
   {
-    const FileLimit full(fs::file_size(PathOf(synced.log) + ".part"));
+    const FileLimit full(fs::file_size(PathOf(synced.log()) + ".part"));
     Publish(0, 11, 14);
     server_.clock().Advance(std::chrono::seconds(2));
-    const auto trouble = WaitFor([](const auto& status) { return status.state == RecorderState::kTrouble; });
-    EXPECT_THAT(trouble.trouble, HasSubstr(synced.log));
-    EXPECT_EQ(WaitFor([](const auto& status) { return status.frames_lost == 4; }).frames_lost, 4u);
+    const auto trouble =
+        WaitFor([](const auto& status) { return status.state() == v1::RECORDER_STATE_TROUBLE; });
+    EXPECT_THAT(trouble.trouble(), HasSubstr(synced.log()));
+    EXPECT_EQ(WaitFor([](const auto& status) { return status.frames_lost() == 4; }).frames_lost(), 4u);
   }
   server_.clock().Advance(std::chrono::seconds(2));
-  WaitFor([](const auto& status) { return status.state == RecorderState::kRecording; });
+  WaitFor([](const auto& status) { return status.state() == v1::RECORDER_STATE_RECORDING; });
   Publish(0, 15, 20);
   const auto stopped = Stop();
-  EXPECT_EQ(stopped.frames_lost, 4u);
-  EXPECT_EQ(stopped.frames, 16u);
-  const auto frames = Read<v1::LinkFrame>(PathOf(stopped.log), TopicKind::kFrame, "upper");
+  EXPECT_EQ(stopped.frames_lost(), 4u);
+  EXPECT_EQ(stopped.frames(), 16u);
+  const auto frames = Read<v1::LinkFrame>(PathOf(stopped.log()), TopicKind::kFrame, "upper");
   EXPECT_EQ(frames.size(), 16u);
-  const auto losses = Read<v1::RecordingLoss>(PathOf(stopped.log), TopicKind::kLosses);
+  const auto losses = Read<v1::RecordingLoss>(PathOf(stopped.log()), TopicKind::kLosses);
   ASSERT_EQ(losses.size(), 1u);
   EXPECT_EQ(losses[0].link(), "upper");
   EXPECT_EQ(losses[0].count(), 4u);

@@ -25,7 +25,9 @@ class ReplayPicturesTest : public ::testing::Test {
  protected:
   std::string Record(bool pictures) {
     server_.arm().Start();
-    EXPECT_TRUE(recordings_.Start({.pictures = pictures}).ok());
+    v1::StartRecordingRequest request;
+    request.set_pictures(pictures);
+    EXPECT_TRUE(recordings_.Start(request).ok());
     const auto published = Stream(client_, Every());
     const int64_t begin_ns = server_.clock().MonotonicNs();
     for (uint64_t i = 1; i <= 20; ++i) {
@@ -44,11 +46,11 @@ class ReplayPicturesTest : public ::testing::Test {
         return {};
       });
       // A worker that is busy passes over all frames but the newest.
-      for (client::Frame frame; !HasFailure() && (frame.link != "upper" || frame.sequence < i);)
+      for (v1::LinkFrame frame; !HasFailure() && (frame.link() != "upper" || frame.sequence() < i);)
         frame = NextOf(*published);
     }
     server_.arm().Stop();
-    return recordings_.Stop()->log;
+    return recordings_.Stop()->log();
   }
   ~ReplayPicturesTest() override {
     context_.TryCancel();

@@ -22,37 +22,34 @@ namespace taclink::server {
 namespace {
 
 namespace fs = std::filesystem;
-using client::Frame;
-using client::ReplayMessage;
-using client::ReplayOptions;
 using client::ReplayReader;
-using client::ReplayStatus;
 using std::chrono::milliseconds;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 /// Everything that a replay has until it ends.
 struct Played {
-  std::vector<ReplayStatus> statuses;
-  std::vector<Frame> frames;
-  std::vector<client::ArmContacts> contacts;
-  std::vector<client::Event> events;
-  std::vector<client::Arm> arms;
-  std::vector<client::ReplayLoss> losses;
+  std::vector<v1::ReplayStatus> statuses;
+  std::vector<v1::LinkFrame> frames;
+  std::vector<v1::StreamContactsResponse> contacts;
+  std::vector<v1::Event> events;
+  std::vector<v1::Arm> arms;
+  std::vector<v1::RecordingLoss> losses;
   std::vector<int64_t> log_times;
 
-  void operator()(const ReplayStatus& status) { statuses.push_back(status); }
-  void operator()(const Frame& frame) { frames.push_back(frame); }
-  void operator()(const client::ArmContacts& all) { contacts.push_back(all); }
-  void operator()(const client::Event& event) { events.push_back(event); }
-  void operator()(const client::Arm& arm) { arms.push_back(arm); }
-  void operator()(const client::ReplayLoss& loss) { losses.push_back(loss); }
+  void Take(const v1::ReplayResponse& message) {
+    log_times.push_back(message.log_utc_ns());
+    if (message.has_status()) statuses.push_back(message.status());
+    if (message.has_frame()) frames.push_back(message.frame());
+    if (message.has_contacts()) contacts.push_back(message.contacts());
+    if (message.has_event()) events.push_back(message.event());
+    if (message.has_arm()) arms.push_back(message.arm());
+    if (message.has_loss()) losses.push_back(message.loss());
+  }
 
   std::vector<uint64_t> sequences(const std::string& link) const {
     std::vector<uint64_t> out;
-    for (const Frame& frame : frames) {
-      if (frame.link == link) out.push_back(frame.sequence);
+    for (const v1::LinkFrame& frame : frames) {
+      if (frame.link() == link) out.push_back(frame.sequence());
     }
     return out;
   }
@@ -66,20 +63,45 @@ Played PlayAll(ReplayReader& reader) {
       EXPECT_EQ(message.error().code, ErrorCode::kEndOfData) << message.error().message;
       return out;
     }
-    out.log_times.push_back(message->log_utc_ns);
-    std::visit(out, message->content);
+    out.Take(*message);
   }
 }
 
-/// The next message of a kind; all others are passed over.
-template <typename T>
-T NextOf(ReplayReader& reader) {
+/// The next message with `wanted`; all others are passed over.
+v1::ReplayResponse NextWith(ReplayReader& reader, v1::ReplayResponse::MessageCase wanted) {
   while (true) {
     const auto message = reader.Next(kForever);
     EXPECT_TRUE(message.ok()) << message.error().message;
-    if (!message) return T();
-    if (const T* content = std::get_if<T>(&message->content)) return *content;
+    if (!message || message->message_case() == wanted) return message ? *message : v1::ReplayResponse();
   }
+}
+v1::ReplayStatus NextStatus(ReplayReader& reader) {
+  return NextWith(reader, v1::ReplayResponse::kStatus).status();
+}
+uint64_t NextSequence(ReplayReader& reader) {
+  return NextWith(reader, v1::ReplayResponse::kFrame).frame().sequence();
+}
+
+/// All of a log, as fast as it is read.
+v1::ReplayRequest WholeOf(const std::string& log, double speed = 0) {
+  v1::ReplayRequest request;
+  request.set_log(log);
+  request.set_detail(v1::DETAIL_FULL);
+  request.set_speed(speed);
+  return request;
+}
+v1::ReplayRequest OfLink(const std::string& link, const std::string& log, double speed = 0) {
+  v1::ReplayRequest request = WholeOf(log, speed);
+  request.add_links(link);
+  return request;
+}
+/// Only the frames of "upper".
+v1::ReplayRequest FramesOf(const std::string& log, double speed = 0) {
+  v1::ReplayRequest request = OfLink("upper", log, speed);
+  request.set_without_events(true);
+  request.set_without_contacts(true);
+  request.set_without_arm(true);
+  return request;
 }
 
 class ReplayTest : public ::testing::Test {
@@ -105,11 +127,11 @@ class ReplayTest : public ::testing::Test {
       server_.clock().Advance(milliseconds(10));
     }
     const auto stopped = recordings_.Stop();
-    EXPECT_TRUE(stopped.ok() && stopped->frames == frames + frames / 10);
-    return stopped->log;
+    EXPECT_TRUE(stopped.ok() && stopped->frames() == frames + frames / 10);
+    return stopped->log();
   }
-  std::unique_ptr<ReplayReader> Play(const ReplayOptions& options) {
-    auto reader = recordings_.Replay(options);
+  std::unique_ptr<ReplayReader> Play(const v1::ReplayRequest& request) {
+    auto reader = recordings_.Replay(request);
     EXPECT_TRUE(reader.ok()) << reader.error().message;
     return reader.ok() ? std::move(*reader) : nullptr;
   }
@@ -120,9 +142,9 @@ class ReplayTest : public ::testing::Test {
       std::this_thread::sleep_for(milliseconds(1));
     EXPECT_EQ(server_.server().streams(), 0u);
   }
-  ErrorCode Refusal(const ReplayOptions& options) {
+  ErrorCode Refusal(const v1::ReplayRequest& request) {
     WaitForNoStreams();
-    auto reader = recordings_.Replay(options);
+    auto reader = recordings_.Replay(request);
     EXPECT_FALSE(reader.ok());
     return reader.error().code;
   }
@@ -160,104 +182,94 @@ TEST_F(ReplayTest, FramesAreThoseThatWereSent) {
 
 TEST_F(ReplayTest, AllThatTheLogHoldsComesInOrder) {
   const std::string log = Record(40);
-  const auto reader = Play({.log = log, .speed = 0});
+  const auto reader = Play(WholeOf(log));
   const Played played = PlayAll(*reader);
   EXPECT_EQ(played.sequences("upper").size(), 40u);
   EXPECT_THAT(played.sequences("lower"), ElementsAre(10, 20, 30, 40));
   EXPECT_TRUE(std::is_sorted(played.log_times.begin() + 1, played.log_times.end() - 1));
   EXPECT_GE(played.contacts.size(), 1u);
   EXPECT_GE(played.arms.size(), 1u);
-  EXPECT_THAT(played.losses, IsEmpty());
-  EXPECT_TRUE(played.frames[0].replayed);
-  EXPECT_FALSE(played.frames[0].latency_s());
-  EXPECT_EQ(played.frames[0].positions_m.size(), 256u);
+  EXPECT_TRUE(played.losses.empty());
+  EXPECT_TRUE(played.frames[0].replayed());
+  EXPECT_FALSE(client::LatencyS(played.frames[0]));
+  EXPECT_EQ(played.frames[0].positions_m_size(), 3 * 256);
   ASSERT_GE(played.statuses.size(), 2u);
-  EXPECT_FALSE(played.statuses.front().ended);
-  const ReplayStatus& last = played.statuses.back();
-  EXPECT_TRUE(last.ended);
-  EXPECT_EQ(last.position_utc_ns, last.to_utc_ns);
-  EXPECT_EQ(last.damaged, 0u);
+  EXPECT_FALSE(played.statuses.front().ended());
+  const v1::ReplayStatus& last = played.statuses.back();
+  EXPECT_TRUE(last.ended());
+  EXPECT_EQ(last.position_utc_ns(), last.to_utc_ns());
+  EXPECT_EQ(last.damaged(), 0u);
 }
 
 TEST_F(ReplayTest, OnlyWhatWasAskedFor) {
   const std::string log = Record(40);
-  const auto whole = NextOf<ReplayStatus>(*Play({.log = log, .speed = 0}));
-  const auto reader = Play({.log = log,
-                            .links = {"upper"},
-                            .detail = client::Detail::kContacts,
-                            .from_utc_ns = whole.from_utc_ns + 95 * kMs,
-                            .to_utc_ns = whole.from_utc_ns + 205 * kMs,
-                            .speed = 0,
-                            .events = false,
-                            .contacts = false,
-                            .arm = false});
+  const int64_t begin_utc_ns = NextStatus(*Play(WholeOf(log))).from_utc_ns();
+  auto request = FramesOf(log);
+  request.set_detail(v1::DETAIL_CONTACTS);
+  request.set_from_utc_ns(begin_utc_ns + 95 * kMs);
+  request.set_to_utc_ns(begin_utc_ns + 205 * kMs);
+  const auto reader = Play(request);
   const Played played = PlayAll(*reader);
   const auto upper = played.sequences("upper");
   EXPECT_EQ(upper.size(), 11u);
   EXPECT_EQ(played.frames.size(), 11u);
-  EXPECT_THAT(played.frames[0].positions_m, IsEmpty());
-  EXPECT_EQ(played.frames[0].contacts.size(), 1u);
+  EXPECT_EQ(played.frames[0].positions_m_size(), 0);
+  EXPECT_EQ(played.frames[0].contacts_size(), 1);
   EXPECT_EQ(played.events.size() + played.contacts.size() + played.arms.size(), 0u);
 }
 
 TEST_F(ReplayTest, WhatCannotBePlayedIsRefused) {
   const std::string log = Record(10);
-  EXPECT_EQ(Refusal({.log = "none.mcap"}), ErrorCode::kNotFound);
-  EXPECT_EQ(Refusal({.log = "../" + log}), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(Refusal({.log = log, .links = {"nose"}}), ErrorCode::kNotFound);
-  EXPECT_EQ(Refusal({.log = log, .speed = 101}), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(Refusal({.log = log, .speed = -1}), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(Refusal({.log = log, .from_utc_ns = 2, .to_utc_ns = 1}), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(Refusal(WholeOf("none.mcap")), ErrorCode::kNotFound);
+  EXPECT_EQ(Refusal(WholeOf("../" + log)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(Refusal(OfLink("nose", log)), ErrorCode::kNotFound);
+  EXPECT_EQ(Refusal(WholeOf(log, 101)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(Refusal(WholeOf(log, -1)), ErrorCode::kInvalidArgument);
+  auto backwards = WholeOf(log);
+  backwards.set_from_utc_ns(2);
+  backwards.set_to_utc_ns(1);
+  EXPECT_EQ(Refusal(backwards), ErrorCode::kInvalidArgument);
   std::ofstream(folder_ + "/text.mcap") << "this is no log at all";
-  EXPECT_EQ(Refusal({.log = "text.mcap"}), ErrorCode::kInternal) << "DATA_LOSS";
+  EXPECT_EQ(Refusal(WholeOf("text.mcap")), ErrorCode::kInternal) << "DATA_LOSS";
 }
 
 TEST_F(ReplayTest, OrdersAreCarriedOut) {
   const std::string log = Record(200);
-  const auto reader = Play({.log = log,
-                            .links = {"upper"},
-                            .speed = 1,
-                            .paused = true,
-                            .events = false,
-                            .contacts = false,
-                            .arm = false});
-  const auto first = NextOf<ReplayStatus>(*reader);
-  EXPECT_TRUE(first.paused);
-  EXPECT_EQ(first.position_utc_ns, first.from_utc_ns);
+  auto request = FramesOf(log, 1);
+  request.set_paused(true);
+  const auto reader = Play(request);
+  const auto first = NextStatus(*reader);
+  EXPECT_TRUE(first.paused());
+  EXPECT_EQ(first.position_utc_ns(), first.from_utc_ns());
   EXPECT_EQ(reader->SetSpeed(1000).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(reader->Step(0).error().code, ErrorCode::kInvalidArgument);
 
   ASSERT_TRUE(reader->Step(3).ok());
-  for (uint64_t i = 1; i <= 3; ++i) EXPECT_EQ(NextOf<Frame>(*reader).sequence, i);
+  for (uint64_t i = 1; i <= 3; ++i) EXPECT_EQ(NextSequence(*reader), i);
 
-  ASSERT_TRUE(reader->Seek(first.from_utc_ns + 1005 * kMs).ok());
-  auto status = NextOf<ReplayStatus>(*reader);
-  while (status.position_utc_ns < first.from_utc_ns + 1005 * kMs) status = NextOf<ReplayStatus>(*reader);
-  EXPECT_TRUE(status.paused);
-  const uint64_t shown = NextOf<Frame>(*reader).sequence;
+  ASSERT_TRUE(reader->Seek(first.from_utc_ns() + 1005 * kMs).ok());
+  auto status = NextStatus(*reader);
+  while (status.position_utc_ns() < first.from_utc_ns() + 1005 * kMs) status = NextStatus(*reader);
+  EXPECT_TRUE(status.paused());
+  const uint64_t shown = NextSequence(*reader);
   EXPECT_NEAR(static_cast<double>(shown), 101, 1) << "the newest before that place";
 
   ASSERT_TRUE(reader->SetSpeed(0).ok());
   ASSERT_TRUE(reader->Resume().ok());
-  for (uint64_t i = shown + 1; i <= 200; ++i) EXPECT_EQ(NextOf<Frame>(*reader).sequence, i);
+  for (uint64_t i = shown + 1; i <= 200; ++i) EXPECT_EQ(NextSequence(*reader), i);
 }
 
 TEST_F(ReplayTest, ARangeIsPlayedAgainAndAgain) {
   const std::string log = Record(20);
-  const auto reader = Play({.log = log,
-                            .links = {"upper"},
-                            .speed = 0,
-                            .loop = true,
-                            .events = false,
-                            .contacts = false,
-                            .arm = false});
+  auto request = FramesOf(log);
+  request.set_loop(true);
+  const auto reader = Play(request);
   for (int round = 0; round < 3; ++round) {
-    for (uint64_t i = 1; i <= 20; ++i) EXPECT_EQ(NextOf<Frame>(*reader).sequence, i);
-    auto status = NextOf<ReplayStatus>(*reader);
-    EXPECT_EQ(status.loops, static_cast<uint64_t>(round + 1));
+    for (uint64_t i = 1; i <= 20; ++i) EXPECT_EQ(NextSequence(*reader), i);
+    EXPECT_EQ(NextStatus(*reader).loops(), static_cast<uint64_t>(round + 1));
   }
   ASSERT_TRUE(reader->SetLoop(false).ok());
-  EXPECT_TRUE(PlayAll(*reader).statuses.back().ended);
+  EXPECT_TRUE(PlayAll(*reader).statuses.back().ended());
 }
 
 TEST_F(ReplayTest, PlayersAreSteeredByTheirIdOnly) {
@@ -311,8 +323,8 @@ TEST_F(ReplayTest, PlayersAreSteeredByTheirIdOnly) {
 
 TEST_F(ReplayTest, TwoPlayersAtOnceGoTheirOwnWays) {
   const std::string log = Record(60);
-  const auto slow = Play({.log = log, .links = {"upper"}, .speed = 4});
-  const auto fast = Play({.log = log, .links = {"lower"}, .speed = 0});
+  const auto slow = Play(OfLink("upper", log, 4));
+  const auto fast = Play(OfLink("lower", log));
   auto all = std::async(std::launch::async, [&] { return PlayAll(*slow); });
   EXPECT_THAT(PlayAll(*fast).sequences("lower"), ElementsAre(10, 20, 30, 40, 50, 60));
   EXPECT_EQ(all.get().sequences("upper").size(), 60u);
@@ -321,8 +333,10 @@ TEST_F(ReplayTest, TwoPlayersAtOnceGoTheirOwnWays) {
 TEST_F(ReplayTest, AClientThatVanishesLeavesNothingBehind) {
   const std::string log = Record(400);
   for (const double speed : {0.0, 1.0, 0.1}) {
-    auto reader = Play({.log = log, .speed = speed, .loop = true});
-    NextOf<Frame>(*reader);
+    auto request = WholeOf(log, speed);
+    request.set_loop(true);
+    auto reader = Play(request);
+    NextSequence(*reader);
     reader.reset();
   }
   WaitForNoStreams();
@@ -330,9 +344,8 @@ TEST_F(ReplayTest, AClientThatVanishesLeavesNothingBehind) {
 
 TEST_F(ReplayTest, AClientThatDoesNotReadSlowsItAndLosesNothing) {
   const std::string log = Record(400);
-  const auto reader =
-      Play({.log = log, .links = {"upper"}, .speed = 0, .events = false, .contacts = false, .arm = false});
-  NextOf<Frame>(*reader);
+  const auto reader = Play(FramesOf(log));
+  NextSequence(*reader);
   std::this_thread::sleep_for(milliseconds(200));  // the transport's buffers fill
   const auto rest = PlayAll(*reader).sequences("upper");
   ASSERT_EQ(rest.size(), 399u);
@@ -341,8 +354,10 @@ TEST_F(ReplayTest, AClientThatDoesNotReadSlowsItAndLosesNothing) {
 
 TEST_F(ReplayTest, AServerThatStopsEndsIt) {
   const std::string log = Record(20);
-  const auto reader = Play({.log = log, .speed = 1, .loop = true});
-  NextOf<Frame>(*reader);
+  auto request = WholeOf(log, 1);
+  request.set_loop(true);
+  const auto reader = Play(request);
+  NextSequence(*reader);
   std::thread stopper([&] { server_.Stop(); });
   while (true) {
     const auto message = reader->Next(kForever);
@@ -356,8 +371,7 @@ TEST_F(ReplayTest, AServerThatStopsEndsIt) {
 // How far from its due time each frame comes at speed 1. Printed, for no machine is always idle.
 TEST_F(ReplayTest, TellsItsTiming) {
   const std::string log = Record(200);
-  const auto reader =
-      Play({.log = log, .links = {"upper"}, .speed = 1, .events = false, .contacts = false, .arm = false});
+  const auto reader = Play(FramesOf(log, 1));
   std::vector<double> offsets_ms;
   double told_ms = 0;
   while (true) {
@@ -366,10 +380,9 @@ TEST_F(ReplayTest, TellsItsTiming) {
     const double now_ms =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch())
             .count();
-    if (const auto* status = std::get_if<ReplayStatus>(&message->content))
-      told_ms = std::max(told_ms, status->lateness_s * 1e3);
-    if (std::holds_alternative<Frame>(message->content))
-      offsets_ms.push_back(now_ms - static_cast<double>(message->log_utc_ns) * 1e-6);
+    told_ms = std::max(told_ms, message->status().lateness_s() * 1e3);
+    if (message->has_frame())
+      offsets_ms.push_back(now_ms - static_cast<double>(message->log_utc_ns()) * 1e-6);
   }
   ASSERT_EQ(offsets_ms.size(), 200u);
   std::sort(offsets_ms.begin(), offsets_ms.end());

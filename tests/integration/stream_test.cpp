@@ -11,9 +11,6 @@
 namespace taclink::server {
 namespace {
 
-using client::Delivery;
-using client::Detail;
-using client::Frame;
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 
@@ -21,35 +18,36 @@ TEST(Stream, FramesOfTwoLinksReachTwoClientsInOrder) {
   TestServer server;
   auto a = server.Connect(), b = server.Connect();
   const auto all = Stream(a, Every());
-  auto only_lower = Every(Detail::kFull);
-  only_lower.links = {"lower"};
+  auto only_lower = Every(v1::DETAIL_FULL);
+  only_lower.add_links("lower");
   const auto lower = Stream(b, only_lower);
   server.arm().Start();
   for (uint64_t i = 1; i <= 20; ++i) {
     for (size_t link = 0; link < 2; ++link) {
       server.script(link).Push(i, server.clock().MonotonicNs());
-      Frame frame = NextOf(*all);
-      while (frame.times.exposure_ns == 0) frame = NextOf(*all);  // status before the first picture
-      EXPECT_EQ(frame.link_index, static_cast<int>(link));
-      EXPECT_EQ(frame.link, link == 0 ? "upper" : "lower");
-      EXPECT_EQ(frame.sequence, i);
+      v1::LinkFrame frame = NextOf(*all);
+      while (frame.times().exposure_ns() == 0) frame = NextOf(*all);  // status before the first picture
+      EXPECT_EQ(frame.link_index(), link);
+      EXPECT_EQ(frame.link(), link == 0 ? "upper" : "lower");
+      EXPECT_EQ(frame.sequence(), i);
     }
-    Frame frame = NextOf(*lower);
-    while (frame.times.exposure_ns == 0) frame = NextOf(*lower);
-    EXPECT_EQ(frame.link, "lower");
-    EXPECT_EQ(frame.sequence, i);
-    EXPECT_EQ(frame.status, client::LinkStatus::kOk);
-    ASSERT_EQ(frame.positions_m.size(), 256u);
-    EXPECT_NEAR(frame.positions_m[9][0], 1e-3 * static_cast<double>(i), 1e-8);
-    EXPECT_NEAR(frame.positions_m[9][1], 1e-3, 1e-8);
-    ASSERT_EQ(frame.contacts.size(), 1u);
-    EXPECT_EQ(frame.contacts[0].id, 7u);
-    EXPECT_NEAR(frame.contacts[0].center_m[0], 0.0365, 1e-9);
-    EXPECT_NEAR(frame.contacts[0].normal_force_n, 0.1 * static_cast<double>(i), 1e-9);
-    EXPECT_NEAR(frame.contacts[0].area_m2, 100e-6, 1e-12);
-    EXPECT_NEAR(frame.pressure_pa.value(), 1e3 * static_cast<double>(i), 1e-6);
-    EXPECT_NEAR(frame.displacement_covariances_m2[0][3], 1e-6, 1e-12);
-    EXPECT_TRUE(frame.latency_s().has_value());
+    v1::LinkFrame frame = NextOf(*lower);
+    while (frame.times().exposure_ns() == 0) frame = NextOf(*lower);
+    EXPECT_EQ(frame.link(), "lower");
+    EXPECT_EQ(frame.sequence(), i);
+    EXPECT_EQ(frame.status(), v1::LINK_STATUS_OK);
+    const auto positions_m = client::Points(frame.positions_m());
+    ASSERT_EQ(positions_m.size(), 256u);
+    EXPECT_NEAR(positions_m[9][0], 1e-3 * static_cast<double>(i), 1e-8);
+    EXPECT_NEAR(positions_m[9][1], 1e-3, 1e-8);
+    ASSERT_EQ(frame.contacts_size(), 1);
+    EXPECT_EQ(frame.contacts(0).id(), 7u);
+    EXPECT_NEAR(frame.contacts(0).center_m().x(), 0.0365, 1e-9);
+    EXPECT_NEAR(frame.contacts(0).normal_force_n(), 0.1 * static_cast<double>(i), 1e-9);
+    EXPECT_NEAR(frame.contacts(0).area_m2(), 100e-6, 1e-12);
+    EXPECT_NEAR(frame.pressure_pa(), 1e3 * static_cast<double>(i), 1e-6);
+    EXPECT_NEAR(static_cast<double>(frame.displacement_covariances_m2(3)), 1e-6, 1e-12);
+    EXPECT_TRUE(client::LatencyS(frame).has_value());
   }
 }
 
@@ -58,29 +56,30 @@ TEST(Stream, GetArmTellsAllThereIsToDrawIt) {
   auto client = server.Connect();
   auto arm = client.GetArm();
   ASSERT_TRUE(arm.ok()) << arm.error().message;
-  EXPECT_EQ(arm->links[0].status, client::LinkStatus::kStarting);
+  EXPECT_EQ(arm->links(0).status(), v1::LINK_STATUS_STARTING);
   server.arm().Start();
   const auto reader = Stream(client, Every());
   server.script(0).Push(1, server.clock().MonotonicNs());
-  while (NextOf(*reader).times.exposure_ns == 0) {
+  while (NextOf(*reader).times().exposure_ns() == 0) {
   }
   arm = client.GetArm();
   ASSERT_TRUE(arm.ok()) << arm.error().message;
-  EXPECT_EQ(arm->name, "test");
-  EXPECT_FALSE(arm->server_version.empty());
-  ASSERT_EQ(arm->links.size(), 2u);
-  EXPECT_EQ(arm->links[0].name, "upper");
-  EXPECT_EQ(arm->links[0].status, client::LinkStatus::kOk);
-  EXPECT_EQ(arm->links[0].contacts, 1);
-  EXPECT_EQ(arm->links[0].source_description, "fake");
-  EXPECT_EQ(arm->links[0].source, client::SourceKind::kSimulated);
-  EXPECT_NEAR(arm->links[1].base_from_link.translation_m[2], 0.25, 1e-12);
-  EXPECT_EQ(arm->links[1].base_from_link.rotation_xyzw[3], 1);
-  const auto& model = arm->links[1].model;
-  EXPECT_EQ(model.name, "barrel");
-  EXPECT_EQ(model.rest_positions_m.size(), static_cast<size_t>(model.paths * model.rings));
-  EXPECT_EQ(model.ring_z_m.size(), static_cast<size_t>(model.rings));
-  EXPECT_EQ(model.profile_z_m.size(), model.profile_radius_m.size());
+  EXPECT_EQ(arm->name(), "test");
+  EXPECT_FALSE(arm->server_version().empty());
+  ASSERT_EQ(arm->links_size(), 2);
+  EXPECT_EQ(arm->links(0).name(), "upper");
+  EXPECT_EQ(arm->links(0).status(), v1::LINK_STATUS_OK);
+  EXPECT_EQ(arm->links(0).statistics().contacts(), 1u);
+  EXPECT_EQ(arm->links(0).source().description(), "fake");
+  EXPECT_EQ(arm->links(0).source().kind(), v1::SOURCE_KIND_SIMULATED);
+  EXPECT_NEAR(arm->links(1).base_from_link().translation_m().z(), 0.25, 1e-12);
+  EXPECT_EQ(arm->links(1).base_from_link().rotation().w(), 1);
+  const v1::LinkModel& model = arm->links(1).model();
+  const v1::MarkerGrid& markers = model.markers();
+  EXPECT_EQ(model.name(), "barrel");
+  EXPECT_EQ(client::Points(markers.rest_positions_m()).size(), markers.paths() * markers.rings());
+  EXPECT_EQ(markers.ring_z_m_size(), static_cast<int>(markers.rings()));
+  EXPECT_EQ(model.profile_z_m_size(), model.profile_radius_m_size());
 }
 
 TEST(Stream, GetArmTellsHowTheCamerasDo) {
@@ -99,87 +98,89 @@ TEST(Stream, GetArmTellsHowTheCamerasDo) {
   const auto reader = Stream(client, Every());
   server.arm().Start();
   server.script(1).Push(1, server.clock().MonotonicNs());
-  while (NextOf(*reader).times.exposure_ns == 0) {
+  while (NextOf(*reader).times().exposure_ns() == 0) {
   }
   const auto arm = client.GetArm();
   ASSERT_TRUE(arm.ok()) << arm.error().message;
-  EXPECT_TRUE(arm->links[0].cameras.empty());
-  EXPECT_EQ(arm->links[1].pairs_skipped, 9u);
-  ASSERT_EQ(arm->links[1].cameras.size(), 2u);
-  const client::Camera& top = arm->links[1].cameras[0];
-  const client::Camera& bottom = arm->links[1].cameras[1];
-  EXPECT_EQ(top.name, "top");
-  EXPECT_EQ(top.configured, "usb:1");
-  EXPECT_EQ(top.device, "/dev/video0");
-  EXPECT_EQ(top.format, "YUYV 640x480");
-  EXPECT_EQ(top.rate_hz, 29.5);
-  EXPECT_EQ(bottom.name, "bottom");
-  EXPECT_EQ(bottom.trouble, "unplugged");
-  EXPECT_EQ(bottom.pictures, 12u);
-  EXPECT_EQ(bottom.lost, 2u);
-  EXPECT_EQ(bottom.damaged, 4u);
-  EXPECT_EQ(bottom.unpaired, 6u);
-  EXPECT_EQ(bottom.stamped_on_arrival, 8u);
+  EXPECT_TRUE(arm->links(0).cameras().empty());
+  EXPECT_EQ(arm->links(1).statistics().pairs_skipped(), 9u);
+  ASSERT_EQ(arm->links(1).cameras_size(), 2);
+  const v1::Camera& top = arm->links(1).cameras(0);
+  const v1::Camera& bottom = arm->links(1).cameras(1);
+  EXPECT_EQ(top.name(), "top");
+  EXPECT_EQ(top.configured(), "usb:1");
+  EXPECT_EQ(top.device(), "/dev/video0");
+  EXPECT_EQ(top.format(), "YUYV 640x480");
+  EXPECT_EQ(top.rate_hz(), 29.5);
+  EXPECT_EQ(bottom.name(), "bottom");
+  EXPECT_EQ(bottom.trouble(), "unplugged");
+  EXPECT_EQ(bottom.pictures(), 12u);
+  EXPECT_EQ(bottom.lost(), 2u);
+  EXPECT_EQ(bottom.damaged(), 4u);
+  EXPECT_EQ(bottom.unpaired(), 6u);
+  EXPECT_EQ(bottom.stamped_on_arrival(), 8u);
 }
 
 TEST(Stream, EachLevelOfDetailHoldsWhatItPromises) {
   TestServer server;
   auto client = server.Connect();
-  const auto contacts = Stream(client, Every(Detail::kContacts));
-  const auto geometry = Stream(client, Every(Detail::kGeometry));
-  const auto full = Stream(client, Every(Detail::kFull));
+  const auto contacts = Stream(client, Every(v1::DETAIL_CONTACTS));
+  const auto geometry = Stream(client, Every(v1::DETAIL_GEOMETRY));
+  const auto full = Stream(client, Every(v1::DETAIL_FULL));
   server.Publish(0, 1);
-  const Frame c = NextOf(*contacts), g = NextOf(*geometry), f = NextOf(*full);
-  EXPECT_EQ(c.contacts.size(), 1u);
-  EXPECT_EQ(c.markers_seen, 256);
-  EXPECT_TRUE(c.positions_m.empty());
-  EXPECT_EQ(g.contacts.size(), 1u);
-  EXPECT_EQ(g.positions_m.size(), 256u);
-  EXPECT_TRUE(g.nodal_forces_n.empty());
-  EXPECT_EQ(f.positions_m, g.positions_m);
-  EXPECT_EQ(f.displacements_m.size(), 256u);
-  EXPECT_EQ(f.displacement_covariances_m2.size(), 256u);
-  EXPECT_EQ(f.nodal_forces_n.size(), 256u);
-  EXPECT_EQ(f.nodal_force_sigmas_n.size(), 256u);
-  EXPECT_EQ(f.marker_sources.size(), 256u);
+  const v1::LinkFrame c = NextOf(*contacts), g = NextOf(*geometry), f = NextOf(*full);
+  EXPECT_EQ(c.contacts_size(), 1);
+  EXPECT_EQ(c.markers_seen(), 256u);
+  EXPECT_TRUE(c.positions_m().empty());
+  EXPECT_EQ(g.contacts_size(), 1);
+  EXPECT_EQ(g.positions_m_size(), 3 * 256);
+  EXPECT_TRUE(g.nodal_forces_n().empty());
+  EXPECT_EQ(client::Points(f.positions_m()), client::Points(g.positions_m()));
+  EXPECT_EQ(f.displacements_m_size(), 3 * 256);
+  EXPECT_EQ(f.displacement_covariances_m2_size(), 6 * 256);
+  EXPECT_EQ(f.nodal_forces_n_size(), 3 * 256);
+  EXPECT_EQ(f.nodal_force_sigmas_n_size(), 256);
+  EXPECT_EQ(f.marker_sources_size(), 256);
 }
 
 TEST(Stream, RateLimitLeavesOutFramesWithoutCountingThem) {
   TestServer server;
   auto client = server.Connect();
-  auto options = Every();
-  options.max_rate_hz = 10;
-  const auto limited = Stream(client, options);
+  auto request = Every();
+  request.set_max_rate_hz(10);
+  const auto limited = Stream(client, request);
   for (uint64_t i = 0; i < 90; ++i)
     server.Publish(0, i, 1'000'000'000 + static_cast<int64_t>(i) * 33'333'334);
-  for (uint64_t i = 0; i < 30; ++i) EXPECT_EQ(NextOf(*limited).sequence, 3 * i);
+  for (uint64_t i = 0; i < 30; ++i) EXPECT_EQ(NextOf(*limited).sequence(), 3 * i);
   server.Stop();
   EXPECT_FALSE(limited->Next(kForever).ok());
-  ASSERT_EQ(limited->counts().size(), 2u);
-  EXPECT_EQ(limited->counts()[0].frames_sent, 30u);
-  EXPECT_EQ(limited->counts()[0].frames_dropped, 0u);
+  ASSERT_EQ(limited->status().links_size(), 2);
+  EXPECT_EQ(limited->status().links(0).frames_sent(), 30u);
+  EXPECT_EQ(limited->status().links(0).frames_dropped(), 0u);
 }
 
 TEST(Stream, LatestBeginsWithTheNewest) {
   TestServer server;
   for (uint64_t i = 1; i <= 5; ++i) server.Publish(0, i);
   auto client = server.Connect();
-  const auto latest = Stream(client, {.delivery = Delivery::kLatest});
-  EXPECT_EQ(NextOf(*latest).sequence, 5u);
+  const auto latest = Stream(client, {});
+  EXPECT_EQ(NextOf(*latest).sequence(), 5u);
 }
 
 // One client stops reading and then goes on; another reads all the time.
 TEST(Stream, AClientThatStopsReadingHarmsOnlyItself) {
   TestServer server;
   auto a = server.Connect(), b = server.Connect(), c = server.Connect();
-  const auto stopped = Stream(a, Every(Detail::kFull));
-  const auto stopped_latest = Stream(b, {.detail = Detail::kFull, .delivery = Delivery::kLatest});
+  const auto stopped = Stream(a, Every(v1::DETAIL_FULL));
+  v1::StreamFramesRequest newest;
+  newest.set_detail(v1::DETAIL_FULL);
+  const auto stopped_latest = Stream(b, newest);
   const auto reading = Stream(c, Every());
   constexpr uint64_t kFrames = 4000;  // more than sockets and windows swallow
   int most_alive = 0;
   for (uint64_t i = 1; i <= kFrames; ++i) {
     server.Publish(0, i);
-    ASSERT_EQ(NextOf(*reading).sequence, i);
+    ASSERT_EQ(NextOf(*reading).sequence(), i);
     most_alive = std::max(most_alive, server.states_alive());
   }
   // The stopped one's queue, the newest, and what is being sent.
@@ -190,15 +191,15 @@ TEST(Stream, AClientThatStopsReadingHarmsOnlyItself) {
     uint64_t received = 0, last = 0;
     auto frame = reader->Next(kForever);
     for (; frame.ok(); frame = reader->Next(kForever)) {
-      EXPECT_GT(frame->sequence, last);
-      last = frame->sequence;
+      EXPECT_GT(frame->sequence(), last);
+      last = frame->sequence();
       ++received;
     }
     EXPECT_EQ(frame.error().code, ErrorCode::kUnavailable);
-    const auto counts = reader->counts().at(0);
-    EXPECT_EQ(counts.frames_sent, received);
-    EXPECT_GT(counts.frames_dropped, 0u);
-    EXPECT_LE(counts.frames_sent + counts.frames_dropped, kFrames);
+    const v1::LinkStreamCounts counts = reader->status().links(0);
+    EXPECT_EQ(counts.frames_sent(), received);
+    EXPECT_GT(counts.frames_dropped(), 0u);
+    EXPECT_LE(counts.frames_sent() + counts.frames_dropped(), kFrames);
   }
   stop.join();
 }
@@ -206,24 +207,24 @@ TEST(Stream, AClientThatStopsReadingHarmsOnlyItself) {
 TEST(Stream, TheGapIsToldWhileTheStreamGoesOn) {
   TestServer server;
   auto client = server.Connect();
-  const auto reader = Stream(client, Every(Detail::kFull));
+  const auto reader = Stream(client, Every(v1::DETAIL_FULL));
   uint64_t published = 0, received = 0;
   while (published < 3000) server.Publish(0, ++published);
   const auto give_up = std::chrono::steady_clock::now() + kForever;
-  while (reader->counts().at(0).frames_dropped == 0 && std::chrono::steady_clock::now() < give_up) {
+  while (reader->status().links(0).frames_dropped() == 0 && std::chrono::steady_clock::now() < give_up) {
     if (!reader->Next(milliseconds(20)).ok()) server.Publish(0, ++published);
     ++received;
   }
-  const auto counts = reader->counts().at(0);
-  EXPECT_GT(counts.frames_dropped, 0u);
-  EXPECT_GT(counts.frames_sent, 0u);
-  EXPECT_LE(counts.frames_sent, received);
+  const v1::LinkStreamCounts counts = reader->status().links(0);
+  EXPECT_GT(counts.frames_dropped(), 0u);
+  EXPECT_GT(counts.frames_sent(), 0u);
+  EXPECT_LE(counts.frames_sent(), received);
 }
 
 TEST(Stream, AnUnknownLinkIsRefusedWithTheKnownOnes) {
   TestServer server;
   auto client = server.Connect();
-  const auto reader = client.StreamFrames({.links = {"upper", "elbow"}});
+  const auto reader = client.StreamFrames(OfLinks({"upper", "elbow"}));
   ASSERT_FALSE(reader.ok());
   EXPECT_EQ(reader.error().code, ErrorCode::kNotFound);
   EXPECT_THAT(reader.error().message, HasSubstr("'elbow'"));
@@ -235,11 +236,13 @@ TEST(Stream, NonsenseIsRefused) {
   auto client = server.Connect();
   for (const double rate :
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-    const auto reader = client.StreamFrames({.max_rate_hz = rate});
+    v1::StreamFramesRequest request;
+    request.set_max_rate_hz(rate);
+    const auto reader = client.StreamFrames(request);
     ASSERT_FALSE(reader.ok());
     EXPECT_EQ(reader.error().code, ErrorCode::kInvalidArgument);
   }
-  const auto huge = client.StreamFrames({.links = {std::string(100'000, 'x')}});
+  const auto huge = client.StreamFrames(OfLinks({std::string(100'000, 'x')}));
   ASSERT_FALSE(huge.ok());
   EXPECT_EQ(huge.error().code, ErrorCode::kResourceExhausted);
 }
@@ -270,7 +273,7 @@ TEST(Stream, ShutdownIsToldToEveryStream) {
   const auto idle = Stream(client, {});
   const auto busy = Stream(client, Every());
   server.Publish(0, 1);
-  EXPECT_EQ(NextOf(*busy).sequence, 1u);
+  EXPECT_EQ(NextOf(*busy).sequence(), 1u);
   std::thread stop([&] { server.Stop(); });
   for (client::FrameReader* reader : {idle.get(), busy.get()}) {
     auto frame = reader->Next(kForever);
@@ -287,7 +290,7 @@ TEST(Stream, NextWaitsNoLongerThanItIsTold) {
   const auto reader = Stream(client, Every());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(reader->Next(milliseconds(1)).error().code, ErrorCode::kTimeout);
   server.Publish(1, 4);
-  EXPECT_EQ(NextOf(*reader).sequence, 4u);
+  EXPECT_EQ(NextOf(*reader).sequence(), 4u);
 }
 
 TEST(Stream, CancelWakesAReader) {

@@ -9,8 +9,6 @@
 namespace taclink::server {
 namespace {
 
-using client::LinkStatus;
-using client::Supervision;
 using ::testing::HasSubstr;
 
 /// One link, "arm", whose processor fails with every frame below 10.
@@ -46,13 +44,13 @@ class SupervisionTest : public ::testing::Test {
   }
 
   // Lets time pass until the link is as wanted.
-  client::Link Until(client::Client& client, Supervision wanted, uint64_t restarts) {
+  v1::Link Until(client::Client& client, v1::Supervision wanted, uint64_t restarts) {
     const auto give_up = std::chrono::steady_clock::now() + kForever;
     while (std::chrono::steady_clock::now() < give_up) {
       auto arm = client.GetArm();
       if (!arm) break;
-      const client::Link& link = arm->links[0];
-      if (link.supervision == wanted && link.worker_restarts == restarts) return link;
+      const v1::Link& link = arm->links(0);
+      if (link.supervision() == wanted && link.statistics().worker_restarts() == restarts) return link;
       clock_.Advance(std::chrono::milliseconds(1));
     }
     ADD_FAILURE() << "the link does not become " << client::Name(wanted);
@@ -71,22 +69,23 @@ TEST_F(SupervisionTest, ALinkThatRestsSaysSoAndIsRestartedByTheOperator) {
   const auto stream = Stream(*client, Every());
   for (uint64_t death = 1; death <= 2; ++death) {
     script_->Push(death);
-    EXPECT_THAT(Until(*client, Supervision::kRunning, death).last_failure, HasSubstr("unknown type"));
+    EXPECT_THAT(Until(*client, v1::SUPERVISION_RUNNING, death).statistics().last_failure(),
+                HasSubstr("unknown type"));
   }
   script_->Push(3);
-  const client::Link resting = Until(*client, Supervision::kResting, 2);
-  EXPECT_THAT(resting.supervision_reason, HasSubstr("taclink restart --link arm"));
+  const v1::Link resting = Until(*client, v1::SUPERVISION_RESTING, 2);
+  EXPECT_THAT(resting.supervision_reason(), HasSubstr("taclink restart --link arm"));
   auto frame = stream->Next(kForever);
-  while (frame.ok() && frame->status_reason.find("taclink restart") == std::string::npos)
+  while (frame.ok() && frame->status_reason().find("taclink restart") == std::string::npos)
     frame = stream->Next(kForever);
   ASSERT_TRUE(frame.ok()) << frame.error().message;
-  EXPECT_EQ(frame->status, LinkStatus::kLost);
+  EXPECT_EQ(frame->status(), v1::LINK_STATUS_LOST);
 
   ASSERT_TRUE(client->RestartLink("arm").ok());
-  Until(*client, Supervision::kRunning, 3);
+  Until(*client, v1::SUPERVISION_RUNNING, 3);
   script_->Push(10);
-  while (frame.ok() && frame->sequence != 10) frame = stream->Next(kForever);
-  EXPECT_EQ(frame->status, LinkStatus::kOk);
+  while (frame.ok() && frame->sequence() != 10) frame = stream->Next(kForever);
+  EXPECT_EQ(frame->status(), v1::LINK_STATUS_OK);
 }
 
 TEST_F(SupervisionTest, AnUnknownLinkIsNamed) {

@@ -132,20 +132,44 @@ class TestServer {
 };
 
 inline std::unique_ptr<client::FrameReader> Stream(client::Client& client,
-                                                   const client::StreamOptions& options) {
-  auto reader = client.StreamFrames(options);
+                                                   const v1::StreamFramesRequest& request) {
+  auto reader = client.StreamFrames(request);
   EXPECT_TRUE(reader.ok()) << reader.error().message;
   return reader.ok() ? std::move(*reader) : nullptr;
 }
 
-inline client::Frame NextOf(client::FrameReader& reader) {
+inline v1::LinkFrame NextOf(client::FrameReader& reader) {
   auto frame = reader.Next(kForever);
   EXPECT_TRUE(frame.ok()) << frame.error().message;
-  return frame.ok() ? std::move(*frame) : client::Frame{};
+  return frame.ok() ? std::move(*frame) : v1::LinkFrame{};
 }
 
-inline client::StreamOptions Every(client::Detail detail = client::Detail::kContacts) {
-  return {.detail = detail, .delivery = client::Delivery::kEvery};
+inline v1::StreamFramesRequest Every(v1::Detail detail = v1::DETAIL_CONTACTS) {
+  v1::StreamFramesRequest request;
+  request.set_detail(detail);
+  request.set_delivery(v1::DELIVERY_EVERY);
+  return request;
+}
+
+/// The newest frames of these links.
+inline v1::StreamFramesRequest OfLinks(const std::vector<std::string>& links) {
+  v1::StreamFramesRequest request;
+  request.mutable_links()->Assign(links.begin(), links.end());
+  return request;
+}
+
+inline v1::StreamEventsRequest EventsOf(const std::vector<v1::EventKind>& kinds) {
+  v1::StreamEventsRequest request;
+  request.mutable_kinds()->Assign(kinds.begin(), kinds.end());
+  return request;
+}
+
+inline v1::Thresholds MakeThresholds(double warning_n, double alarm_n = 0, double hysteresis_n = 0.05) {
+  v1::Thresholds thresholds;
+  thresholds.set_warning_n(warning_n);
+  thresholds.set_alarm_n(alarm_n);
+  thresholds.set_hysteresis_n(hysteresis_n);
+  return thresholds;
 }
 
 }  // namespace taclink::server

@@ -77,9 +77,11 @@ class CrashTest : public ::testing::Test {
     auto client = client::Client::Connect(line->substr(line->rfind(' ') + 1), kPatience);
     EXPECT_TRUE(client.ok()) << client.error().message;
     client::Recordings recordings = client->RecordingCalls();
-    const auto stream = client->StreamFrames({.delivery = client::Delivery::kEvery}, kPatience);
+    v1::StreamFramesRequest every;
+    every.set_delivery(v1::DELIVERY_EVERY);
+    const auto stream = client->StreamFrames(every, kPatience);
     EXPECT_TRUE(stream.ok()) << stream.error().message;
-    client::RecorderStatus before;
+    v1::RecorderStatus before;
     while (killed.seen.size() < frames || killed.synced < frames) {
       const auto frame = (*stream)->Next(kPatience);
       const auto status = recordings.Status();
@@ -87,12 +89,12 @@ class CrashTest : public ::testing::Test {
         ADD_FAILURE() << (frame ? status.error() : frame.error()).message;
         break;
       }
-      if (frame->times.exposure_ns != 0) killed.seen.emplace(frame->link, frame->sequence);
+      if (frame->times().exposure_ns() != 0) killed.seen.emplace(frame->link(), frame->sequence());
       // One thread writes and syncs in turn, so the next sync covers all that a status says was written.
-      if (status->synced_utc_ns != before.synced_utc_ns) killed.synced = before.frames;
+      if (status->synced_utc_ns() != before.synced_utc_ns()) killed.synced = before.frames();
       before = *status;
     }
-    killed.log = before.log;
+    killed.log = before.log();
     // This waits for nothing. It lets the kill come at any point of the work on a frame.
     std::this_thread::sleep_for(within_period);
     server.Signal(SIGKILL);

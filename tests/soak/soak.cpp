@@ -108,13 +108,14 @@ class MemoryWatch {
 void CheckThatItServes(RpcServer& server, Complaints& complaints) {
   auto connection = client::Client::Connect(server.address(), std::chrono::seconds(60));
   if (!connection) return complaints.Add("at the end: " + connection.error().message);
-  const auto reader =
-      connection->StreamFrames({.delivery = client::Delivery::kEvery}, std::chrono::seconds(60));
+  v1::StreamFramesRequest every;
+  every.set_delivery(v1::DELIVERY_EVERY);
+  const auto reader = connection->StreamFrames(every, std::chrono::seconds(60));
   if (!reader) return complaints.Add("at the end: " + reader.error().message);
   std::map<std::string, uint64_t> received;
   const auto take = [&] {
     auto frame = (*reader)->Next(std::chrono::seconds(60));
-    if (frame) ++received[frame->link];
+    if (frame) ++received[frame->link()];
     return frame;
   };
   while (received.size() < kLinks) {
@@ -127,8 +128,8 @@ void CheckThatItServes(RpcServer& server, Complaints& complaints) {
   stop.join();
   if (frame.error().message.find("end of the test") == std::string::npos)
     complaints.Add("the end was not told: " + frame.error().message);
-  for (const auto& told : (*reader)->counts()) {
-    if (told.frames_sent != received[told.link]) complaints.Add("the last status does not fit what came");
+  for (const v1::LinkStreamCounts& told : (*reader)->status().links()) {
+    if (told.frames_sent() != received[told.link()]) complaints.Add("the last status does not fit what came");
   }
 }
 

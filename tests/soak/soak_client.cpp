@@ -23,25 +23,26 @@ struct Visit {
   Complaints& complaints;
   ClientCounts& counts;
 
-  client::StreamOptions Options(Manner manner) const {
-    client::StreamOptions options{
-        .detail = static_cast<client::Detail>(random() % 3),
-        .delivery = random() % 3 == 0 ? client::Delivery::kLatest : client::Delivery::kEvery};
-    if (manner == Manner::kSlow) options.detail = client::Detail::kFull;
-    if (random() % 4 == 0) options.links = {"link0"};
-    if (random() % 5 == 0) options.max_rate_hz = 20;
-    if (random() % 5 == 0) options.deadband_force_n = 0.5;
-    return options;
+  v1::StreamFramesRequest Request(Manner manner) const {
+    constexpr v1::Detail kDetails[] = {v1::DETAIL_CONTACTS, v1::DETAIL_GEOMETRY, v1::DETAIL_FULL};
+    v1::StreamFramesRequest request;
+    request.set_detail(kDetails[random() % 3]);
+    request.set_delivery(random() % 3 == 0 ? v1::DELIVERY_LATEST : v1::DELIVERY_EVERY);
+    if (manner == Manner::kSlow) request.set_detail(v1::DETAIL_FULL);
+    if (random() % 4 == 0) request.add_links("link0");
+    if (random() % 5 == 0) request.set_max_rate_hz(20);
+    if (random() % 5 == 0) request.set_deadband_force_n(0.5);
+    return request;
   }
 
-  void Read(client::FrameReader& reader, const client::StreamOptions& options, Manner manner,
+  void Read(client::FrameReader& reader, const v1::StreamFramesRequest& request, Manner manner,
             steady_clock::time_point end) const {
-    const bool all = options.max_rate_hz <= 0 && options.deadband_force_n <= 0;
-    StreamCheck check(all && options.delivery == client::Delivery::kEvery, complaints);
+    const bool all = request.max_rate_hz() <= 0 && request.deadband_force_n() <= 0;
+    StreamCheck check(all && request.delivery() == v1::DELIVERY_EVERY, complaints);
     bool cancelled = false;
     while (true) {
       const auto frame = reader.Next(kPoll);
-      check.Counts(reader.counts(), counts);
+      check.Counts(reader.status(), counts);
       if (frame) {
         check.Frame(*frame);
         ++counts.frames;
@@ -61,8 +62,8 @@ struct Visit {
   void Stream(Manner manner, steady_clock::time_point end) const {
     auto connection = client::Client::Connect(address, std::chrono::seconds(60));
     if (!connection) return complaints.Add("no connection: " + connection.error().message);
-    const auto options = Options(manner);
-    const auto reader = connection->StreamFrames(options, std::chrono::seconds(60));
+    const auto request = Request(manner);
+    const auto reader = connection->StreamFrames(request, std::chrono::seconds(60));
     if (!reader && reader.error().code == ErrorCode::kResourceExhausted) {
       ++counts.refused;
       std::this_thread::sleep_for(kPoll);
@@ -71,7 +72,7 @@ struct Visit {
     if (!reader) return complaints.Add("no stream: " + reader.error().message);
     ++counts.streams;
     if (manner == Manner::kNeverReads) return std::this_thread::sleep_until(end);
-    Read(**reader, options, manner, end);
+    Read(**reader, request, manner, end);
   }
 
   void Garbage() const {
@@ -91,32 +92,32 @@ void Complaints::Add(const std::string& what) {
 }
 
 // A status tells what was sent before it, and it comes in its place between the frames.
-void StreamCheck::Counts(const std::vector<client::StreamCounts>& counts, ClientCounts& out) {
-  for (const client::StreamCounts& told : counts) {
-    PerLink& link = links_[told.link];
-    if (told.frames_dropped == link.dropped_told) continue;
-    out.dropped += told.frames_dropped - link.dropped_told;
+void StreamCheck::Counts(const v1::StreamStatus& status, ClientCounts& out) {
+  for (const v1::LinkStreamCounts& told : status.links()) {
+    PerLink& link = links_[told.link()];
+    if (told.frames_dropped() == link.dropped_told) continue;
+    out.dropped += told.frames_dropped() - link.dropped_told;
     ++out.statuses;
-    link.dropped_told = told.frames_dropped;
-    if (told.frames_sent != link.received)
-      complaints_.Add(told.link + ": " + std::to_string(told.frames_sent) + " sent, " +
+    link.dropped_told = told.frames_dropped();
+    if (told.frames_sent() != link.received)
+      complaints_.Add(told.link() + ": " + std::to_string(told.frames_sent()) + " sent, " +
                       std::to_string(link.received) + " received");
-    if (every_ && link.lost > static_cast<int64_t>(told.frames_dropped))
-      complaints_.Add(told.link + ": " + std::to_string(link.lost) + " lost, " +
-                      std::to_string(told.frames_dropped) + " told");
+    if (every_ && link.lost > static_cast<int64_t>(told.frames_dropped()))
+      complaints_.Add(told.link() + ": " + std::to_string(link.lost) + " lost, " +
+                      std::to_string(told.frames_dropped()) + " told");
   }
 }
 
-void StreamCheck::Frame(const client::Frame& frame) {
-  PerLink& link = links_[frame.link];
+void StreamCheck::Frame(const v1::LinkFrame& frame) {
+  PerLink& link = links_[frame.link()];
   ++link.received;
-  if (frame.times.exposure_ns == 0) return;  // a status repeats the last sequence
-  if (link.sequence != 0 && frame.sequence <= link.sequence)
-    complaints_.Add(frame.link + ": sequence " + std::to_string(frame.sequence) + " after " +
+  if (frame.times().exposure_ns() == 0) return;  // a status repeats the last sequence
+  if (link.sequence != 0 && frame.sequence() <= link.sequence)
+    complaints_.Add(frame.link() + ": sequence " + std::to_string(frame.sequence()) + " after " +
                     std::to_string(link.sequence));
-  link.sequence = frame.sequence;
-  if (!frame.pressure_pa) return;  // the processor threw
-  const auto order = std::llround(*frame.pressure_pa);
+  link.sequence = frame.sequence();
+  if (!frame.has_pressure_pa()) return;  // the processor threw
+  const auto order = std::llround(frame.pressure_pa());
   if (link.order != 0) link.lost += order - link.order - 1;
   link.order = order;
 }

@@ -33,8 +33,8 @@ class StreamCheck {
   StreamCheck(bool every, Complaints& complaints) : every_(every), complaints_(complaints) {}
 
   /// Each time after Next.
-  void Counts(const std::vector<client::StreamCounts>& counts, ClientCounts& out);
-  void Frame(const client::Frame& frame);
+  void Counts(const v1::StreamStatus& status, ClientCounts& out);
+  void Frame(const v1::LinkFrame& frame);
 
  private:
   struct PerLink {

@@ -123,16 +123,18 @@ std::string Rig::StartServer() {
   auto client = client::Client::Connect(address(), std::chrono::seconds(60));
   if (!client) return client.error().message;
   client_ = std::move(*client);
-  auto reader = client_->StreamFrames({.delivery = client::Delivery::kEvery}, std::chrono::seconds(60));
+  v1::StreamFramesRequest every;
+  every.set_delivery(v1::DELIVERY_EVERY);
+  auto reader = client_->StreamFrames(every, std::chrono::seconds(60));
   if (!reader) return reader.error().message;
   reader_ = std::move(*reader);
   receiver_ = std::jthread([this](const std::stop_token& stop) { Receive(stop); });
   return "";
 }
 
-client::Arm Rig::Arm() {
+v1::Arm Rig::Arm() {
   auto arm = client_->GetArm(std::chrono::seconds(60));
-  return arm ? std::move(*arm) : client::Arm{};
+  return arm ? std::move(*arm) : v1::Arm{};
 }
 
 void Rig::Receive(const std::stop_token& stop) {
@@ -153,7 +155,7 @@ std::optional<ReceivedFrame> Rig::Await(const std::string& link, int64_t after_n
   received_.wait_for(lock, std::chrono::duration<double>(kRigForever), [&] {
     for (; looked_at < frames_.size() && !found; ++looked_at) {
       const ReceivedFrame& each = frames_[looked_at];
-      if (each.received_ns > after_ns && each.frame.link == link && wanted(each.frame)) found = each;
+      if (each.received_ns > after_ns && each.frame.link() == link && wanted(each.frame)) found = each;
     }
     return found.has_value();
   });
@@ -164,8 +166,8 @@ std::vector<ReceivedFrame> Rig::Frames(const std::string& link, int64_t from_ns,
   const std::lock_guard lock(mutex_);
   std::vector<ReceivedFrame> out;
   for (const ReceivedFrame& each : frames_) {
-    if (each.frame.link == link && each.received_ns >= from_ns && each.received_ns <= to_ns &&
-        each.frame.times.exposure_ns != 0) {
+    if (each.frame.link() == link && each.received_ns >= from_ns && each.received_ns <= to_ns &&
+        each.frame.times().exposure_ns() != 0) {
       out.push_back(each);
     }
   }

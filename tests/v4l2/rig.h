@@ -26,7 +26,7 @@ int64_t MonotonicNs();
 
 /// A frame as a client got it.
 struct ReceivedFrame {
-  client::Frame frame;
+  v1::LinkFrame frame;
   int64_t received_ns = 0;  ///< monotonic
 };
 
@@ -44,12 +44,12 @@ class Rig {
   const Pictures& pictures(CameraId id) const { return pictures_[Index(id)]; }
   /// Empty: it runs; else what failed.
   std::string StartServer();
-  client::Arm Arm();
+  v1::Arm Arm();
   client::Client& client() { return *client_; }
   const std::string& address() const { return server_->address(); }
   void StopServer();
 
-  using Wanted = std::function<bool(const client::Frame&)>;
+  using Wanted = std::function<bool(const v1::LinkFrame&)>;
   /// The first frame of the link, received after that time, that is wanted; waits for it. None: never came.
   std::optional<ReceivedFrame> Await(const std::string& link, int64_t after_ns, const Wanted& wanted);
   /// All of the link with an image, received within.

@@ -25,7 +25,6 @@
 namespace taclink::testing {
 namespace {
 
-using client::LinkStatus;
 using ::testing::HasSubstr;
 
 // From a fault to the status, and from its end to `ok`, in frames of the other link, which runs on: frames
@@ -34,14 +33,14 @@ constexpr size_t kToStatusFrames = 5 * kRigRateHz, kToRecoveryFrames = 8 * kRigR
 constexpr double kStartS = 10;  // of the guest
 enum : size_t { kATop, kABottom, kBTop, kBBottom };
 
-bool Blames(const client::Frame& frame, const std::string& reason) {
-  return frame.status != LinkStatus::kOk && frame.status_reason.find(reason) != std::string::npos;
+bool Blames(const v1::LinkFrame& frame, const std::string& reason) {
+  return frame.status() != v1::LINK_STATUS_OK && frame.status_reason().find(reason) != std::string::npos;
 }
-bool IsOk(const client::Frame& frame) {
-  return frame.status == LinkStatus::kOk;
+bool IsOk(const v1::LinkFrame& frame) {
+  return frame.status() == v1::LINK_STATUS_OK;
 }
-bool NamesNoCamera(const client::Frame& frame) {
-  return frame.times.exposure_ns != 0 && frame.status_reason.find("camera") == std::string::npos;
+bool NamesNoCamera(const v1::LinkFrame& frame) {
+  return frame.times().exposure_ns() != 0 && frame.status_reason().find("camera") == std::string::npos;
 }
 double Seconds(int64_t from_ns, int64_t to_ns) {
   return 1e-9 * static_cast<double>(to_ns - from_ns);
@@ -49,8 +48,8 @@ double Seconds(int64_t from_ns, int64_t to_ns) {
 int LostBetween(const std::vector<ReceivedFrame>& frames) {
   int lost = 0;
   for (size_t i = 1; i < frames.size(); ++i) {
-    if (frames[i].frame.sequence > frames[i - 1].frame.sequence + 1)
-      lost += static_cast<int>(frames[i].frame.sequence - frames[i - 1].frame.sequence - 1);
+    if (frames[i].frame.sequence() > frames[i - 1].frame.sequence() + 1)
+      lost += static_cast<int>(frames[i].frame.sequence() - frames[i - 1].frame.sequence() - 1);
   }
   return lost;
 }
@@ -94,12 +93,12 @@ class RigTest : public ::testing::Test {
   }
   static void TearDownTestSuite() { delete rig_; }
 
-  static void PrintRow(const char* what, const char* how, const client::Frame& frame, double to_status_s,
+  static void PrintRow(const char* what, const char* how, const v1::LinkFrame& frame, double to_status_s,
                        double to_recovery_s, const std::string& lost) {
-    std::string reason = frame.status_reason;  // without the list of cameras
+    std::string reason = frame.status_reason();  // without the list of cameras
     for (size_t at = 0; (at = reason.find(" There are")) != std::string::npos;)
       reason.erase(at, std::min(reason.find(';', at), reason.size()) - at);
-    std::printf("| %s | %s | %s: %s | %.2f | %.2f | %s |\n", what, how, client::Name(frame.status),
+    std::printf("| %s | %s | %s: %s | %.2f | %.2f | %s |\n", what, how, client::Name(frame.status()),
                 reason.c_str(), to_status_s, to_recovery_s, lost.c_str());
     std::fflush(stdout);
   }
@@ -125,7 +124,7 @@ class RigTest : public ::testing::Test {
     EXPECT_EQ(lost, 0) << fault.what;
     EXPECT_FALSE(others.empty()) << fault.what;
     for (const ReceivedFrame& other : others)
-      EXPECT_TRUE(IsOk(other.frame)) << fault.what << ": " << other.frame.status_reason;
+      EXPECT_TRUE(IsOk(other.frame)) << fault.what << ": " << other.frame.status_reason();
   }
 
   static Rig* rig_;
@@ -148,7 +147,7 @@ TEST_F(RigTest, AStartsWithoutCameras) {
   const auto absent =
       rig_->Await("b", 0, [](const auto& frame) { return Blames(frame, "serial:b-bottom: no such camera"); });
   ASSERT_TRUE(busy && absent);
-  EXPECT_THAT(busy->frame.status_reason, HasSubstr("bottom camera"));
+  EXPECT_THAT(busy->frame.status_reason(), HasSubstr("bottom camera"));
 
   const int64_t released_ns = MonotonicNs();
   held.reset();
@@ -158,16 +157,16 @@ TEST_F(RigTest, AStartsWithoutCameras) {
   ASSERT_TRUE(a && b);
   // Recovery is the first pair's exposure.
   PrintRow("Held by another program at the start", "another process has it open with buffers", busy->frame,
-           Seconds(started_ns, busy->received_ns), Seconds(released_ns, a->frame.times.exposure_ns), "-");
+           Seconds(started_ns, busy->received_ns), Seconds(released_ns, a->frame.times().exposure_ns()), "-");
   PrintRow("Absent at the start", "not plugged in", absent->frame, Seconds(started_ns, absent->received_ns),
-           Seconds(released_ns, b->frame.times.exposure_ns), "-");
+           Seconds(released_ns, b->frame.times().exposure_ns()), "-");
   EXPECT_LE(Seconds(started_ns, busy->received_ns), kStartS);
   EXPECT_LE(Seconds(started_ns, absent->received_ns), kStartS);
-  EXPECT_LE(Seconds(released_ns, a->frame.times.exposure_ns), kStartS);
-  EXPECT_LE(Seconds(released_ns, b->frame.times.exposure_ns), kStartS);
+  EXPECT_LE(Seconds(released_ns, a->frame.times().exposure_ns()), kStartS);
+  EXPECT_LE(Seconds(released_ns, b->frame.times().exposure_ns()), kStartS);
   for (const char* link : {"a", "b"})
     ASSERT_TRUE(rig_->Await(link, released_ns, IsOk))
-        << rig_->Frames(link, 0, MonotonicNs()).back().frame.status_reason;
+        << rig_->Frames(link, 0, MonotonicNs()).back().frame.status_reason();
 }
 
 TEST_F(RigTest, BNoFrameIsLost) {
@@ -178,7 +177,7 @@ TEST_F(RigTest, BNoFrameIsLost) {
                             [&, seen = size_t{0}](const auto&) mutable { return ++seen == kFrames; }));
     const auto frames = rig_->Frames(link, begun_ns, MonotonicNs());
     EXPECT_EQ(LostBetween(frames), 0) << link;
-    for (const ReceivedFrame& each : frames) EXPECT_TRUE(IsOk(each.frame)) << each.frame.status_reason;
+    for (const ReceivedFrame& each : frames) EXPECT_TRUE(IsOk(each.frame)) << each.frame.status_reason();
   }
 }
 
@@ -219,20 +218,30 @@ TEST_F(RigTest, BPreviewsAreWhatTheCamerasSee) {
 TEST_F(RigTest, BSettingsGoToTheCameraAlsoWhenItComesBack) {
   constexpr UvcSettings kManual{.exposure_mode = 1, .exposure_100us = 80, .gain = 20};
   client::Client& client = rig_->client();
-  const auto bottom = [] { return rig_->Arm().links[0].cameras[1]; };
-  EXPECT_EQ(bottom().automatic_exposure, true);
-  EXPECT_EQ(bottom().exposure_s, std::nullopt);
-  EXPECT_EQ(bottom().gain, 16);
-  const auto set = client.SetCamera("a", "bottom", {.exposure_s = 0.008, .gain = 20});
+  const auto bottom = [] { return rig_->Arm().links(0).cameras(1); };
+  EXPECT_TRUE(bottom().automatic_exposure());
+  EXPECT_FALSE(bottom().has_exposure_s());
+  EXPECT_EQ(bottom().gain(), 16);
+  v1::SetCameraRequest manual;
+  manual.set_link("a");
+  manual.set_camera("bottom");
+  manual.set_exposure_s(0.008);
+  manual.set_gain(20);
+  const auto set = client.SetCamera(manual);
   ASSERT_TRUE(set) << set.error().message;
   EXPECT_EQ(rig_->camera(kABottom).settings(), kManual);
   EXPECT_EQ(rig_->camera(kATop).settings(), UvcSettings());
-  const auto read_back = [&](const client::Camera& camera) {
-    return camera.automatic_exposure == false && camera.exposure_s == 0.008 && camera.gain == 20;
+  const auto read_back = [&](const v1::Camera& camera) {
+    return camera.has_automatic_exposure() && !camera.automatic_exposure() && camera.exposure_s() == 0.008 &&
+           camera.gain() == 20;
   };
   EXPECT_TRUE(read_back(bottom()));
 
-  const auto refused = client.SetCamera("a", "bottom", {.gain = 900});
+  v1::SetCameraRequest gain;
+  gain.set_link("a");
+  gain.set_camera("bottom");
+  gain.set_gain(900);
+  const auto refused = client.SetCamera(gain);
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
   EXPECT_THAT(refused.error().message, HasSubstr("gain must be from 0 to 64, not 900"));
 
@@ -240,17 +249,22 @@ TEST_F(RigTest, BSettingsGoToTheCameraAlsoWhenItComesBack) {
   rig_->camera(kABottom).Unplug();
   ASSERT_TRUE(
       rig_->Await("a", unplugged_ns, [](const auto& frame) { return Blames(frame, "bottom camera"); }));
-  EXPECT_EQ(bottom().gain, std::nullopt) << "nobody knows";
-  EXPECT_EQ(client.SetCamera("a", "bottom", {.gain = 3}).error().code, ErrorCode::kUnavailable);
+  EXPECT_FALSE(bottom().has_gain()) << "nobody knows";
+  gain.set_gain(3);
+  EXPECT_EQ(client.SetCamera(gain).error().code, ErrorCode::kUnavailable);
   const int64_t plugged_ns = MonotonicNs();
   ASSERT_EQ(rig_->camera(kABottom).Plug(kABottom), "");
   ASSERT_TRUE(rig_->Await("a", plugged_ns, IsOk));
   EXPECT_EQ(rig_->camera(kABottom).settings(), kManual);
   EXPECT_TRUE(read_back(bottom()));
 
-  ASSERT_TRUE(client.SetCamera("a", "bottom", {.automatic_exposure = true}));
+  v1::SetCameraRequest automatic;
+  automatic.set_link("a");
+  automatic.set_camera("bottom");
+  automatic.set_automatic(true);
+  ASSERT_TRUE(client.SetCamera(automatic));
   EXPECT_EQ(rig_->camera(kABottom).settings().exposure_mode, 8u);
-  EXPECT_EQ(bottom().automatic_exposure, true);
+  EXPECT_TRUE(bottom().automatic_exposure());
 }
 
 TEST_F(RigTest, CFaultsOfOneLinkAreSaidMendedAndNobodyElses) {
@@ -289,19 +303,19 @@ TEST_F(RigTest, CFaultsOfOneLinkAreSaidMendedAndNobodyElses) {
 }
 
 TEST_F(RigTest, DWhatHappenedIsCounted) {
-  const client::Arm arm = rig_->Arm();
-  ASSERT_EQ(arm.links.size(), 2u);
-  ASSERT_EQ(arm.links[0].cameras.size(), 2u);
-  const client::Camera& top = arm.links[0].cameras[0];
-  const client::Camera& bottom = arm.links[0].cameras[1];
-  EXPECT_EQ(top.format, "MJPEG 320x240");
-  EXPECT_EQ(arm.links[1].cameras[0].format, "YUYV 320x240");
-  EXPECT_THAT(top.device, HasSubstr("serial:a-top"));
-  EXPECT_THAT(bottom.device, HasSubstr("usb:"));
-  EXPECT_EQ(bottom.trouble, "");
-  EXPECT_NEAR(top.rate_hz, kRigRateHz, 0.1 * kRigRateHz);
-  EXPECT_GE(top.undecodable, 2u);  // of eight: what came while a frame computed was left out
-  EXPECT_GT(top.unpaired + bottom.unpaired + top.pictures, 0u);
+  const v1::Arm arm = rig_->Arm();
+  ASSERT_EQ(arm.links_size(), 2);
+  ASSERT_EQ(arm.links(0).cameras_size(), 2);
+  const v1::Camera& top = arm.links(0).cameras(0);
+  const v1::Camera& bottom = arm.links(0).cameras(1);
+  EXPECT_EQ(top.format(), "MJPEG 320x240");
+  EXPECT_EQ(arm.links(1).cameras(0).format(), "YUYV 320x240");
+  EXPECT_THAT(top.device(), HasSubstr("serial:a-top"));
+  EXPECT_THAT(bottom.device(), HasSubstr("usb:"));
+  EXPECT_EQ(bottom.trouble(), "");
+  EXPECT_NEAR(top.rate_hz(), kRigRateHz, 0.1 * kRigRateHz);
+  EXPECT_GE(top.undecodable(), 2u);  // of eight: what came while a frame computed was left out
+  EXPECT_GT(top.unpaired() + bottom.unpaired() + top.pictures(), 0u);
 }
 
 TEST_F(RigTest, EHundredAndTwentyPairsASecond) {

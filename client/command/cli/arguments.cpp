@@ -33,7 +33,12 @@ Check Positive() {
   return Check(CLI::PositiveNumber);
 }
 Check OneOf(std::initializer_list<const char*> names) {
-  return Check(CLI::IsMember(std::vector<std::string>(names.begin(), names.end())));
+  return OneOf(std::vector<std::string>(names.begin(), names.end()));
+}
+
+Check OneOf(std::vector<std::string> names, const std::string& other) {
+  if (!other.empty()) names.insert(names.begin(), other);
+  return Check(CLI::IsMember(std::move(names)));
 }
 
 const Option& Option::Must(const Check& check) const {

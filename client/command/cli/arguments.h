@@ -4,6 +4,7 @@
 #include <initializer_list>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -34,6 +35,8 @@ Check Within(double min, double max);
 Check Between(int min, int max);
 Check Positive();
 Check OneOf(std::initializer_list<const char*> names);
+/// One of `names`, or `other`.
+Check OneOf(std::vector<std::string> names, const std::string& other = "");
 
 /// A handle of one option of a command.
 class Option {

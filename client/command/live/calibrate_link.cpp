@@ -13,24 +13,24 @@
 namespace taclink::command {
 namespace {
 
-void PrintText(const client::CalibrationResult& result) {
+void PrintText(const v1::CalibrationResult& result) {
   fmt::print(
       "{} markers seen by both cameras, RMS {:.3f} px per axis\n"
       "Rest markers, triangulated, against the model: RMSE R {:.3f} mm, phi*R {:.3f} mm, Z {:.3f} mm\n",
-      result.markers_used, result.rms_px, result.rmse_r_m * kMmPerMetre,
-      result.rmse_tangential_m * kMmPerMetre, result.rmse_z_m * kMmPerMetre);
-  if (!result.saved_to.empty()) fmt::print("saved on the server: {}\n", result.saved_to);
+      result.markers_used(), result.rms_px(), result.rmse_r_m() * kMmPerMetre,
+      result.rmse_tangential_m() * kMmPerMetre, result.rmse_z_m() * kMmPerMetre);
+  if (!result.saved_to().empty()) fmt::print("saved on the server: {}\n", result.saved_to());
 }
 
-void PrintCalibrationJson(const std::string& link, const client::CalibrationResult& result) {
+void PrintCalibrationJson(const std::string& link, const v1::CalibrationResult& result) {
   const Json json = {{"link", link},
-                     {"markers_used", result.markers_used},
-                     {"rms_px", result.rms_px},
+                     {"markers_used", result.markers_used()},
+                     {"rms_px", result.rms_px()},
                      {"rmse_mm",
-                      {{"r", result.rmse_r_m * kMmPerMetre},
-                       {"phi_r", result.rmse_tangential_m * kMmPerMetre},
-                       {"z", result.rmse_z_m * kMmPerMetre}}},
-                     {"saved_to", result.saved_to}};
+                      {{"r", result.rmse_r_m() * kMmPerMetre},
+                       {"phi_r", result.rmse_tangential_m() * kMmPerMetre},
+                       {"z", result.rmse_z_m() * kMmPerMetre}}},
+                     {"saved_to", result.saved_to()}};
   fmt::print("{}\n", json.dump());
 }
 
@@ -40,23 +40,28 @@ Result<void> CalibrateLink(const LinkCalibration& calibration) {
   auto connection = ConnectTo(calibration.server);
   if (!connection) return connection.error();
   bool told = false;
-  const auto result = connection->Calibrate(calibration.options, [&told](int taken, int wanted) {
+  v1::CalibrateRequest request;
+  request.set_link(calibration.link);
+  request.set_pairs(static_cast<uint32_t>(calibration.pairs));
+  request.set_save(calibration.save);
+  request.set_force(calibration.force);
+  const auto result = connection->Calibrate(request, [&told](const v1::CalibrationProgress& progress) {
     told = true;
-    fmt::print(stderr, "\r{} of {} rest pairs", taken, wanted);
+    fmt::print(stderr, "\r{} of {} rest pairs", progress.pairs_taken(), progress.pairs_wanted());
     return true;
   });
   if (told) fmt::print(stderr, "\n");
   if (!result) return result.error();
   if (!calibration.out.empty()) {
     std::ofstream file(calibration.out, std::ios::trunc);
-    file << result->file_text;
+    file << result->file_text();
     file.close();
     if (!file)
       return Error{ErrorCode::kUnavailable,
                    "cannot write '" + calibration.out + "'; the link uses the result"};
   }
   if (calibration.json) {
-    PrintCalibrationJson(calibration.options.link, *result);
+    PrintCalibrationJson(calibration.link, *result);
   } else {
     PrintText(*result);
   }

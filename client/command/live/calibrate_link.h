@@ -2,14 +2,17 @@
 
 #include <string>
 
-#include "client/cpp/taclink/client.h"
+#include "sensing/core/result.h"
 
 namespace taclink::command {
 
 /// `taclink calibrate --link`: a server's link as it is now. Progress goes to standard error.
 struct LinkCalibration {
   std::string server = "127.0.0.1:50051";
-  client::CalibrateOptions options;
+  std::string link;
+  int pairs = 8;      ///< rest pairs to average over
+  bool save = false;  ///< also write the link's configured calibration file on the server
+  bool force = false;
   std::string out;  ///< file to write here; empty: none
   bool json = false;
 };

@@ -2,13 +2,13 @@
 
 #include <string>
 
-#include "client/cpp/taclink/arm_contacts.h"
+#include "taclink/v1/contacts.pb.h"
 
 namespace taclink::command {
 
 /// One line of JSON.
-std::string ContactsJson(const client::ArmContacts& arm);
+std::string ContactsJson(const v1::StreamContactsResponse& arm);
 /// A table of the contacts and a line of joint torques.
-std::string ContactsTable(const client::ArmContacts& arm);
+std::string ContactsTable(const v1::StreamContactsResponse& arm);
 
 }  // namespace taclink::command

@@ -4,109 +4,137 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <map>
 
-#include "client/command/cli/json.h"
 #include "client/command/cli/units.h"
+#include "client/command/live/frame_json.h"
+#include "client/cpp/taclink/values.h"
 #include "sensing/core/printable.h"
 
 namespace taclink::command {
 namespace {
 
-using client::EventKind;
-
-bool IsContact(EventKind kind) {
-  return kind == EventKind::kContactBegin || kind == EventKind::kContactUpdate ||
-         kind == EventKind::kContactEnd;
+std::string Place(const v1::Vector3& center_m) {
+  return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", center_m.x() * kMmPerMetre, center_m.y() * kMmPerMetre,
+                     center_m.z() * kMmPerMetre);
 }
 
-bool IsOperation(EventKind kind) {
-  return kind == EventKind::kTare || kind == EventKind::kCalibration || kind == EventKind::kBaseline ||
-         kind == EventKind::kThresholds || kind == EventKind::kRecording || kind == EventKind::kForceModel ||
-         kind == EventKind::kCamera;
+// Protobuf's maps are in no order.
+std::map<std::string, double> Sorted(const v1::OperationEvent& operation) {
+  return {operation.values().begin(), operation.values().end()};
 }
 
-std::string Place(const client::Event& event) {
-  return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", event.center_m[0] * kMmPerMetre,
-                     event.center_m[1] * kMmPerMetre, event.center_m[2] * kMmPerMetre);
+std::string ContactText(const v1::ContactEvent& contact) {
+  if (!contact.end_reason().empty())
+    return fmt::format("contact {}: {} after {:.2f} s, at most {:.3f} N", contact.contact_id(),
+                       contact.end_reason(), contact.duration_s(), contact.peak_force_n());
+  return fmt::format("contact {}: {:.3f} N at {}", contact.contact_id(), client::Norm(contact.force_n()),
+                     Place(contact.center_m()));
 }
 
-std::string Detail(const client::Event& event) {
-  switch (event.kind) {
-    case EventKind::kContactBegin:
-    case EventKind::kContactUpdate:
-      return fmt::format("contact {}: {:.3f} N at {}", event.contact_id, event.force_n, Place(event));
-    case EventKind::kContactEnd:
-      return fmt::format("contact {}: {} after {:.2f} s, at most {:.3f} N", event.contact_id,
-                         event.end_reason, event.duration_s, event.peak_force_n);
-    case EventKind::kForceLevel:
-      return fmt::format("{}{} -> {}: {:.3f} N at {}", event.region.empty() ? "" : event.region + ": ",
-                         client::Name(event.previous_level), client::Name(event.level), event.force_n,
-                         Place(event));
-    case EventKind::kLinkStatus:
-      return fmt::format("{} -> {}{}", event.previous_status, event.status,
-                         event.reason.empty() ? "" : ": " + event.reason);
-    case EventKind::kDrift:
-      return fmt::format("the baseline has drifted by {:.3f} mm", event.drift_m * kMmPerMetre);
-    case EventKind::kFramesLost:
-      return fmt::format("{} frames are lost to the events", event.frames);
-    default:
+std::string OperationText(const v1::OperationEvent& operation) {
+  std::string text = fmt::format("{} by {}{}", operation.accepted() ? "done" : "refused", operation.who(),
+                                 operation.outcome().empty() ? "" : ": " + operation.outcome());
+  for (const auto& [name, value] : Sorted(operation)) text += fmt::format(" {}={:.6g}", name, value);
+  return text;
+}
+
+std::string Detail(const v1::Event& event) {
+  const v1::ForceLevelEvent& level = event.force_level();
+  const v1::LinkStatusEvent& status = event.link_status();
+  switch (event.detail_case()) {
+    case v1::Event::kContact:
+      return ContactText(event.contact());
+    case v1::Event::kForceLevel:
+      return fmt::format("{}{} -> {}: {:.3f} N at {}", level.region().empty() ? "" : level.region() + ": ",
+                         client::Name(level.previous()), client::Name(level.level()), level.force_n(),
+                         Place(level.center_m()));
+    case v1::Event::kLinkStatus:
+      return fmt::format("{} -> {}{}", client::Name(status.previous()), client::Name(status.status()),
+                         status.reason().empty() ? "" : ": " + status.reason());
+    case v1::Event::kOperation:
+      return OperationText(event.operation());
+    case v1::Event::kDrift:
+      return fmt::format("the baseline has drifted by {:.3f} mm", event.drift().drift_m() * kMmPerMetre);
+    case v1::Event::kFramesLost:
+      return fmt::format("{} frames are lost to the events", event.frames_lost().frames());
+    case v1::Event::DETAIL_NOT_SET:
       break;
   }
-  std::string text = fmt::format("{} by {}{}", event.accepted ? "done" : "refused", event.who,
-                                 event.outcome.empty() ? "" : ": " + event.outcome);
-  for (const auto& [name, value] : event.values) text += fmt::format(" {}={:.6g}", name, value);
-  return text;
+  return "";
+}
+
+Json ContactDetail(const v1::Event& event) {
+  const v1::ContactEvent& contact = event.contact();
+  Json json = {{"frame", event.frame_sequence()},
+               {"contact_id", contact.contact_id()},
+               {"force_n", client::Norm(contact.force_n())},
+               {"center_mm", ToJson(contact.center_m(), kMmPerMetre)},
+               {"force_vector_n", ToJson(contact.force_n())},
+               {"peak_force_n", contact.peak_force_n()},
+               {"duration_s", contact.duration_s()}};
+  if (!contact.end_reason().empty()) json["end_reason"] = contact.end_reason();
+  return json;
+}
+
+Json LevelDetail(const v1::Event& event) {
+  const v1::ForceLevelEvent& level = event.force_level();
+  return {{"frame", event.frame_sequence()},
+          {"contact_id", level.contact_id()},
+          {"force_n", level.force_n()},
+          {"center_mm", ToJson(level.center_m(), kMmPerMetre)},
+          {"region", level.region()},
+          {"level", client::Name(level.level())},
+          {"previous", client::Name(level.previous())}};
+}
+
+Json DetailJson(const v1::Event& event) {
+  switch (event.detail_case()) {
+    case v1::Event::kContact:
+      return ContactDetail(event);
+    case v1::Event::kForceLevel:
+      return LevelDetail(event);
+    case v1::Event::kLinkStatus:
+      return {{"status", client::Name(event.link_status().status())},
+              {"previous", client::Name(event.link_status().previous())},
+              {"reason", event.link_status().reason()}};
+    case v1::Event::kOperation:
+      return {{"who", event.operation().who()},
+              {"accepted", event.operation().accepted()},
+              {"outcome", event.operation().outcome()},
+              {"values", Sorted(event.operation())}};
+    case v1::Event::kDrift:
+      return {{"drift_mm", event.drift().drift_m() * kMmPerMetre}};
+    case v1::Event::kFramesLost:
+      return {{"frames", event.frames_lost().frames()}};
+    case v1::Event::DETAIL_NOT_SET:
+      break;
+  }
+  return Json::object();
 }
 
 }  // namespace
 
-std::string EventJson(const client::Event& event, const std::string& run_id) {
-  const auto latency = event.latency_s();
-  Json json = {{"sequence", event.sequence},
+std::string EventJson(const v1::Event& event, const std::string& run_id) {
+  const auto latency = client::LatencyS(event);
+  Json json = {{"sequence", event.sequence()},
                {"run_id", run_id},
-               {"kind", client::Name(event.kind)},
-               {"link", event.link},
-               {"raised_utc_ns", event.raised_utc_ns},
-               {"exposure_utc_ns", event.exposure_utc_ns},
+               {"kind", client::Name(event.kind())},
+               {"link", event.link()},
+               {"raised_utc_ns", event.times().raised_utc_ns()},
+               {"exposure_utc_ns", event.times().exposure_utc_ns()},
                {"latency_ms", latency ? Json(*latency * 1e3) : Json(nullptr)}};
-  if (IsContact(event.kind) || event.kind == EventKind::kForceLevel) {
-    json["frame"] = event.frame_sequence;
-    json["contact_id"] = event.contact_id;
-    json["force_n"] = event.force_n;
-    json["center_mm"] = ToJson(event.center_m, kMmPerMetre);
-  }
-  if (IsContact(event.kind)) {
-    json["force_vector_n"] = ToJson(event.force_vector_n, 1);
-    json["peak_force_n"] = event.peak_force_n;
-    json["duration_s"] = event.duration_s;
-    if (event.kind == EventKind::kContactEnd) json["end_reason"] = event.end_reason;
-  } else if (event.kind == EventKind::kForceLevel) {
-    json["region"] = event.region;
-    json["level"] = client::Name(event.level);
-    json["previous"] = client::Name(event.previous_level);
-  } else if (event.kind == EventKind::kLinkStatus) {
-    json["status"] = event.status;
-    json["previous"] = event.previous_status;
-    json["reason"] = event.reason;
-  } else if (IsOperation(event.kind)) {
-    json["who"] = event.who;
-    json["accepted"] = event.accepted;
-    json["outcome"] = event.outcome;
-    json["values"] = Json(event.values);
-  } else if (event.kind == EventKind::kDrift) {
-    json["drift_mm"] = event.drift_m * kMmPerMetre;
-  } else if (event.kind == EventKind::kFramesLost) {
-    json["frames"] = event.frames;
-  }
+  json.update(DetailJson(event));
   return json.dump();
 }
 
-std::string EventText(const client::Event& event) {
-  const auto seconds = static_cast<std::time_t>(event.raised_utc_ns / 1'000'000'000);
-  const auto latency = event.latency_s();
+std::string EventText(const v1::Event& event) {
+  const int64_t raised_utc_ns = event.times().raised_utc_ns();
+  const auto seconds = static_cast<std::time_t>(raised_utc_ns / 1'000'000'000);
+  const auto latency = client::LatencyS(event);
   return Printable(fmt::format("{:%H:%M:%S}.{:03}  {:<14}  {:<10}  {}{}", fmt::gmtime(seconds),
-                               event.raised_utc_ns / 1'000'000 % 1000, client::Name(event.kind),
-                               event.link.empty() ? "-" : event.link, Detail(event),
+                               raised_utc_ns / 1'000'000 % 1000, client::Name(event.kind()),
+                               event.link().empty() ? "-" : event.link(), Detail(event),
                                latency ? fmt::format("  [{:.0f} ms]", *latency * 1e3) : ""));
 }
 

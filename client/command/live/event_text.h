@@ -2,12 +2,12 @@
 
 #include <string>
 
-#include "client/cpp/taclink/client.h"
+#include "taclink/v1/events.pb.h"
 
 namespace taclink::command {
 
 /// One line each, without its end.
-std::string EventJson(const client::Event& event, const std::string& run_id);
-std::string EventText(const client::Event& event);
+std::string EventJson(const v1::Event& event, const std::string& run_id);
+std::string EventText(const v1::Event& event);
 
 }  // namespace taclink::command

@@ -15,8 +15,7 @@ namespace {
 
 struct EventsOptions {
   std::string server = "127.0.0.1:50051";
-  client::EventOptions stream;
-  std::vector<std::string> kinds;
+  std::vector<std::string> links, kinds;
   std::string run_id;
   std::optional<uint64_t> after;
   bool all = false;
@@ -25,8 +24,8 @@ struct EventsOptions {
 };
 
 void PrintLost(bool json, const client::EventReader& reader, uint64_t& told) {
-  if (reader.events_lost() == told) return;
-  told = reader.events_lost();
+  if (reader.status().events_lost() == told) return;
+  told = reader.status().events_lost();
   if (json) {
     fmt::print("{}\n", Json({{"lost", told}}).dump());
   } else {
@@ -35,21 +34,25 @@ void PrintLost(bool json, const client::EventReader& reader, uint64_t& told) {
 }
 
 void PrintStart(bool json, const client::EventReader& reader) {
-  if (reader.run_changed()) {
-    fmt::print("{}\n", json ? Json({{"run_changed", true}, {"run_id", reader.place().run_id}}).dump()
+  if (reader.status().run_changed()) {
+    fmt::print("{}\n", json ? Json({{"run_changed", true}, {"run_id", reader.status().run_id()}}).dump()
                             : "-- the server was started anew: the end of its former run is unknown --");
   }
   std::fflush(stdout);
 }
 
 Result<void> RunEvents(const EventsOptions& options) {
-  client::EventOptions stream = options.stream;
-  for (const std::string& name : options.kinds) stream.kinds.push_back(*client::EventKindOf(name));
-  if (options.all) stream.resume.emplace();
-  if (options.after) stream.resume = client::EventPlace{options.run_id, *options.after};
+  v1::StreamEventsRequest request;
+  request.mutable_links()->Assign(options.links.begin(), options.links.end());
+  for (const std::string& name : options.kinds) request.add_kinds(*client::ValueOf<v1::EventKind>(name));
+  if (options.all) request.set_after_sequence(0);
+  if (options.after) {
+    request.set_run_id(options.run_id);
+    request.set_after_sequence(*options.after);
+  }
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
-  auto reader = connection->StreamEvents(stream);
+  auto reader = connection->StreamEvents(request);
   if (!reader) return reader.error();
   CatchInterrupts();
   PrintStart(options.json, **reader);
@@ -58,7 +61,7 @@ Result<void> RunEvents(const EventsOptions& options) {
     const auto event = (*reader)->Next(kInterruptPoll);
     PrintLost(options.json, **reader, lost_told);
     if (event) {
-      fmt::print("{}\n", options.json ? EventJson(*event, (*reader)->place().run_id) : EventText(*event));
+      fmt::print("{}\n", options.json ? EventJson(*event, (*reader)->status().run_id()) : EventText(*event));
       ++taken;
     } else if (event.error().code != ErrorCode::kTimeout) {
       return event.error();
@@ -76,10 +79,9 @@ void AddEvents(const Arguments& app, Selected& selected) {
   const Arguments command = app.AddCommand(
       "events", "Show what happens to a server's links: contacts, force levels, status, tares, drift");
   AddServerOption(command, options->server);
-  command.AddOption("--links", options->stream.links, "Names of links, separated by commas (all)")
-      .Delimiter(',');
+  command.AddOption("--links", options->links, "Names of links, separated by commas (all)").Delimiter(',');
   const auto check = [](const std::string& name) {
-    return client::EventKindOf(name) ? std::string() : "'" + name + "' is no kind of event";
+    return client::ValueOf<v1::EventKind>(name) ? std::string() : "'" + name + "' is no kind of event";
   };
   command
       .AddOption("--kinds", options->kinds, "Kinds of events, separated by commas (all): contact_begin, ...")

@@ -24,9 +24,9 @@ FrameOutput::FrameOutput(const std::string& title, bool json)
   if (live_) fmt::print("{}", kClearScreen);
 }
 
-void FrameOutput::Take(const client::Frame& frame, const std::vector<client::StreamCounts>& counts) {
+void FrameOutput::Take(const v1::LinkFrame& frame, const v1::StreamStatus& status) {
   if (json_) {
-    PrintDrops(counts);
+    PrintDrops(status);
     fmt::print("{}\n", FrameJson(frame));
     std::fflush(stdout);
   } else if (live_) {
@@ -37,21 +37,21 @@ void FrameOutput::Take(const client::Frame& frame, const std::vector<client::Str
   }
 }
 
-void FrameOutput::Refresh(const std::vector<client::StreamCounts>& counts) {
+void FrameOutput::Refresh(const v1::StreamStatus& status) {
   const auto now = steady_clock::now();
   if (!live_ || now - drawn_ < kRedraw) return;
   drawn_ = now;
-  fmt::print("{}", view_.Draw(counts, now));
+  fmt::print("{}", view_.Draw(status, now));
   std::fflush(stdout);
 }
 
 // A line of its own whenever the server left something out: {"dropped": {"link": frames since the start}}.
-void FrameOutput::PrintDrops(const std::vector<client::StreamCounts>& counts) {
+void FrameOutput::PrintDrops(const v1::StreamStatus& status) {
   uint64_t total = 0;
   Json dropped = Json::object();
-  for (const auto& link : counts) {
-    total += link.frames_dropped;
-    dropped[link.link] = link.frames_dropped;
+  for (const v1::LinkStreamCounts& link : status.links()) {
+    total += link.frames_dropped();
+    dropped[link.link()] = link.frames_dropped();
   }
   if (total == dropped_) return;
   dropped_ = total;

@@ -2,10 +2,9 @@
 
 #include <chrono>
 #include <string>
-#include <vector>
 
 #include "client/command/live/watch_view.h"
-#include "client/cpp/taclink/client.h"
+#include "taclink/v1/tactile.pb.h"
 
 namespace taclink::command {
 
@@ -16,13 +15,13 @@ class FrameOutput {
   /// `title`: of the view.
   FrameOutput(const std::string& title, bool json);
 
-  void Take(const client::Frame& frame, const std::vector<client::StreamCounts>& counts = {});
+  void Take(const v1::LinkFrame& frame, const v1::StreamStatus& status = {});
   /// Draws the view, now and then.
-  void Refresh(const std::vector<client::StreamCounts>& counts = {});
+  void Refresh(const v1::StreamStatus& status = {});
   bool drawn_over() const { return live_; }
 
  private:
-  void PrintDrops(const std::vector<client::StreamCounts>& counts);
+  void PrintDrops(const v1::StreamStatus& status);
 
   const bool json_;
   const bool live_;

@@ -66,7 +66,12 @@ class Player {
       std::this_thread::sleep_until(time);
     }
     ++sent_;
-    return writer_.Write({line.names, line.positions, line.velocities, UtcNs(time)});
+    v1::UpdateJointStatesRequest states;
+    states.mutable_names()->Assign(line.names.begin(), line.names.end());
+    states.mutable_positions()->Assign(line.positions.begin(), line.positions.end());
+    states.mutable_velocities()->Assign(line.velocities.begin(), line.velocities.end());
+    states.set_utc_ns(UtcNs(time));
+    return writer_.Write(states);
   }
   static system_clock::duration Duration(double seconds) {
     return std::chrono::duration_cast<system_clock::duration>(std::chrono::duration<double>(seconds));
@@ -96,8 +101,8 @@ Result<void> RunJoints(const JointsOptions& options) {
   } while (options.loop && options.file != "-");
   const auto summary = writer->Finish();
   if (!summary) return summary.error();
-  fmt::print("{} joint states accepted, {} refused{}\n", summary->accepted, summary->refused,
-             summary->first_refusal.empty() ? "" : ": " + summary->first_refusal);
+  fmt::print("{} joint states accepted, {} refused{}\n", summary->accepted(), summary->refused(),
+             summary->first_refusal().empty() ? "" : ": " + summary->first_refusal());
   return {};
 }
 

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <memory>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "client/command/cli/commands.h"
@@ -24,10 +23,11 @@ constexpr double kSlowest = 0.1, kFastest = 100;
 
 struct PlayOptions {
   std::string server = "127.0.0.1:50051";
-  client::ReplayOptions replay;
+  std::string log;
+  std::vector<std::string> links;
   std::string detail = "contacts";
-  double from_s = 0, to_s = 0;
-  bool events = false, contacts = false, json = false;
+  double speed = 1, from_s = 0, to_s = 0;
+  bool loop = false, events = false, contacts = false, json = false;
 };
 
 int64_t Ns(double seconds) {
@@ -35,24 +35,26 @@ int64_t Ns(double seconds) {
 }
 
 /// Seconds of the log become times.
-Result<client::ReplayOptions> ToReplay(const PlayOptions& options, client::Recordings& recordings) {
-  client::ReplayOptions replay = options.replay;
-  replay.detail = options.detail == "full"       ? client::Detail::kFull
-                  : options.detail == "geometry" ? client::Detail::kGeometry
-                                                 : client::Detail::kContacts;
-  replay.events = options.events;
-  replay.contacts = options.contacts;
-  replay.arm = false;
+Result<v1::ReplayRequest> ToReplay(const PlayOptions& options, client::Recordings& recordings) {
+  v1::ReplayRequest replay;
+  replay.set_log(options.log);
+  replay.mutable_links()->Assign(options.links.begin(), options.links.end());
+  replay.set_detail(*client::ValueOf<v1::Detail>(options.detail));
+  replay.set_speed(options.speed);
+  replay.set_loop(options.loop);
+  replay.set_without_events(!options.events);
+  replay.set_without_contacts(!options.contacts);
+  replay.set_without_arm(true);
   if (options.from_s == 0 && options.to_s == 0) return replay;
   const auto logs = recordings.List();
   if (!logs) return logs.error();
-  for (const client::Log& log : *logs) {
-    if (log.name != replay.log) continue;
-    if (log.start_utc_ns == 0)
+  for (const v1::Log& log : logs->logs()) {
+    if (log.name() != options.log) continue;
+    if (log.start_utc_ns() == 0)
       return Error{ErrorCode::kFailedPrecondition,
-                   replay.log + " is being written, so its times are not known yet"};
-    replay.from_utc_ns = log.start_utc_ns + Ns(options.from_s);
-    if (options.to_s > 0) replay.to_utc_ns = log.start_utc_ns + Ns(options.to_s);
+                   options.log + " is being written, so its times are not known yet"};
+    replay.set_from_utc_ns(log.start_utc_ns() + Ns(options.from_s));
+    if (options.to_s > 0) replay.set_to_utc_ns(log.start_utc_ns() + Ns(options.to_s));
     return replay;
   }
   return replay;  // the server says that there is no such log
@@ -63,24 +65,16 @@ class Output {
  public:
   explicit Output(const PlayOptions& options)
       : json_(options.json),
-        frames_("taclink record play " + options.replay.log + "   (Ctrl-C ends)", options.json) {}
+        frames_("taclink record play " + options.log + "   (Ctrl-C ends)", options.json) {}
 
-  void operator()(const client::Frame& frame) { frames_.Take(frame); }
-  void operator()(const client::Event& event) {
-    if (!frames_.drawn_over()) Line(json_ ? EventJson(event, "") : EventText(event));
-  }
-  void operator()(const client::ArmContacts& contacts) {
-    if (!frames_.drawn_over()) Line(json_ ? ContactsJson(contacts) : ContactsTable(contacts));
-  }
-  void operator()(const client::ReplayLoss& loss) {
-    if (!json_ && frames_.drawn_over()) return;
-    Line(json_ ? Json({{"lost", {{"link", loss.link}, {"frames", loss.count}}}}).dump()
-               : fmt::format("-- {}: {} frames are not in the log --", loss.link, loss.count));
-  }
-  void operator()(const client::Arm&) {}
-  void operator()(const client::ReplayStatus& status) {
-    damaged_ = status.damaged;
-    lateness_s_ = std::max(lateness_s_, status.lateness_s);
+  void Take(const v1::ReplayResponse& message) {
+    if (message.has_status()) TakeStatus(message.status());
+    if (message.has_frame()) return frames_.Take(message.frame());
+    if (frames_.drawn_over()) return;
+    if (message.has_event()) Line(json_ ? EventJson(message.event(), "") : EventText(message.event()));
+    if (message.has_contacts())
+      Line(json_ ? ContactsJson(message.contacts()) : ContactsTable(message.contacts()));
+    if (message.has_loss()) TakeLoss(message.loss());
   }
 
   void Refresh() { frames_.Refresh(); }
@@ -93,6 +87,14 @@ class Output {
   }
 
  private:
+  void TakeStatus(const v1::ReplayStatus& status) {
+    damaged_ = status.damaged();
+    lateness_s_ = std::max(lateness_s_, status.lateness_s());
+  }
+  void TakeLoss(const v1::RecordingLoss& loss) const {
+    Line(json_ ? Json({{"lost", {{"link", loss.link()}, {"frames", loss.count()}}}}).dump()
+               : fmt::format("-- {}: {} frames are not in the log --", loss.link(), loss.count()));
+  }
   static void Line(const std::string& text) {
     fmt::print("{}\n", text);
     std::fflush(stdout);
@@ -117,7 +119,7 @@ Result<void> RunPlay(const PlayOptions& options) {
   while (!IsInterrupted()) {
     const auto message = (*reader)->Next(kInterruptPoll);
     if (message) {
-      std::visit(output, message->content);
+      output.Take(*message);
     } else if (message.error().code == ErrorCode::kEndOfData) {
       break;
     } else if (message.error().code != ErrorCode::kTimeout) {
@@ -137,22 +139,22 @@ void AddPlay(const Arguments& record, Selected& selected) {
   const Arguments command =
       record.AddCommand("play", "Show a log of the server at its pace, as 'watch' does");
   AddServerOption(command, options->server);
-  command.AddOption("log", options->replay.log, "Name of the log, as 'list' shows it").Required();
-  command.AddOption("--link", options->replay.links, "Names of links (default: all)");
+  command.AddOption("log", options->log, "Name of the log, as 'list' shows it").Required();
+  command.AddOption("--link", options->links, "Names of links (default: all)");
   command.AddOption("--detail", options->detail, "contacts, geometry or full")
-      .Must(OneOf({"contacts", "geometry", "full"}))
+      .Must(OneOf(client::Names<v1::Detail>()))
       .ShowDefault();
   const auto check = [](const std::string& text) {
     const std::string outside = Within(kSlowest, kFastest).Problem(text);
     return text == "0" ? std::string() : outside;
   };
-  command.AddOption("--speed", options->replay.speed, "0.1 to 100 times as it happened; 0: as fast as it can")
+  command.AddOption("--speed", options->speed, "0.1 to 100 times as it happened; 0: as fast as it can")
       .Must(Check(check))
       .ShowDefault();
   command.AddOption("--from", options->from_s, "Begin so many seconds after the log's first message")
       .Must(Within(0, 1e9));
   command.AddOption("--to", options->to_s, "End there; 0: at its last one").Must(Within(0, 1e9));
-  command.AddFlag("--loop", options->replay.loop, "Begin anew at the end");
+  command.AddFlag("--loop", options->loop, "Begin anew at the end");
   command.AddFlag("--events", options->events, "Also events, as 'events' prints them");
   command.AddFlag("--contacts", options->contacts, "Also the arm's contacts, as 'contacts' prints them");
   command.AddFlag("--json", options->json, "One JSON object a line");

@@ -19,13 +19,13 @@
 namespace taclink::command {
 namespace {
 
-using client::LogCompression;
-using client::RecorderStatus;
 using client::Recordings;
 
 struct RecordOptions {
   std::string server = "127.0.0.1:50051";
-  client::RecordingOptions recording;
+  std::string name, note;
+  std::vector<std::string> links;
+  bool pictures = false;
   std::string compression = "configured";
   std::string log, output;
   double duration_s = 0;
@@ -38,45 +38,45 @@ Result<Recordings> Connect(const RecordOptions& options) {
   return connection->RecordingCalls();
 }
 
-Json RecorderJson(const RecorderStatus& status) {
-  return {{"state", client::Name(status.state)},
-          {"trouble", status.trouble},
-          {"last_trouble", status.last_trouble},
-          {"last_trouble_utc_ns", status.last_trouble_utc_ns},
-          {"log", status.log},
-          {"folder", status.folder},
-          {"started_utc_ns", status.started_utc_ns},
-          {"synced_utc_ns", status.synced_utc_ns},
-          {"bytes", status.bytes},
-          {"logs", status.logs},
-          {"frames", status.frames},
-          {"events", status.events},
-          {"frames_lost", status.frames_lost},
-          {"free_bytes", status.free_bytes},
-          {"pictures", status.pictures}};
+Json RecorderJson(const v1::RecorderStatus& status) {
+  return {{"state", client::Name(status.state())},
+          {"trouble", status.trouble()},
+          {"last_trouble", status.last_trouble()},
+          {"last_trouble_utc_ns", status.last_trouble_utc_ns()},
+          {"log", status.log()},
+          {"folder", status.folder()},
+          {"started_utc_ns", status.started_utc_ns()},
+          {"synced_utc_ns", status.synced_utc_ns()},
+          {"bytes", status.bytes()},
+          {"logs", status.logs()},
+          {"frames", status.frames()},
+          {"events", status.events()},
+          {"frames_lost", status.frames_lost()},
+          {"free_bytes", status.free_bytes()},
+          {"pictures", status.pictures()}};
 }
 
-void Print(const RecorderStatus& status, bool json) {
+void Print(const v1::RecorderStatus& status, bool json) {
   if (json) {
     fmt::print("{}\n", RecorderJson(status).dump());
     return;
   }
-  fmt::print("{}{}{}\n", client::Name(status.state), status.log.empty() ? "" : ": ", status.log);
-  if (!status.trouble.empty()) fmt::print("  {}\n", status.trouble);
-  if (status.last_trouble != status.trouble && !status.last_trouble.empty())
-    fmt::print("  before, at {}: {}\n", UtcText(status.last_trouble_utc_ns), status.last_trouble);
-  if (status.started_utc_ns != 0) {
-    fmt::print("  {} frames, {} lost, {} events, {} in {} logs\n", status.frames, status.frames_lost,
-               status.events, SizeText(status.bytes), status.logs);
+  fmt::print("{}{}{}\n", client::Name(status.state()), status.log().empty() ? "" : ": ", status.log());
+  if (!status.trouble().empty()) fmt::print("  {}\n", status.trouble());
+  if (status.last_trouble() != status.trouble() && !status.last_trouble().empty())
+    fmt::print("  before, at {}: {}\n", UtcText(status.last_trouble_utc_ns()), status.last_trouble());
+  if (status.started_utc_ns() != 0) {
+    fmt::print("  {} frames, {} lost, {} events, {} in {} logs\n", status.frames(), status.frames_lost(),
+               status.events(), SizeText(status.bytes()), status.logs());
   }
-  if (status.folder.empty()) {
+  if (status.folder().empty()) {
     fmt::print("  no folder is configured (recording.folder): nothing can be recorded\n");
   } else {
-    fmt::print("  folder {} on the server, {} free\n", status.folder, SizeText(status.free_bytes));
+    fmt::print("  folder {} on the server, {} free\n", status.folder(), SizeText(status.free_bytes()));
   }
 }
 
-Result<void> PrintStatus(const Result<RecorderStatus>& status, const RecordOptions& options) {
+Result<void> PrintStatus(const Result<v1::RecorderStatus>& status, const RecordOptions& options) {
   if (!status) return status.error();
   Print(*status, options.json);
   return {};
@@ -92,11 +92,14 @@ void WaitFor(double duration_s) {
 Result<void> Start(const RecordOptions& options) {
   auto recordings = Connect(options);
   if (!recordings) return recordings.error();
-  client::RecordingOptions recording = options.recording;
-  if (options.compression == "none") recording.compression = LogCompression::kNone;
-  if (options.compression == "zstd") recording.compression = LogCompression::kZstd;
-  if (options.compression == "lz4") recording.compression = LogCompression::kLz4;
-  const auto started = recordings->Start(recording);
+  v1::StartRecordingRequest request;
+  request.set_name(options.name);
+  request.mutable_links()->Assign(options.links.begin(), options.links.end());
+  request.set_pictures(options.pictures);
+  request.set_compression(
+      client::ValueOf<v1::LogCompression>(options.compression).value_or(v1::LOG_COMPRESSION_UNSPECIFIED));
+  request.set_note(options.note);
+  const auto started = recordings->Start(request);
   if (!started || options.duration_s <= 0) return PrintStatus(started, options);
   WaitFor(options.duration_s);
   return PrintStatus(recordings->Stop(), options);
@@ -114,32 +117,33 @@ Result<void> Status(const RecordOptions& options) {
   return PrintStatus(recordings->Status(), options);
 }
 
-Json LogJson(const client::Log& log) {
-  return {{"name", log.name},
-          {"bytes", log.bytes},
-          {"start_utc_ns", log.start_utc_ns},
-          {"end_utc_ns", log.end_utc_ns},
-          {"links", log.links},
-          {"frames", log.frames},
-          {"contacts", log.contacts ? Json(*log.contacts) : Json()},
-          {"pictures", log.pictures},
-          {"open", log.open},
-          {"problem", log.problem},
-          {"note", log.note}};
+Json LogJson(const v1::Log& log) {
+  return {{"name", log.name()},
+          {"bytes", log.bytes()},
+          {"start_utc_ns", log.start_utc_ns()},
+          {"end_utc_ns", log.end_utc_ns()},
+          {"links", std::vector<std::string>(log.links().begin(), log.links().end())},
+          {"frames", log.frames()},
+          {"contacts", log.has_contacts() ? Json(log.contacts()) : Json()},
+          {"pictures", log.pictures()},
+          {"open", log.open()},
+          {"problem", log.problem()},
+          {"note", log.note()}};
 }
 
-void PrintRow(const client::Log& log) {
-  fmt::print("{:<44} {:>9}", log.name, SizeText(log.bytes));
-  if (log.open) {
+void PrintRow(const v1::Log& log) {
+  fmt::print("{:<44} {:>9}", log.name(), SizeText(log.bytes()));
+  if (log.open()) {
     fmt::print("  being written");
-  } else if (log.start_utc_ns != 0) {
-    fmt::print("  {}  {:>8.1f} s  {} links, {} frames", UtcText(static_cast<uint64_t>(log.start_utc_ns)),
-               static_cast<double>(log.end_utc_ns - log.start_utc_ns) * 1e-9, log.links.size(), log.frames);
-    if (log.contacts) fmt::print(", {} contacts", *log.contacts);
-    if (log.pictures) fmt::print(", pictures");
+  } else if (log.start_utc_ns() != 0) {
+    fmt::print("  {}  {:>8.1f} s  {} links, {} frames", UtcText(static_cast<uint64_t>(log.start_utc_ns())),
+               static_cast<double>(log.end_utc_ns() - log.start_utc_ns()) * 1e-9, log.links_size(),
+               log.frames());
+    if (log.has_contacts()) fmt::print(", {} contacts", log.contacts());
+    if (log.pictures()) fmt::print(", pictures");
   }
-  fmt::print("{}{}\n", log.note.empty() ? "" : "  ", Printable(log.note));
-  if (!log.problem.empty()) fmt::print("  {}\n", Printable(log.problem));
+  fmt::print("{}{}\n", log.note().empty() ? "" : "  ", Printable(log.note()));
+  if (!log.problem().empty()) fmt::print("  {}\n", Printable(log.problem()));
 }
 
 Result<void> List(const RecordOptions& options) {
@@ -147,8 +151,8 @@ Result<void> List(const RecordOptions& options) {
   if (!recordings) return recordings.error();
   const auto logs = recordings->List();
   if (!logs) return logs.error();
-  if (!options.json && logs->empty()) fmt::print("no logs\n");
-  for (const client::Log& log : *logs) {
+  if (!options.json && logs->logs().empty()) fmt::print("no logs\n");
+  for (const v1::Log& log : logs->logs()) {
     if (options.json) {
       fmt::print("{}\n", LogJson(log).dump());
     } else {
@@ -209,12 +213,12 @@ void AddRecord(const Arguments& app, Selected& selected) {
   record.RequireCommand();
   auto options = std::make_shared<RecordOptions>();
   const Arguments start = AddOne(record, "start", "Begin a recording", options, selected, Start);
-  start.AddOption("--name", options->recording.name, "Part of the logs' names (default: the arm's name)");
-  start.AddOption("--link", options->recording.links, "Names of links (default: all)");
-  start.AddFlag("--pictures", options->recording.pictures, "Also the cameras' pictures, as they sent them");
+  start.AddOption("--name", options->name, "Part of the logs' names (default: the arm's name)");
+  start.AddOption("--link", options->links, "Names of links (default: all)");
+  start.AddFlag("--pictures", options->pictures, "Also the cameras' pictures, as they sent them");
   start.AddOption("--compression", options->compression, "Of the logs")
-      .Must(OneOf({"configured", "none", "zstd", "lz4"}));
-  start.AddOption("--note", options->recording.note, "Text kept in the logs");
+      .Must(OneOf(client::Names<v1::LogCompression>(), "configured"));
+  start.AddOption("--note", options->note, "Text kept in the logs");
   start
       .AddOption("--duration", options->duration_s,
                  "Stop after so many seconds, or with ^C; 0: later, by 'stop'")

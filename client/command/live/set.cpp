@@ -21,27 +21,23 @@ struct SetOptions {
   bool any_camera() const { return automatic_exposure || exposure_ms || gain; }
 };
 
-client::ForceModel ForceModelOf(const std::string& name) {
-  for (const auto model :
-       {client::ForceModel::kLiteral, client::ForceModel::kLinear, client::ForceModel::kPressurised,
-        client::ForceModel::kNonlinear, client::ForceModel::kAuto})
-    if (name == client::Name(model)) return model;
-  return client::ForceModel::kUnknown;
-}
-
 Result<void> RunSet(const SetOptions& options) {
   auto connection = ConnectTo(options.server);
   if (!connection) return connection.error();
   if (options.any_camera()) {
-    client::CameraSettings settings{.automatic_exposure = options.automatic_exposure, .gain = options.gain};
-    if (options.exposure_ms) settings.exposure_s = *options.exposure_ms * 1e-3;
-    if (auto set = connection->SetCamera(options.link, options.camera, settings); !set) return set;
+    v1::SetCameraRequest request;
+    request.set_link(options.link);
+    request.set_camera(options.camera);
+    if (options.automatic_exposure) request.set_automatic(true);
+    if (options.exposure_ms) request.set_exposure_s(*options.exposure_ms * 1e-3);
+    if (options.gain) request.set_gain(*options.gain);
+    if (auto set = connection->SetCamera(request); !set) return set;
     fmt::print("link {}: {} set\n", options.link,
                options.camera.empty() ? "both cameras are" : options.camera + " camera is");
   }
   if (options.force_model) {
-    if (auto set = connection->SetForceModel(options.link, ForceModelOf(*options.force_model)); !set)
-      return set;
+    const auto model = *client::ValueOf<v1::ForceModel>(*options.force_model);
+    if (auto set = connection->SetForceModel(options.link, model); !set) return set;
     fmt::print("link {}: forces are computed by the {} model\n", options.link,
                *options.force_model == "auto" ? "cheapest good enough" : *options.force_model);
   }
@@ -58,8 +54,8 @@ void AddSet(const Arguments& app, Selected& selected) {
   command.AddOption("--link", options->link, "Name of the link").Required();
   command
       .AddOption("--force-model", options->force_model,
-                 "auto (the cheapest that is good enough), nonlinear, pressurised, linear or literal")
-      .Must(OneOf({"auto", "nonlinear", "pressurised", "linear", "literal"}));
+                 "Name of the model; auto: the cheapest that is good enough")
+      .Must(OneOf(client::Names<v1::ForceModel>()));
   command.AddOption("--camera", options->camera, "top or bottom (default: both)")
       .Must(OneOf({"top", "bottom"}));
   const Option exposure =

@@ -23,44 +23,44 @@ std::string Force(double force_n) {
   return force_n > 0 ? fmt::format("{:.3f}", force_n) : "-";
 }
 
-void PrintText(const client::Arm& arm) {
+void PrintText(const v1::Arm& arm) {
   fmt::print("{:<12}  {:<12}  {:>9}  {:>8}  {:>12}  {:<8}  {}\n", "LINK", "REGION", "WARNING N", "ALARM N",
              "HYSTERESIS N", "LEVEL", "FORCE N");
-  for (const auto& link : arm.links) {
-    for (const auto& state : link.force_levels)
-      fmt::print("{:<12}  {:<12}  {:>9}  {:>8}  {:>12.3f}  {:<8}  {:.3f}\n", link.name,
-                 state.region.empty() ? "-" : state.region, Force(state.thresholds.warning_n),
-                 Force(state.thresholds.alarm_n), state.thresholds.hysteresis_n, client::Name(state.level),
-                 state.force_n);
+  for (const auto& link : arm.links()) {
+    for (const auto& state : link.force_levels())
+      fmt::print("{:<12}  {:<12}  {:>9}  {:>8}  {:>12.3f}  {:<8}  {:.3f}\n", link.name(),
+                 state.region().empty() ? "-" : state.region(), Force(state.thresholds().warning_n()),
+                 Force(state.thresholds().alarm_n()), state.thresholds().hysteresis_n(),
+                 client::Name(state.level()), state.force_n());
   }
 }
 
-void PrintThresholdsJson(const client::Arm& arm) {
+void PrintThresholdsJson(const v1::Arm& arm) {
   Json list = Json::array();
-  for (const auto& link : arm.links) {
-    for (const auto& state : link.force_levels)
-      list.push_back({{"link", link.name},
-                      {"region", state.region},
-                      {"warning_n", state.thresholds.warning_n},
-                      {"alarm_n", state.thresholds.alarm_n},
-                      {"hysteresis_n", state.thresholds.hysteresis_n},
-                      {"level", client::Name(state.level)},
-                      {"force_n", state.force_n}});
+  for (const auto& link : arm.links()) {
+    for (const auto& state : link.force_levels())
+      list.push_back({{"link", link.name()},
+                      {"region", state.region()},
+                      {"warning_n", state.thresholds().warning_n()},
+                      {"alarm_n", state.thresholds().alarm_n()},
+                      {"hysteresis_n", state.thresholds().hysteresis_n()},
+                      {"level", client::Name(state.level())},
+                      {"force_n", state.force_n()}});
   }
   fmt::print("{}\n", Json({{"thresholds", std::move(list)}}).dump());
 }
 
 // What is not given stays as it is.
-Result<void> Set(client::Client& connection, const ThresholdsOptions& options, const client::Arm& arm) {
-  client::Thresholds thresholds;
-  for (const auto& link : arm.links) {
-    for (const auto& state : link.force_levels) {
-      if (link.name == options.link && state.region == options.region) thresholds = state.thresholds;
+Result<void> Set(client::Client& connection, const ThresholdsOptions& options, const v1::Arm& arm) {
+  v1::Thresholds thresholds;
+  for (const auto& link : arm.links()) {
+    for (const auto& state : link.force_levels()) {
+      if (link.name() == options.link && state.region() == options.region) thresholds = state.thresholds();
     }
   }
-  thresholds.warning_n = options.warning_n.value_or(thresholds.warning_n);
-  thresholds.alarm_n = options.alarm_n.value_or(thresholds.alarm_n);
-  thresholds.hysteresis_n = options.hysteresis_n.value_or(thresholds.hysteresis_n);
+  if (options.warning_n) thresholds.set_warning_n(*options.warning_n);
+  if (options.alarm_n) thresholds.set_alarm_n(*options.alarm_n);
+  if (options.hysteresis_n) thresholds.set_hysteresis_n(*options.hysteresis_n);
   const auto set = connection.SetThresholds(options.link, options.region, thresholds);
   return set ? Result<void>() : set.error();
 }

@@ -27,15 +27,15 @@ struct WatchOptions {
   uint64_t count = 0;
 };
 
-client::StreamOptions ToStream(const WatchOptions& options) {
-  return {.links = options.links,
-          .detail = options.detail == "full"       ? client::Detail::kFull
-                    : options.detail == "geometry" ? client::Detail::kGeometry
-                                                   : client::Detail::kContacts,
-          .max_rate_hz = options.rate_hz,
-          .delivery = options.every ? client::Delivery::kEvery : client::Delivery::kLatest,
-          .deadband_force_n = options.deadband_n,
-          .deadband_move_m = options.deadband_mm * 1e-3};
+v1::StreamFramesRequest ToStream(const WatchOptions& options) {
+  v1::StreamFramesRequest request;
+  request.mutable_links()->Assign(options.links.begin(), options.links.end());
+  request.set_detail(*client::ValueOf<v1::Detail>(options.detail));
+  request.set_max_rate_hz(options.rate_hz);
+  request.set_delivery(options.every ? v1::DELIVERY_EVERY : v1::DELIVERY_LATEST);
+  request.set_deadband_force_n(options.deadband_n);
+  request.set_deadband_move_m(options.deadband_mm * 1e-3);
+  return request;
 }
 
 Result<void> RunWatch(const WatchOptions& options) {
@@ -54,7 +54,7 @@ Result<void> RunWatch(const WatchOptions& options) {
     const auto frame = (*reader)->Next(kInterruptPoll);
     if (frame) {
       silence_s = 0;
-      output.Take(*frame, (*reader)->counts());
+      output.Take(*frame, (*reader)->status());
       ++taken;
     } else if (frame.error().code != ErrorCode::kTimeout) {
       return frame.error();
@@ -65,7 +65,7 @@ Result<void> RunWatch(const WatchOptions& options) {
                                options.server, patience_s)};
     }
     if (std::ferror(stdout) != 0) break;  // main reports it
-    output.Refresh((*reader)->counts());
+    output.Refresh((*reader)->status());
   }
   return {};
 }
@@ -80,7 +80,7 @@ void AddWatch(const Arguments& app, Selected& selected) {
   command.AddOption("--rate", options->rate_hz, "At most so many frames a second of each link (all)")
       .Must(Positive());
   command.AddOption("--detail", options->detail, "contacts, geometry or full")
-      .Must(OneOf({"contacts", "geometry", "full"}))
+      .Must(OneOf(client::Names<v1::Detail>()))
       .ShowDefault();
   command.AddOption("--deadband-force", options->deadband_n, "Pass over forces that change by less, N")
       .Must(Positive());

@@ -10,6 +10,8 @@
 #include "client/command/cli/log_text.h"
 #include "client/command/logs/log_tools.h"
 #include "client/command/logs/solve_log.h"
+#include "taclink/v1/frame.pb.h"
+#include "wire/enum_names.h"
 
 namespace taclink::command {
 namespace {
@@ -190,7 +192,7 @@ void AddLogSolve(const Arguments& log, Selected& selected) {
   command
       .AddOption("--force-model", options->force_model,
                  "In place of the recorded one; auto: cheapest that is good enough")
-      .Must(OneOf({"auto", "literal", "linear", "pressurised", "nonlinear"}));
+      .Must(OneOf(wire::NamesOf<v1::ForceModel>().All()));
   command
       .AddOption("--force-refinement", options->force_refinement,
                  "Elements per interval of the marker grid; 0: auto")

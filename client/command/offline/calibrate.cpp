@@ -165,7 +165,7 @@ Result<std::vector<RestPictures>> ReadPairs(const std::vector<std::string>& path
 }
 
 Result<void> Calibrate(const CalibrateOptions& options) {
-  if (!options.live.options.link.empty()) {
+  if (!options.live.link.empty()) {
     LinkCalibration live = options.live;
     live.out = options.out;
     live.json = options.json;
@@ -219,18 +219,16 @@ void AddCalibrate(const Arguments& app, Selected& selected) {
       .Must(OneOf({"division", "kannala_brandt"}));
   command.AddOption("-o,--out", options->out, "Calibration file to write (YAML)");
   const Option link =
-      command.AddOption("--link", options->live.options.link,
+      command.AddOption("--link", options->live.link,
                         "Instead of pictures: a link of a running server, which then uses the result");
   AddServerOption(command, options->live.server);
-  command.AddOption("--pairs", options->live.options.pairs, "Rest pairs that the server takes")
+  command.AddOption("--pairs", options->live.pairs, "Rest pairs that the server takes")
       .Must(Within(1, 300))
       .ShowDefault()
       .Needs(link);
-  command
-      .AddFlag("--save", options->live.options.save,
-               "The server writes the link's configured calibration file")
+  command.AddFlag("--save", options->live.save, "The server writes the link's configured calibration file")
       .Needs(link);
-  command.AddFlag("--force", options->live.options.force, "Even while the link shows contacts").Needs(link);
+  command.AddFlag("--force", options->live.force, "Even while the link shows contacts").Needs(link);
   command.AddOption("--residuals", options->residuals,
                     "Picture of the residuals to write (PNG); without, beside the calibration file");
   command

@@ -7,6 +7,7 @@
 #include "client/command/cli/json.h"
 #include "client/command/offline/marker_csv.h"
 #include "client/command/offline/picture_solver.h"
+#include "client/cpp/taclink/values.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/marker_solve.h"
 
@@ -239,7 +240,7 @@ void AddSolve(const Arguments& app, Selected& selected) {
           "With --markers: their standard deviation in x and y; z: 3 times; told by themselves if not given")
       .Must(Within(1e-4, 10));
   command.AddOption("--force-model", options->force_model, "auto: the cheapest that is good enough")
-      .Must(OneOf({"auto", "literal", "linear", "pressurised", "nonlinear"}));
+      .Must(OneOf(client::Names<v1::ForceModel>()));
   command
       .AddOption("--force-refinement", options->force_refinement,
                  "Elements per interval of the marker grid; 0: what the model does best with")

@@ -9,26 +9,29 @@
 #include <string>
 #include <thread>
 
-using namespace taclink::client;
+namespace client = taclink::client;
+namespace v1 = taclink::v1;
 
 namespace {
 
-void PrintLinks(const Arm& arm) {
-  std::printf("%s, server %s\n", arm.name.c_str(), arm.server_version.c_str());
-  for (const Link& link : arm.links) {
-    std::printf("  %-12s %-10s %d markers, %.0f mm long\n", link.name.c_str(), Name(link.status),
-                link.model.paths * link.model.rings, 1e3 * link.model.length_m);
+void PrintLinks(const v1::Arm& arm) {
+  std::printf("%s, server %s\n", arm.name().c_str(), arm.server_version().c_str());
+  for (const v1::Link& link : arm.links()) {
+    const v1::MarkerGrid& markers = link.model().markers();
+    std::printf("  %-12s %-10s %u markers, %.0f mm long\n", link.name().c_str(), client::Name(link.status()),
+                markers.paths() * markers.rings(), 1e3 * link.model().length_m());
   }
 }
 
-void PrintContacts(const Frame& frame) {
-  for (const Contact& contact : frame.contacts) {
-    const Vector3& f = contact.force_n;
-    const Vector3& p = contact.center_m;
-    std::printf("%s #%llu: force %+.2f %+.2f %+.2f N at %+.1f %+.1f %+.1f mm", frame.link.c_str(),
-                static_cast<unsigned long long>(contact.id), f[0], f[1], f[2], 1e3 * p[0], 1e3 * p[1],
-                1e3 * p[2]);
-    if (const auto latency = frame.latency_s()) std::printf(", %.1f ms after exposure", 1e3 * *latency);
+void PrintContacts(const v1::LinkFrame& frame) {
+  const auto latency = client::LatencyS(frame);
+  for (const v1::Contact& contact : frame.contacts()) {
+    const v1::Vector3& f = contact.force_n();
+    const v1::Vector3& p = contact.center_m();
+    std::printf("%s #%llu: force %+.2f %+.2f %+.2f N at %+.1f %+.1f %+.1f mm", frame.link().c_str(),
+                static_cast<unsigned long long>(contact.id()), f.x(), f.y(), f.z(), 1e3 * p.x(), 1e3 * p.y(),
+                1e3 * p.z());
+    if (latency) std::printf(", %.1f ms after exposure", 1e3 * *latency);
     std::printf("\n");
   }
   std::fflush(stdout);
@@ -37,20 +40,22 @@ void PrintContacts(const Frame& frame) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  FollowOptions options;
+  client::FollowOptions options;
   if (argc > 1) options.address = argv[1];
   const double seconds = argc > 2 ? std::strtod(argv[2], nullptr) : 10;
 
-  auto client = Client::Connect(options.address);
-  if (!client) return std::fprintf(stderr, "%s\n", client.error().message.c_str()), 1;
-  const auto arm = client->GetArm();
+  auto connection = client::Client::Connect(options.address);
+  if (!connection) return std::fprintf(stderr, "%s\n", connection.error().message.c_str()), 1;
+  const auto arm = connection->GetArm();
   if (!arm) return std::fprintf(stderr, "%s\n", arm.error().message.c_str()), 1;
   PrintLinks(*arm);
 
-  options.on_disconnected = [](const Disconnection& why) {
+  options.on_disconnected = [](const client::Disconnection& why) {
     std::fprintf(stderr, "%s; attempt %d in %lld ms\n", why.error.message.c_str(), why.attempt,
                  static_cast<long long>(why.delay.count()));
   };
-  const auto frames = FollowFrames(options, {.max_rate_hz = 5}, PrintContacts);
+  v1::StreamFramesRequest request;
+  request.set_max_rate_hz(5);
+  const auto frames = client::FollowFrames(options, request, PrintContacts);
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
 }

@@ -53,17 +53,18 @@ class Subscription {
   std::unique_ptr<Worker> worker_;
 };
 
-/// What was published while there was no connection is missing: Frame::sequence shows the gap.
-std::unique_ptr<Subscription> FollowFrames(FollowOptions options, StreamOptions stream,
-                                           std::function<void(const Frame&)> on_frame);
+/// What was published while there was no connection is missing: LinkFrame.sequence shows the gap.
+std::unique_ptr<Subscription> FollowFrames(FollowOptions options, v1::StreamFramesRequest request,
+                                           std::function<void(const v1::LinkFrame&)> on_frame);
 
 /// `max_rate_hz` 0: whenever a link publishes.
-std::unique_ptr<Subscription> FollowContacts(FollowOptions options, double max_rate_hz,
-                                             std::function<void(const ArmContacts&)> on_contacts);
+std::unique_ptr<Subscription> FollowContacts(
+    FollowOptions options, double max_rate_hz,
+    std::function<void(const v1::StreamContactsResponse&)> on_contacts);
 
-/// Goes on after the event that came last: none is missed as long as the server still has it in its history
-/// and was not started anew.
-std::unique_ptr<Subscription> FollowEvents(FollowOptions options, EventOptions events,
-                                           std::function<void(const Event&)> on_event);
+/// Resumes after the newest event: none is missed as long as the server still has it in its history
+/// and was not restarted.
+std::unique_ptr<Subscription> FollowEvents(FollowOptions options, v1::StreamEventsRequest request,
+                                           std::function<void(const v1::Event&)> on_event);
 
 }  // namespace taclink::client

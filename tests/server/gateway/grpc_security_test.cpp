@@ -62,13 +62,13 @@ std::string ThresholdsMessage() {
 std::string WhoSetThresholds(TestServer& server, const std::function<void()>& order) {
   server.arm().events().Start();
   auto client = server.Connect();
-  const auto events = client.StreamEvents({.kinds = {client::EventKind::kThresholds}}, kForever);
+  const auto events = client.StreamEvents(EventsOf({v1::EVENT_KIND_THRESHOLDS}), kForever);
   EXPECT_TRUE(events.ok());
   order();
   const auto event = (*events)->Next(kForever);
   server.arm().events().Stop();
-  EXPECT_TRUE(event.ok() && event->accepted);
-  return event ? event->who : "";
+  EXPECT_TRUE(event.ok() && event->operation().accepted());
+  return event ? event->operation().who() : "";
 }
 
 class GrpcSecurity : public SecurityTest {
@@ -158,17 +158,19 @@ TEST_F(GrpcSecurity, AViewerSeesButDoesNotChange) {
   auto viewer = Connect({.token = kViewer}), admin = Connect({.token = kOperator});
   ASSERT_TRUE(viewer.ok() && admin.ok());
   EXPECT_TRUE(viewer->StreamFrames({}, kForever).ok());
-  const auto refused = viewer->Calibrate({.link = "no such"}, {}, kForever);
+  v1::CalibrateRequest request;
+  request.set_link("no such");
+  const auto refused = viewer->Calibrate(request, {}, kForever);
   EXPECT_EQ(refused.error().code, ErrorCode::kPermissionDenied);
   EXPECT_THAT(refused.error().message, HasSubstr("'eve' is a viewer"));
-  EXPECT_EQ(admin->Calibrate({.link = "no such"}, {}, kForever).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(admin->Calibrate(request, {}, kForever).error().code, ErrorCode::kNotFound);
 }
 
 TEST_F(GrpcSecurity, TheAuditNamesTheTokenAndTheAddress) {
   Serve(WithTokens());
   const std::string who = WhoSetThresholds(arm_, [this] {
     auto otto = Connect({.token = kOperator});
-    EXPECT_TRUE(otto.ok() && otto->SetThresholds("lower", "", {.warning_n = 1, .alarm_n = 2}, kForever).ok());
+    EXPECT_TRUE(otto.ok() && otto->SetThresholds("lower", "", MakeThresholds(1, 2), kForever).ok());
   });
   EXPECT_THAT(who, ::testing::StartsWith("otto ipv4:127.0.0.1:"));
 }

@@ -59,7 +59,7 @@ class PublisherTest : public ::testing::Test {
     server_.Publish(sequence % 2, sequence, server_.clock().MonotonicNs());
   }
   void RaiseEvent(double warning_n) {
-    ASSERT_TRUE(server_.Connect().SetThresholds("upper", "", {.warning_n = warning_n}).ok());
+    ASSERT_TRUE(server_.Connect().SetThresholds("upper", "", MakeThresholds(warning_n)).ok());
   }
 
   TestServer server_;

@@ -1,0 +1,81 @@
+#include "client/cpp/taclink/values.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <mutex>
+
+#include "wire/enum_names.h"
+
+namespace taclink::client {
+namespace {
+
+std::optional<double> SecondsSince(int64_t utc_ns) {
+  if (utc_ns == 0) return std::nullopt;
+  const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
+  return static_cast<double>(now.count() - utc_ns) * 1e-9;
+}
+
+// The names of each type are made once. The map is never destroyed, because threads may still use it while
+// the program ends.
+const wire::EnumNames& NamesOf(const google::protobuf::EnumDescriptor& type) {
+  static std::mutex mutex;
+  static auto& known = *new std::map<const google::protobuf::EnumDescriptor*, wire::EnumNames>;
+  const std::lock_guard lock(mutex);
+  return known.try_emplace(&type, type).first->second;
+}
+
+}  // namespace
+
+Vector3 ToArray(const v1::Vector3& vector) {
+  return {vector.x(), vector.y(), vector.z()};
+}
+
+double Norm(const v1::Vector3& vector) {
+  return std::hypot(vector.x(), vector.y(), vector.z());
+}
+
+std::vector<Vector3> Points(const google::protobuf::RepeatedField<float>& numbers) {
+  std::vector<Vector3> points(static_cast<size_t>(numbers.size()) / 3);
+  auto next = numbers.begin();
+  for (Vector3& point : points) {
+    for (double& component : point) component = static_cast<double>(*next++);
+  }
+  return points;
+}
+
+std::optional<Covariance3> Covariance(const google::protobuf::RepeatedField<double>& numbers) {
+  Covariance3 covariance{};
+  if (static_cast<size_t>(numbers.size()) != covariance.size()) return std::nullopt;
+  std::copy(numbers.begin(), numbers.end(), covariance.begin());
+  return covariance;
+}
+
+Vector3 Sigmas(const Covariance3& covariance) {
+  const auto root = [](double variance) { return std::sqrt(std::max(0.0, variance)); };
+  return {root(covariance[0]), root(covariance[3]), root(covariance[5])};
+}
+
+std::optional<double> LatencyS(const v1::LinkFrame& frame) {
+  return frame.replayed() ? std::nullopt : SecondsSince(frame.times().exposure_utc_ns());
+}
+
+// The server sets sent_utc_ns when it sends an event live; logs do not have it.
+std::optional<double> LatencyS(const v1::Event& event) {
+  return event.times().sent_utc_ns() == 0 ? std::nullopt : SecondsSince(event.times().exposure_utc_ns());
+}
+
+const char* EnumName(const google::protobuf::EnumDescriptor& type, int number) {
+  return NamesOf(type).Name(number);
+}
+
+std::optional<int> EnumNumber(const google::protobuf::EnumDescriptor& type, std::string_view name) {
+  return NamesOf(type).Number(name);
+}
+
+std::vector<std::string> EnumNames(const google::protobuf::EnumDescriptor& type) {
+  return NamesOf(type).All();
+}
+
+}  // namespace taclink::client
