@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <exception>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -49,11 +50,20 @@ struct Options {
   std::string log_level, log_format;  // in place of the configured ones
   bool print_config = false;
   bool check_config = false;
+  bool print_schema = false;
+  bool print_reference = false;
 };
 
-int Complain(std::string message, int code) {
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  std::fprintf(stderr, "taclinkd: %s\n", Printable(message).c_str());
+// A configuration has a line for each of its errors.
+std::vector<std::string> LinesOf(const std::string& message) {
+  std::vector<std::string> lines;
+  std::istringstream in(message);
+  for (std::string line; std::getline(in, line);) lines.push_back(Printable(line));
+  return lines;
+}
+
+int Complain(const std::string& message, int code) {
+  for (const std::string& line : LinesOf(message)) std::fprintf(stderr, "taclinkd: %s\n", line.c_str());
   return code;
 }
 
@@ -114,9 +124,10 @@ void Reload(const Options& options, Reloader& reloader, Security& security, Arm&
   const int64_t now_us = SystemClock().MonotonicNs() / 1000;
   systemd.Send("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(now_us));
   if (const auto next = Configure(options); !next) {
-    const std::string text = "the configuration in use stays: " + next.error().message;
-    SPDLOG_ERROR("SIGHUP: {}", text);
-    Audit(arm, "configuration", false, text);
+    const std::vector<std::string> lines = LinesOf(next.error().message);
+    for (const std::string& line : lines) SPDLOG_ERROR("SIGHUP: the configuration in use stays: {}", line);
+    Audit(arm, "configuration", false,
+          fmt::format("the configuration in use stays: {}", fmt::join(lines, "; ")));
   } else {
     const Reloader::Outcome outcome = reloader.Reload(*next);
     for (const auto& error : outcome.errors) SPDLOG_ERROR("SIGHUP: {}", error);
@@ -222,9 +233,7 @@ int Check(const Options& options, const Config& config) {
   return 0;
 }
 
-int Main(int argc, char** argv) {
-  Options options;
-  CLI::App app("Serves the soft tactile links of an arm over gRPC", "taclinkd");
+void AddOptions(CLI::App& app, Options& options) {
   app.set_version_flag("--version", std::string(TACLINK_VERSION));
   app.add_option("--config", options.config, "Configuration file (default: a simulated arm of four links)");
   CLI::Option* replay = app.add_option(
@@ -240,15 +249,30 @@ int Main(int argc, char** argv) {
   app.add_flag("--check-config", options.check_config,
                "Make all that the configuration names, say OK or all that is wrong, and exit")
       ->excludes(replay);
+  app.add_flag("--print-schema", options.print_schema, "Print the JSON schema of the configuration and exit");
+  app.add_flag("--print-config-reference", options.print_reference,
+               "Print all keys of the configuration as a page of Markdown (docs/configuration.md) and exit");
   app.add_option("--log-level", options.log_level, "In place of the configured one")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}));
   app.add_option("--log-format", options.log_format, "In place of the configured one")
       ->check(CLI::IsMember({"text", "json"}));
+}
+
+int Main(int argc, char** argv) {
+  Options options;
+  CLI::App app("Serves the soft tactile links of an arm over gRPC", "taclinkd");
+  AddOptions(app, options);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);
-    return Complain(std::string(e.what()) + "; see taclinkd --help", kUsage);
+    std::string what = e.what();
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    return Complain(what + "; see taclinkd --help", kUsage);
+  }
+  if (options.print_schema || options.print_reference) {
+    std::fputs((options.print_schema ? ConfigSchema() : ConfigReference()).c_str(), stdout);
+    return 0;
   }
   // gRPC's own messages are for its developers.
   gpr_set_log_function([](gpr_log_func_args* args) {

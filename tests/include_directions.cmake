@@ -74,7 +74,7 @@ folder(server/rpc/services sensing/core wire server/link server/events server/se
 folder(server/rpc sensing/core server/process server/security server/arm server/rpc/requests server/rpc/services)
 folder(server/publish sensing/core wire server/config server/process server/security server/arm server/messages)
 folder(server/gateway sensing/core server/config server/process server/link server/security server/arm server/rpc server/publish)
-folder(server/assembly sensing/core sensing/model sensing/camera sensing/capture sensing/pipeline sensing/simulation mcap
+folder(server/assembly sensing/core sensing/yaml sensing/model sensing/camera sensing/capture sensing/pipeline sensing/simulation mcap
        wire/log server/config server/process server/hub server/pressure server/link server/security server/arm server/recording
        server/replay)
 folder(server sensing/core server/config server/process server/security server/recording server/rpc server/publish

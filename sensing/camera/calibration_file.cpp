@@ -55,6 +55,8 @@ Result<StereoRig> ReadRig(Result<YamlFile> file, const LinkModel& model) {
   if (!file) return file.error();
   YamlMap& root = file->root();
   const int version = root.Integer("taclink_calibration", {.min = 1, .max = kFormatVersion});
+  // Another version's keys mean something else.
+  if (root.Has("taclink_calibration") && root.Failed("taclink_calibration")) return file->Finish().error();
   if (const std::string name = root.Text("model"); !name.empty() && name != model.name) {
     root.Fail("model", "is '" + name + "', but the link's model is '" + model.name + "'");
   }

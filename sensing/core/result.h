@@ -22,7 +22,7 @@ enum class ErrorCode {
   kInternal,            ///< a defect of this program
 };
 
-/// What failed, where, and what to do about it, in one line.
+/// What failed, where, and what to do about it, in one line; of a file that was read, in one line per error.
 struct Error {
   ErrorCode code = ErrorCode::kInternal;
   std::string message;

@@ -26,12 +26,14 @@ Mat3 DesignedRotation(CameraId id) {
 
 RadiusProfile ReadProfile(YamlMap map, double length_mm) {
   RadiusProfile profile = RadiusProfile::Constant(1);
-  switch (map.Choice("shape", {"cylinder", "arc", "spline"})) {
+  const size_t shape = map.Choice("shape", {"cylinder", "arc", "spline"});
+  if (map.Failed("shape")) return profile;  // the other keys depend on it
+  switch (shape) {
     case 1: {
       const double end = map.Number("end_radius_mm", kPositive);
       const double middle = map.Number("middle_radius_mm", kPositive);
-      if (std::abs(middle - end) >= length_mm / 2)
-        map.Fail("middle_radius_mm", "bulges more than half a circle");
+      if (length_mm > 0 && std::abs(middle - end) >= length_mm / 2)
+        map.Fail("middle_radius_mm", "bulges more than half a circle", {"end_radius_mm"});
       profile = RadiusProfile::Arc(length_mm, end, middle);
       break;
     }
@@ -99,13 +101,14 @@ void ReadMarkers(YamlMap map, LinkModel& model) {
   }
   double last = 0;
   for (const double z : grid.rings_z_mm) {
-    if (z <= last || z >= model.length_mm)
-      map.Fail("rings_z_mm", "must rise and lie between the clamped ends");
+    if (z <= last || (model.length_mm > 0 && z >= model.length_mm))
+      map.Fail("rings_z_mm", "must rise and lie between the clamped ends", {"rings"});
     last = z;
   }
-  if (grid.rings_z_mm.size() < 2) map.Fail("rings_z_mm", "needs at least 2 rings");
+  if (grid.rings_z_mm.size() < 2) map.Fail("rings_z_mm", "needs at least 2 rings", {"rings"});
   if (grid.rings_z_mm.size() * static_cast<size_t>(grid.paths) > kMaxMarkers) {
-    map.Fail("paths", "times the number of rings must be at most " + std::to_string(kMaxMarkers));
+    map.Fail("paths", "times the number of rings must be at most " + std::to_string(kMaxMarkers),
+             {"rings", "rings_z_mm"});
   }
   grid.diameter_mm = map.Number("diameter_mm", kPositive);
   grid.center_depth_mm =
@@ -135,10 +138,11 @@ Result<LinkModel> ReadLinkModel(YamlFile file) {
   YamlMap& root = file.root();
   LinkModel model;
   const int version = root.Integer("taclink_model", {.min = 1, .max = kFormatVersion});
+  // Another version's keys mean something else.
+  if (root.Has("taclink_model") && root.Failed("taclink_model")) return file.Finish().error();
   model.name = root.Text("name");
   model.description = root.Prose("description", "");
   ReadSkin(root.Map("skin"), version, model);
-  if (auto good = file.Finish(); !good) return good.error();
   ReadMarkers(root.Map("markers"), model);
   YamlMap tube = root.Map("tube");
   model.tube_outer_radius_mm = tube.Number("outer_radius_mm", 0.0, kNotNegative);
@@ -164,6 +168,7 @@ CameraModel ReadCamera(YamlMap map, CameraId id) {
   const auto center = map.Numbers("principal_point_px", 2);
   camera.lens.principal_point_px = Vec2(center[0], center[1]);
   camera.lens.kind = static_cast<LensKind>(map.Choice("lens", {kLensNames.begin(), kLensNames.end()}, 0));
+  if (map.Failed("lens")) map.Abandon();
   if (camera.lens.kind == LensKind::kKannalaBrandt) {
     const auto k = map.Numbers("fisheye_k", 4);
     std::copy(k.begin(), k.end(), camera.lens.fisheye_k.begin());

@@ -38,13 +38,13 @@ SceneContact ReadContact(YamlMap& map, double duration_s) {
   if (map.Has("force_n")) contact.force_n = map.Number("force_n", kNotNegative);
   if (map.Has("depth_mm")) contact.depth_mm = map.Number("depth_mm", kNotNegative);
   if (contact.force_n.has_value() == contact.depth_mm.has_value())
-    map.Fail("force_n", "or 'depth_mm': give exactly one of them");
+    map.Fail("force_n", "or 'depth_mm': give exactly one of them", {"depth_mm"});
   contact.begin_s = map.Number("begin_s", {.min = 0, .max = duration_s});
   contact.end_s = map.Number("end_s", {.min = 0, .max = duration_s});
   contact.ramp_s = map.Number("ramp_s", 0.2, kNotNegative);
-  if (contact.end_s <= contact.begin_s) map.Fail("end_s", "must be after begin_s");
+  if (contact.end_s <= contact.begin_s) map.Fail("end_s", "must be after begin_s", {"begin_s"});
   if (2 * contact.ramp_s > contact.end_s - contact.begin_s)
-    map.Fail("ramp_s", "must fit twice between begin_s and end_s");
+    map.Fail("ramp_s", "must fit twice between begin_s and end_s", {"begin_s", "end_s"});
   map.Done();
   return contact;
 }
@@ -104,6 +104,8 @@ Result<Scene> ReadScene(YamlFile file) {
   YamlMap& root = file.root();
   Scene scene;
   root.Integer("taclink_scene", {.min = kFormatVersion, .max = kFormatVersion});
+  // Another version's keys mean something else.
+  if (root.Has("taclink_scene") && root.Failed("taclink_scene")) return file.Finish().error();
   scene.name = root.Text("name");
   scene.description = root.Prose("description", "");
   scene.model = root.Text("model", "cylinder");
@@ -115,7 +117,8 @@ Result<Scene> ReadScene(YamlFile file) {
   scene.loop = root.Bool("loop", true);
   scene.seed = static_cast<uint64_t>(root.Integer("seed", 1, kNotNegative));
   scene.pressure = ReadPressure(root);
-  for (YamlMap& map : root.Maps("contacts")) scene.contacts.push_back(ReadContact(map, scene.duration_s));
+  const double last_s = root.Failed("duration_s") ? kNotNegative.max : scene.duration_s;
+  for (YamlMap& map : root.Maps("contacts")) scene.contacts.push_back(ReadContact(map, last_s));
   if (scene.contacts.size() > kMaxSceneContacts)
     root.Fail("contacts", "must be at most " + std::to_string(kMaxSceneContacts));
   scene.camera = ReadCameraEffects(root.Map("camera"));

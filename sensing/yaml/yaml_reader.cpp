@@ -7,11 +7,14 @@
 #include <fstream>
 #include <sstream>
 #include <type_traits>
+#include <utility>
 
 #include "sensing/core/read_file.h"
 
 namespace taclink {
 namespace {
+
+constexpr size_t kMostProblems = 100;  // a file of another kind would fill the screen
 
 // Lines count from 1; nodes that are not from the file have none.
 int LineOf(const YAML::Node& node, int otherwise) {
@@ -106,23 +109,57 @@ YAML::Node YamlMap::Find(const std::string& key, bool required) {
     const YAML::Node found = node_[key];
     if (found.IsDefined()) return found;
   }
-  if (required && !context_->error) {
-    FailAt(node_, key, "is missing");
-    context_->only_missing = true;
-  }
+  if (required) FailAt(node_, key, "is missing", true);
   return YAML::Node(YAML::NodeType::Undefined);
 }
 
-void YamlMap::FailAt(const YAML::Node& node, const std::string& key, const std::string& what) {
-  if (context_->error && !context_->only_missing) return;
-  std::string message =
-      context_->file + ":" + std::to_string(LineOf(node, line_)) + ": '" + path_ + key + "' " + what;
-  std::replace_if(message.begin(), message.end(), IsControl, ' ');  // a message is one line
-  context_->error = Error{ErrorCode::kInvalidArgument, std::move(message)};
-  context_->only_missing = false;
+bool YamlMap::Ask(const std::string& key, bool required) {
+  return Find(key, required).IsDefined();
 }
 
-void YamlMap::Fail(const std::string& key, const std::string& what) {
+bool YamlMap::Failed(const std::string& key) const {
+  const std::string path = path_ + key;
+  return std::ranges::any_of(context_->problems, [&](const Problem& problem) {
+    const std::string full = problem.map + problem.key;
+    const bool is_below = full.starts_with(path) && (full.size() == path.size() || full[path.size()] == '.' ||
+                                                     full[path.size()] == '[');
+    return is_below || (!absent_.empty() && full == absent_);
+  });
+}
+
+void YamlMap::FailAt(const YAML::Node& node, const std::string& key, const std::string& what,
+                     bool is_missing_key) {
+  const int line = LineOf(node, line_);
+  // Of a mapping that is missing as a whole only that is reported.
+  const std::string map = is_missing_key && !absent_.empty() ? "" : path_;
+  const std::string& name = is_missing_key && !absent_.empty() ? absent_ : key;
+  const auto is_known = [&](const Problem& problem) {
+    return problem.line == line && problem.key == name && problem.map == map;
+  };
+  std::vector<Problem>& problems = context_->problems;
+  if (std::ranges::any_of(problems, is_known)) return;
+  if (problems.size() == kMostProblems) {
+    ++context_->left_out;
+    return;
+  }
+  std::string message = context_->file + ":" + std::to_string(line) + ": '" + map + name + "' " + what;
+  std::replace_if(message.begin(), message.end(), IsControl, ' ');  // a message is one line
+  problems.push_back({.line = line,
+                      .order = line,
+                      .is_missing_key = is_missing_key,
+                      .map = map,
+                      .key = name,
+                      .message = std::move(message)});
+}
+
+void YamlMap::Fail(const std::string& key, const std::string& what,
+                   std::initializer_list<const char*> others) {
+  const auto explains = [&](const Problem& problem) {
+    return (problem.map == path_ && problem.key == key) ||
+           (!absent_.empty() && problem.map + problem.key == absent_);
+  };
+  if (std::ranges::any_of(context_->problems, explains)) return;
+  if (std::ranges::any_of(others, [this](const char* other) { return Failed(other); })) return;
   FailAt(Has(key) ? node_[key] : node_, key, what);
 }
 
@@ -149,7 +186,7 @@ T YamlMap::Scalar(const std::string& key, const YAML::Node& node, const char* ex
   return {};
 }
 
-double YamlMap::CheckRange(const std::string& key, double value, Range range) {
+double YamlMap::CheckRange(const std::string& key, double value, Range range, const YAML::Node& node) {
   if (std::isfinite(value) && value >= range.min && value <= range.max) return value;
   std::string expected = "must be a finite number";
   if (range.min == kPositive.min) {
@@ -159,15 +196,14 @@ double YamlMap::CheckRange(const std::string& key, double value, Range range) {
   }
   if (std::isfinite(range.max))
     expected += std::string(std::isfinite(range.min) ? " and" : "") + " at most " + Shown(range.max);
-  Fail(key, expected + ", not " + Shown(value));
+  FailAt(node, key, expected + ", not " + Shown(value));
   return value;
 }
 
 double YamlMap::Number(const std::string& key, Range range) {
   const YAML::Node node = Find(key, true);
-  const bool known = node.IsDefined() && !context_->error;
   const double value = Scalar<double>(key, node, "a number");
-  return known && !context_->error ? CheckRange(key, value, range) : value;
+  return node.IsDefined() ? CheckRange(key, value, range, node) : value;
 }
 
 double YamlMap::Number(const std::string& key, double fallback, Range range) {
@@ -177,9 +213,8 @@ double YamlMap::Number(const std::string& key, double fallback, Range range) {
 
 int YamlMap::Integer(const std::string& key, Range range) {
   const YAML::Node node = Find(key, true);
-  const bool known = node.IsDefined() && !context_->error;
   const int value = Scalar<int>(key, node, "a whole number");
-  if (known && !context_->error) CheckRange(key, value, range);
+  if (node.IsDefined()) CheckRange(key, value, range, node);
   return Within(range, value);
 }
 
@@ -236,7 +271,7 @@ std::vector<T> YamlMap::List(const std::string& key, size_t count, Range range, 
   if (node.IsSequence() && (count == 0 || node.size() == count)) {
     for (const auto& item : node) {
       const T value = Scalar<T>(key, item, expected.c_str());
-      CheckRange(key, value, range);
+      CheckRange(key, value, range, item);
       values.push_back(Within(range, value));
     }
   } else {
@@ -263,15 +298,23 @@ std::vector<std::string> YamlMap::Texts(const std::string& key) {
   return values;
 }
 
-YamlMap YamlMap::Map(const std::string& key) {
+YamlMap YamlMap::Map(const std::string& key, const char* scalar_for) {
   YAML::Node node = Find(key, false);
+  const bool is_absent = !node.IsDefined();
+  if (scalar_for != nullptr && node.IsDefined() && node.IsScalar()) {
+    YAML::Node map(YAML::NodeType::Map);
+    map[scalar_for] = node;
+    node = map;
+  }
   if (!node.IsDefined() || node.IsNull()) {
     node = YAML::Node(YAML::NodeType::Map);
   } else if (!node.IsMap()) {
     FailAt(node, key, "must be a mapping (key: value)");
     node = YAML::Node(YAML::NodeType::Map);
   }
-  return {context_, node, path_ + key + ".", KeyLine(node_, key, line_)};
+  YamlMap map(context_, node, path_ + key + ".", KeyLine(node_, key, line_));
+  if (is_absent) map.absent_ = absent_.empty() ? path_ + key : absent_;
+  return map;
 }
 
 std::vector<YamlMap> YamlMap::Maps(const std::string& key) {
@@ -293,15 +336,22 @@ std::vector<YamlMap> YamlMap::Maps(const std::string& key) {
 }
 
 void YamlMap::Done() {
-  if (!node_.IsMap()) return;
+  if (!node_.IsMap() || abandoned_) return;
+  std::string known;
+  for (const auto& name : asked_) known += (known.empty() ? "" : ", ") + name;
+  int first_line = 0;
   for (const auto& entry : node_) {
     const auto key = entry.first.IsScalar() ? entry.first.Scalar() : std::string("?");
     if (asked_.contains(key)) continue;
-    std::string known;
-    for (const auto& name : asked_) known += (known.empty() ? "" : ", ") + name;
-    FailAt(entry.first, key, "is not a known key here; known are: " + known);
-    return;
+    FailAt(entry.first, key, "is not a known key here" + (first_line > 0 ? "" : "; known are: " + known));
+    if (first_line == 0) first_line = LineOf(entry.first, line_);
   }
+  for (Problem& problem : context_->problems)
+    if (problem.is_missing_key && problem.map == path_) problem.order = std::max(problem.order, first_line);
+}
+
+void YamlMap::Abandon() {
+  abandoned_ = true;
 }
 
 Result<YamlFile> YamlFile::Load(const std::string& path) {
@@ -327,8 +377,17 @@ Result<YamlFile> YamlFile::Parse(const std::string& name, std::string_view conte
 }
 
 Result<void> YamlFile::Finish() {
-  const std::optional<Error>& error = root_.context_->error;
-  return error ? Result<void>(*error) : Result<void>();
+  const YamlMap::Context& context = *root_.context_;
+  if (context.problems.empty()) return {};
+  std::vector<YamlMap::Problem> problems = context.problems;
+  std::ranges::stable_sort(problems, {}, [](const YamlMap::Problem& problem) {
+    return std::pair(problem.order, problem.is_missing_key);
+  });
+  std::string text;
+  for (const YamlMap::Problem& problem : problems) text += (text.empty() ? "" : "\n") + problem.message;
+  if (context.left_out > 0)
+    text += "\n" + context.file + ": has " + std::to_string(context.left_out) + " more errors";
+  return Error{ErrorCode::kInvalidArgument, std::move(text)};
 }
 
 }  // namespace taclink

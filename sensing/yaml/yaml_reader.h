@@ -2,34 +2,31 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <functional>
-#include <limits>
+#include <cstddef>
+#include <initializer_list>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "sensing/core/result.h"
+#include "sensing/yaml/range.h"
 
 namespace taclink {
 
-/// Bounds of a number, inclusive.
-struct Range {
-  double min = -std::numeric_limits<double>::infinity();
-  double max = std::numeric_limits<double>::infinity();
-};
-inline constexpr Range kPositive{.min = std::numeric_limits<double>::min()};
-inline constexpr Range kNotNegative{.min = 0};
-
-/// Reads one mapping of a YAML file strictly. A getter that fails records the error (the first one of the
-/// file is kept, with file, line and what was expected) and returns a default, so that a reader is a plain
-/// list of fields; `Done` then reports keys that nobody asked for. A key that stands twice is an error, too.
-/// YamlFile::Finish says whether all went well.
+/// Reads one mapping of a YAML file strictly. A getter that fails records an error with file, line and what
+/// was expected, and returns a default, so that a reader is a plain list of fields; `Done` then reports keys
+/// that nobody asked for. A key that appears twice is an error as well. The file keeps all errors, at most
+/// one for each line of a key: what follows from a value that could not be read is not reported.
+/// YamlFile::Finish returns them.
 class YamlMap {
  public:
   bool Has(const std::string& key) const;
+  /// Has(key); the key becomes a known one, and an error is recorded if it is required and missing.
+  bool Ask(const std::string& key, bool required);
+  /// Whether an error was recorded for the key of this mapping, or for one below it.
+  bool Failed(const std::string& key) const;
   /// Whether a single value stands there, in place of a mapping or a list.
   bool HasScalar(const std::string& key) const;
 
@@ -50,24 +47,35 @@ class YamlMap {
   std::vector<double> Numbers(const std::string& key, size_t count = 0, Range range = {});
   std::vector<int> Integers(const std::string& key, size_t count = 0, Range range = {});
   std::vector<std::string> Texts(const std::string& key);
-  /// A mapping; an empty one where the key is missing.
-  YamlMap Map(const std::string& key);
+  /// A mapping; an empty one where the key is missing. With `scalar_for`, a single value in place of the
+  /// mapping is a mapping of that one key.
+  YamlMap Map(const std::string& key, const char* scalar_for = nullptr);
   /// Every mapping of a list; none where the key is missing.
   std::vector<YamlMap> Maps(const std::string& key);
 
-  /// Unknown keys become errors. Call once everything was read.
+  /// All unknown keys become errors. Call once everything was read.
   void Done();
-  /// Records an error at `key`'s line (or the map's, where there is no such key).
-  void Fail(const std::string& key, const std::string& what);
+  /// In place of Done, where a value decides which keys are known and could not be read.
+  void Abandon();
+  /// Records an error at `key`'s line (or the map's, where there is no such key), unless it has one already,
+  /// or one of `others`, on which the statement depends as well, has one.
+  void Fail(const std::string& key, const std::string& what, std::initializer_list<const char*> others = {});
   /// Where this mapping stands: "file:line".
   std::string Where() const;
 
  private:
   friend class YamlFile;
+  struct Problem {
+    int line = 0;
+    int order = 0;  // line that it is sorted by
+    bool is_missing_key = false;
+    std::string map, key;
+    std::string message;
+  };
   struct Context {
     std::string file;
-    std::optional<Error> error;
-    bool only_missing = false;  // the error is a missing key: a misspelt one explains more
+    std::vector<Problem> problems;
+    size_t left_out = 0;  // problems beyond the most that are kept
   };
   YamlMap(std::shared_ptr<Context> context, const YAML::Node& node, std::string path, int line);
 
@@ -76,14 +84,17 @@ class YamlMap {
   T Scalar(const std::string& key, const YAML::Node& node, const char* expected);
   template <typename T>
   std::vector<T> List(const std::string& key, size_t count, Range range, const std::string& expected);
-  double CheckRange(const std::string& key, double value, Range range);
-  void FailAt(const YAML::Node& node, const std::string& key, const std::string& what);
+  double CheckRange(const std::string& key, double value, Range range, const YAML::Node& node);
+  void FailAt(const YAML::Node& node, const std::string& key, const std::string& what,
+              bool is_missing_key = false);
 
   std::shared_ptr<Context> context_;
   YAML::Node node_;
   std::string path_;
-  int line_;  // of the mapping, or of the one it is missing from
+  int line_;            // of the mapping, or of the one it is missing from
+  std::string absent_;  // path of the outermost mapping that is missing and holds this one, or is it
   std::set<std::string> asked_;
+  bool abandoned_ = false;
 };
 
 /// A YAML file whose root is a mapping.
@@ -95,7 +106,8 @@ class YamlFile {
   static Result<YamlFile> Parse(const std::string& name, std::string_view content);
 
   YamlMap& root() { return root_; }
-  /// The first error recorded by any map of this file, if any.
+  /// All errors recorded by any map of this file, one a line, in the order of the file. An unknown key comes
+  /// before the missing ones of its mapping, because a misspelled key explains a missing one.
   Result<void> Finish();
 
  private:

@@ -10,7 +10,7 @@
 
 #include "sensing/core/result.h"
 #include "server/arm/arm_kinematics.h"
-#include "server/config/joint_state_options.h"
+#include "server/config/options.h"
 
 namespace taclink::server {
 

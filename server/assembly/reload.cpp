@@ -4,7 +4,7 @@
 #include <sstream>
 #include <utility>
 
-#include "server/config/config_changes.h"
+#include "sensing/yaml/yaml_changes.h"
 
 namespace taclink::server {
 

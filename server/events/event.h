@@ -9,7 +9,7 @@
 
 #include "sensing/core/geometry.h"
 #include "sensing/core/link_state.h"
-#include "server/config/event_options.h"
+#include "server/config/options.h"
 
 namespace taclink::server {
 

@@ -4,7 +4,7 @@
 
 #include "sensing/core/result.h"
 #include "server/arm/arm.h"
-#include "server/config/config_http.h"
+#include "server/config/options.h"
 #include "server/gateway/gateway.h"
 #include "server/publish/publisher.h"
 #include "server/rpc/rpc_server.h"

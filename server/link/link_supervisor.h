@@ -14,7 +14,7 @@
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
 #include "sensing/core/result.h"
-#include "server/config/watchdog_options.h"
+#include "server/config/options.h"
 #include "server/link/link_outlet.h"
 #include "server/link/link_worker.h"
 

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <utility>
 
-#include "server/config/config_pressure.h"
+#include "server/config/config.h"
 #include "server/pressure/line_reader.h"
 
 namespace taclink::server {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string_view>
 
-#include "server/config/log_options.h"
+#include "server/config/options.h"
 
 namespace taclink::server {
 

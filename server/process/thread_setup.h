@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "server/config/realtime_options.h"
+#include "server/config/options.h"
 
 namespace taclink::server {
 

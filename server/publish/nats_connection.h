@@ -5,7 +5,7 @@
 #include <string>
 
 #include "sensing/core/result.h"
-#include "server/config/config_publish.h"
+#include "server/config/options.h"
 #include "server/publish/outbox.h"
 
 namespace taclink::server {

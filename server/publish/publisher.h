@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "server/arm/arm.h"
-#include "server/config/config_publish.h"
+#include "server/config/options.h"
 #include "server/publish/nats_connection.h"
 #include "server/publish/outbox.h"
 

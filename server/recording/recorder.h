@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "server/arm/arm.h"
-#include "server/config/config_recording.h"
+#include "server/config/options.h"
 #include "server/recording/log_catalog.h"
 #include "server/recording/recording.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "server/arm/arm.h"
-#include "server/config/config_recording.h"
+#include "server/config/options.h"
 #include "server/hub/rate_limit.h"
 #include "server/recording/arm_recorder.h"
 #include "server/recording/log_file.h"

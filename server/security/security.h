@@ -13,7 +13,7 @@
 
 #include "sensing/core/clock.h"
 #include "sensing/core/result.h"
-#include "server/config/config_security.h"
+#include "server/config/options.h"
 #include "server/security/failed_tries.h"
 #include "server/security/tls_files.h"
 #include "server/security/tokens.h"

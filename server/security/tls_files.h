@@ -3,7 +3,7 @@
 #include <string>
 
 #include "sensing/core/result.h"
-#include "server/config/config_security.h"
+#include "server/config/options.h"
 
 namespace taclink::server {
 

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cstddef>
 
-#include "server/config/config_limits.h"
+#include "server/config/options.h"
 
 namespace taclink::server {
 

@@ -1,5 +1,3 @@
-#include "server/config/config_recording.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

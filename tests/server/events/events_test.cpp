@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "server/config/config.h"
 #include "server/events/event_engine.h"
 #include "tests/server/support.h"
 #include "tests/support/times.h"

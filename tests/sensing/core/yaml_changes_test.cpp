@@ -1,15 +1,15 @@
-#include "server/config/config_changes.h"
+#include "sensing/yaml/yaml_changes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace taclink::server {
+namespace taclink {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-TEST(ConfigChanges, NamesKeysAndNoValues) {
+TEST(YamlChanges, NamesKeysAndNoValues) {
   const char* const before =
       "log: {level: info}\nlimits: {a: 1, b: 2}\narm: {name: x, links: [{name: base, gain: 1}, {name: tip, "
       "cpus: [1, 2]}]}\n";
@@ -27,4 +27,4 @@ TEST(ConfigChanges, NamesKeysAndNoValues) {
 }
 
 }  // namespace
-}  // namespace taclink::server
+}  // namespace taclink

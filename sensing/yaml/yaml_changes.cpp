@@ -1,11 +1,11 @@
-#include "server/config/config_changes.h"
+#include "sensing/yaml/yaml_changes.h"
 
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <utility>
 
-namespace taclink::server {
+namespace taclink {
 namespace {
 
 using Members = std::vector<std::pair<std::string, YAML::Node>>;
@@ -57,4 +57,4 @@ std::vector<std::string> ChangedKeys(const std::string& before, const std::strin
   return out;
 }
 
-}  // namespace taclink::server
+}  // namespace taclink

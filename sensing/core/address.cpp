@@ -1,11 +1,12 @@
+#include "sensing/core/address.h"
+
 #include <arpa/inet.h>
 
+#include <algorithm>
 #include <charconv>
 #include <optional>
 
-#include "server/config/config.h"
-
-namespace taclink::server {
+namespace taclink {
 namespace {
 
 constexpr std::string_view kUnixScheme = "unix:";
@@ -42,6 +43,13 @@ Result<void> CheckListenAddress(const std::string& address) {
       "must be host:port, [ip6]:port or unix:path, for example 127.0.0.1:50051, not '" + address + "'"};
 }
 
+Result<void> CheckHttpListen(const std::string& address) {
+  if (address.empty()) return {};
+  if (address.starts_with(kUnixScheme))
+    return Error{ErrorCode::kInvalidArgument, "must be host:port or [ip6]:port, not a unix socket"};
+  return CheckListenAddress(address);
+}
+
 bool IsLoopback(const std::string& address) {
   if (address.starts_with(kUnixScheme)) return true;
   const auto split = Split(address);
@@ -53,4 +61,26 @@ bool IsLoopback(const std::string& address) {
   return split->host == "localhost";
 }
 
-}  // namespace taclink::server
+std::vector<std::string> SplitUrls(const std::string& urls) {
+  std::vector<std::string> out;
+  for (size_t begin = 0; begin <= urls.size();) {
+    const size_t end = std::min(urls.find(',', begin), urls.size());
+    out.push_back(urls.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return out;
+}
+
+Result<void> CheckNatsUrls(const std::string& urls) {
+  if (urls.empty()) return {};
+  for (const std::string& url : SplitUrls(urls)) {
+    if (!url.starts_with("nats://") && !url.starts_with("tls://"))
+      return Error{ErrorCode::kInvalidArgument,
+                   "must be nats://HOST:PORT or tls://HOST:PORT, several with commas between"};
+    if (url.find('@') != std::string::npos)
+      return Error{ErrorCode::kInvalidArgument, "must not hold a password; use token_file or credentials"};
+  }
+  return {};
+}
+
+}  // namespace taclink
