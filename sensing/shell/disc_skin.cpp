@@ -331,4 +331,9 @@ std::vector<RigidContact::Summary> DiscSkin::Contacts(const SkinLoad& load, cons
   return contacts;
 }
 
+double DiscSkin::Residual(const SkinLoad& load, const SkinBalance& balance) {
+  Misfit(load, balance);
+  return gradient_.size() > 0 ? gradient_.cwiseAbs().maxCoeff() : 0.0;
+}
+
 }  // namespace taclink

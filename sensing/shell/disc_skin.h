@@ -79,6 +79,9 @@ class DiscSkin {
   /// By disc, of a balance; the force's entries are zero where there is none.
   std::vector<RigidContact::Summary> Contacts(const SkinLoad& load, const SkinBalance& balance);
 
+  /// Largest entry of the residual with the discs where the balance has them, N or N mm.
+  double Residual(const SkinLoad& load, const SkinBalance& balance);
+
   const ShellMesh& mesh() const { return mesh_; }
   int factorizations() const { return factorizations_; }
 
