@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
+#include <mutex>
 
 namespace taclink::wire {
 namespace {
@@ -22,10 +24,12 @@ EnumNames::EnumNames(const google::protobuf::EnumDescriptor& descriptor) {
   for (int i = 1; i < descriptor.value_count(); ++i) {
     const auto& value = *descriptor.value(i);
     values_.push_back({value.number(), LowerCase(std::string_view(value.name()).substr(prefix))});
+    if (values_.back().name == "unknown") zero_ = "unspecified";
   }
 }
 
 const char* EnumNames::Name(int number) const {
+  if (number == 0) return zero_;
   const auto found = std::ranges::find(values_, number, &Value::number);
   return found == values_.end() ? "unknown" : found->name.c_str();
 }
@@ -40,6 +44,13 @@ std::vector<std::string> EnumNames::All() const {
   std::vector<std::string> names;
   for (const Value& value : values_) names.push_back(value.name);
   return names;
+}
+
+const EnumNames& NamesOf(const google::protobuf::EnumDescriptor& type) {
+  static std::mutex mutex;
+  static auto& known = *new std::map<const google::protobuf::EnumDescriptor*, EnumNames>;  // never destroyed
+  const std::lock_guard lock(mutex);
+  return known.try_emplace(&type, type).first->second;
 }
 
 }  // namespace taclink::wire

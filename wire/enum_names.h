@@ -11,15 +11,15 @@
 namespace taclink::wire {
 
 /// The names of an enum as people and files see them, by reflection of its .proto: EVENT_KIND_FORCE_LEVEL of
-/// EventKind is "force_level". Number 0 (..._UNSPECIFIED) and numbers that this version does not have are
-/// "unknown". Any thread.
+/// EventKind is "force_level". Number 0 (..._UNSPECIFIED) is "unknown", or "unspecified" in an enum that has
+/// a value of its own for that; numbers that this version does not have are "unknown". Any thread.
 class EnumNames {
  public:
   explicit EnumNames(const google::protobuf::EnumDescriptor& descriptor);
 
-  /// Lasts as long as the program, null-terminated.
+  /// Null-terminated; lasts as long as this object.
   const char* Name(int number) const;
-  /// None: no value has this name. "unknown" is none.
+  /// None: no value but number 0 has this name.
   std::optional<int> Number(std::string_view name) const;
   /// All but number 0, in the order of the .proto.
   std::vector<std::string> All() const;
@@ -30,11 +30,15 @@ class EnumNames {
     std::string name;
   };
   std::vector<Value> values_;  // without number 0
+  const char* zero_ = "unknown";
 };
+
+/// Made once for each type; lasts as long as the program, also while its threads outlive main.
+const EnumNames& NamesOf(const google::protobuf::EnumDescriptor& type);
 
 template <typename Enum>
 const EnumNames& NamesOf() {
-  static const EnumNames names(*google::protobuf::GetEnumDescriptor<Enum>());
+  static const EnumNames& names = NamesOf(*google::protobuf::GetEnumDescriptor<Enum>());
   return names;
 }
 

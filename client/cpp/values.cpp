@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <map>
-#include <mutex>
 
 #include "wire/enum_names.h"
 
@@ -15,15 +13,6 @@ std::optional<double> SecondsSince(int64_t utc_ns) {
   if (utc_ns == 0) return std::nullopt;
   const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
   return static_cast<double>(now.count() - utc_ns) * 1e-9;
-}
-
-// The names of each type are made once. The map is never destroyed, because threads may still use it while
-// the program ends.
-const wire::EnumNames& NamesOf(const google::protobuf::EnumDescriptor& type) {
-  static std::mutex mutex;
-  static auto& known = *new std::map<const google::protobuf::EnumDescriptor*, wire::EnumNames>;
-  const std::lock_guard lock(mutex);
-  return known.try_emplace(&type, type).first->second;
 }
 
 }  // namespace
@@ -67,15 +56,15 @@ std::optional<double> LatencyS(const v1::Event& event) {
 }
 
 const char* EnumName(const google::protobuf::EnumDescriptor& type, int number) {
-  return NamesOf(type).Name(number);
+  return wire::NamesOf(type).Name(number);
 }
 
 std::optional<int> EnumNumber(const google::protobuf::EnumDescriptor& type, std::string_view name) {
-  return NamesOf(type).Number(name);
+  return wire::NamesOf(type).Number(name);
 }
 
 std::vector<std::string> EnumNames(const google::protobuf::EnumDescriptor& type) {
-  return NamesOf(type).All();
+  return wire::NamesOf(type).All();
 }
 
 }  // namespace taclink::client

@@ -110,6 +110,8 @@ def write_names(protos: list[Path], file: Path) -> None:
             for place in proto.source_code_info.location
             if place.leading_comments
         }
+        if any(message.enum_type for message in proto.message_type):
+            raise SystemExit(f"{proto.name}: enums must stand outside messages")
         for number, enum in enumerate(proto.enum_type):
             text += enum_text(enum, comments, (5, number)) + "\n"
     file.write_text(text, encoding="utf-8")

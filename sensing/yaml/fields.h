@@ -155,6 +155,7 @@ class FieldVisitor {
   }
   void Choice(Key key, std::string& value, const Names& names, const char* help) {
     auto index = static_cast<size_t>(std::ranges::find(names, value) - names.begin());
+    if (index == names.size()) index = 0;  // a value that no file can give
     OneOf(With(key, help), index, names);
     value = names[index];
   }

@@ -97,8 +97,9 @@ void AddSection(std::string& out, const std::string& path, const Json& object) {
     for (const Json& alternative : object.at("allOf")) {
       const Json& then = alternative.at("then");
       if (then.at("properties").empty()) continue;
-      const auto& [key, condition] = *alternative.at("if").at("properties").items().begin();
-      alternatives += "\nWith `" + key + ": " + condition.at("const").get<std::string>() + "`:\n";
+      const auto condition = alternative.at("if").at("properties").begin();
+      alternatives +=
+          "\nWith `" + condition.key() + ": " + condition->at("const").get<std::string>() + "`:\n";
       AddTable(alternatives, path, then);
     }
   }

@@ -99,10 +99,6 @@ bool YamlMap::Has(const std::string& key) const {
   return node_.IsMap() && node_[key].IsDefined();
 }
 
-bool YamlMap::HasScalar(const std::string& key) const {
-  return Has(key) && node_[key].IsScalar();
-}
-
 YAML::Node YamlMap::Find(const std::string& key, bool required) {
   asked_.insert(key);
   if (node_.IsMap()) {
@@ -118,6 +114,7 @@ bool YamlMap::Ask(const std::string& key, bool required) {
 }
 
 bool YamlMap::Failed(const std::string& key) const {
+  if (context_->left_out > 0) return true;  // it may be among those that are not kept
   const std::string path = path_ + key;
   return std::ranges::any_of(context_->problems, [&](const Problem& problem) {
     const std::string full = problem.map + problem.key;
@@ -304,13 +301,13 @@ YamlMap YamlMap::Map(const std::string& key, const char* scalar_for) {
   if (scalar_for != nullptr && node.IsDefined() && node.IsScalar()) {
     YAML::Node map(YAML::NodeType::Map);
     map[scalar_for] = node;
-    node = map;
+    node.reset(map);  // not an assignment, which would change the document
   }
   if (!node.IsDefined() || node.IsNull()) {
-    node = YAML::Node(YAML::NodeType::Map);
+    node.reset(YAML::Node(YAML::NodeType::Map));
   } else if (!node.IsMap()) {
     FailAt(node, key, "must be a mapping (key: value)");
-    node = YAML::Node(YAML::NodeType::Map);
+    node.reset(YAML::Node(YAML::NodeType::Map));
   }
   YamlMap map(context_, node, path_ + key + ".", KeyLine(node_, key, line_));
   if (is_absent) map.absent_ = absent_.empty() ? path_ + key : absent_;

@@ -27,8 +27,6 @@ class YamlMap {
   bool Ask(const std::string& key, bool required);
   /// Whether an error was recorded for the key of this mapping, or for one below it.
   bool Failed(const std::string& key) const;
-  /// Whether a single value stands there, in place of a mapping or a list.
-  bool HasScalar(const std::string& key) const;
 
   double Number(const std::string& key, Range range = {});
   double Number(const std::string& key, double fallback, Range range = {});

@@ -110,7 +110,7 @@ struct SimulatedSourceConfig {
   ScenePace pace = ScenePace::kFrames;
   void Describe(FieldVisitor& visit) {
     visit.NameOrPath(Required("scene"), scene, "Name of a shipped scene, or path.");
-    visit.Choice("pace", pace, {"frames", "clock"}, "Of a slow machine: slow down, or skip frames.");
+    visit.Choice("pace", pace, {"frames", "clock"}, "Slow machines slow down, or skip frames.");
   }
 };
 

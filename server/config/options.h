@@ -31,7 +31,7 @@ struct LimitsConfig {
     constexpr Range kCount{1, 10000}, kMegabytes{1, 65536}, kDay{1, 86400};
     visit("max_links", max_links, kCount, "Links of the arm; each takes some 100 MB.");
     visit("max_streams", max_streams, kCount, "Streams of all clients; a quarter is for operators.");
-    visit("max_streams_per_peer", max_streams_per_peer, kCount, "Streams of a caller or address.");
+    visit("max_streams_per_peer", max_streams_per_peer, kCount, "Streams of one caller or address.");
     visit("max_calls_per_connection", max_calls_per_connection, kCount, "Concurrent calls.");
     visit("max_message_kb", max_message_kb, {1, 65536}, "Size of a request.");
     visit("memory_mb", memory_mb, {16, 65536}, "Memory of gRPC: connections, requests, replies.");
@@ -74,7 +74,7 @@ struct WatchdogOptions {
 
 struct ShutdownConfig {
   std::chrono::milliseconds limit{2000};
-  void Describe(FieldVisitor& visit) { visit("limit_s", limit, {0, 600}, "Real time for clients to leave."); }
+  void Describe(FieldVisitor& visit) { visit("limit_s", limit, {0, 600}, "Time for clients to leave."); }
 };
 
 struct LogRates {
@@ -94,7 +94,7 @@ struct LogOptions {
     visit("file", file, "Absolute path of the file to append to; empty: standard error.");
     visit.Check(file.empty() || file.starts_with('/'), "file", "must be an absolute path");
     visit("rate_limit", rates.per_site, kRates, "Messages a minute of a place and source; 0: no limit.");
-    visit("rate_limit_total", rates.total, kRates, "In total; a quarter is for warnings; 0: no limit.");
+    visit("rate_limit_total", rates.total, kRates, "In total; a quarter for warnings; 0: no limit.");
   }
 };
 
@@ -121,8 +121,8 @@ struct HttpConfig {
     constexpr Range kConnections{1, 10000}, kTimeouts{0.01, 3600};
     visit("listen", listen, "Empty: off; not set: 127.0.0.1:8080 if it is free.", CheckHttpListen);
     visit.Path("web_root", web_root, "Folder of the web page; empty: the built-in one.");
-    visit("max_connections", max_connections, kConnections, "Concurrent; a quarter is for this machine.");
-    visit("max_connections_per_peer", max_connections_per_peer, kConnections, "Concurrent, of one address.");
+    visit("max_connections", max_connections, kConnections, "Connections; a quarter is for this machine.");
+    visit("max_connections_per_peer", max_connections_per_peer, kConnections, "Connections of one address.");
     visit("header_timeout_s", header_timeout_s, kTimeouts, "Longest wait for a request and its headers.");
     visit("idle_timeout_s", idle_timeout_s, kTimeouts, "Longest time between two requests.");
     visit("write_timeout_s", write_timeout_s, kTimeouts, "Longest time in which a client reads nothing.");
@@ -138,13 +138,13 @@ struct SecurityConfig {
     visit.Path("certificate", certificate, "PEM, the server's own first: TLS for gRPC and HTTP.");
     visit.Path("key", key, "PEM, of the certificate.");
     visit.Path("client_ca", client_ca, "PEM: clients must show a certificate signed by one of these.");
-    visit.Path("tokens", tokens, "Without it everyone who can connect is an operator.");
+    visit.Path("tokens", tokens, "Access tokens; without them everyone is an operator.");
     visit.Check(certificate.empty() == key.empty(), key.empty() ? "certificate" : "key",
                 "is of no use alone: 'certificate' and 'key' need each other", {"certificate", "key"});
     visit.Check(client_ca.empty() || !certificate.empty(), "client_ca",
                 "needs 'certificate' and 'key': it is asked for within TLS", {"certificate"});
-    visit.Choice("tokens_on_error", tokens_keep, {"refuse", "keep"}, "When the token file is invalid.");
-    visit.Choice("tokens_permissions", tokens_open, {"strict", "any"}, "Required of the token file.");
+    visit.Choice("tokens_on_error", tokens_keep, {"refuse", "keep"}, "Effect of an invalid file.");
+    visit.Choice("tokens_permissions", tokens_open, {"strict", "any"}, "Its permissions.");
     visit("max_failed_tries_per_minute", max_failed_tries, {0, 1'000'000}, "Of one address; 0: no limit.");
   }
 };
@@ -251,15 +251,15 @@ struct RecordingConfig {
     visit.Path(NoDefault("folder"), folder, "Empty: none; not set: ~/.local/state/taclink/logs.");
     visit("at_start", at_start, "Begin a recording with the server.");
     visit.Check(!at_start || !folder.empty(), "at_start", "needs a folder", {"folder"});
-    visit("pictures", pictures, "That recording holds the cameras' images as well.");
-    visit.Choice("compression", compression, compressions, "Of recordings that hold no images.");
-    visit.Choice("picture_compression", picture_compression, compressions, "Of recordings that hold images.");
+    visit("pictures", pictures, "Record the cameras' images as well.");
+    visit.Choice("compression", compression, compressions, "Compression without images.");
+    visit.Choice("picture_compression", picture_compression, compressions, "Compression with images.");
     visit("split_mb", split_mb, kSplit, "A file of this size is closed, and the next one begun; 0: never.");
     visit("split_s", split_s, kSplit, "A file of this age is closed, and the next one begun; 0: never.");
-    visit("quota_mb", quota_mb, {0, 1e9}, "Of the folder: the oldest files are deleted; 0: no limit.");
-    visit("sync_s", sync_s, {0.05, 60}, "What is older survives a power cut.");
-    visit("queue_mb", queue_mb, {1, 65536}, "Memory of what waits for a slow disk.");
-    visit("scene_rate_hz", scene_rate_hz, {0, 1000}, "Of what Foxglove draws, of each link; 0: none.");
+    visit("quota_mb", quota_mb, {0, 1e9}, "Size of the folder: the oldest files are deleted; 0: no limit.");
+    visit("sync_s", sync_s, {0.05, 60}, "Interval of flushing; a power failure loses no more.");
+    visit("queue_mb", queue_mb, {1, 65536}, "Memory for data that waits for a slow disk.");
+    visit("scene_rate_hz", scene_rate_hz, {0, 1000}, "Rate of each link's scene for Foxglove; 0: none.");
   }
 };
 
@@ -276,17 +276,17 @@ struct PublishConfig {
     visit("site", site, "Second part of the subjects.", CheckSubjectPart);
     if (stream.empty()) stream = "TACLINK_" + site;
     visit(NoDefault("stream"), stream, "Not set: TACLINK_ and the site.", CheckSubjectPart);
-    visit("stream_mb", stream_mb, {1, 1e9}, "Of a stream that is created: the oldest messages are dropped.");
+    visit("stream_mb", stream_mb, {1, 1e9}, "Size of the stream: the oldest messages are dropped.");
     visit.Path("tls_ca", tls_ca, "PEM; empty: the authorities that this machine trusts.");
     visit.Path("certificate", certificate, "PEM, this server's own.");
     visit.Path("key", key, "PEM, of the certificate.");
-    visit.Check(certificate.empty() == key.empty(), "key", "and certificate need each other");
+    visit.Check(certificate.empty() == key.empty(), "key", "needs its certificate", {"certificate"});
     visit.Path("credentials", credentials, "File of the NATS user's credentials (.creds).");
     visit.Path("token_file", token_file, "File of the NATS token.");
     visit.Choice("frames_detail", frames_detail, {"contacts", "geometry", "full"}, "Detail of frames.");
     visit("frames_rate_hz", frames_rate_hz, {0, 1000}, "Frames of each link; 0: none.");
     visit("contacts_deadband_n", contacts_deadband_n, {0, 1000}, "Smaller changes are sent once a second.");
-    visit("queue_mb", queue_mb, {1, 65536}, "Memory of what waits while no server is reachable.");
+    visit("queue_mb", queue_mb, {1, 65536}, "Memory for data while no server is reachable.");
   }
 };
 

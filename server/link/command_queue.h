@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <mutex>
+#include <string>
 #include <utility>
 
 #include "sensing/core/result.h"
@@ -28,17 +31,17 @@ class CommandQueue {
     return {};
   }
 
-  /// On the worker's thread: runs all waiting commands. A command that is running stays in the queue, so that
-  /// Close can answer for it while it hangs.
+  /// On the worker's thread: runs the commands that wait now; what a command throws is its result. A command
+  /// that is running stays in the queue, so that Close can answer for it while it hangs.
   void RunAll(Target& target) {
-    while (true) {
+    for (size_t left = size(); left > 0; --left) {
       Run run;
       {
         const std::lock_guard lock(mutex_);
         if (jobs_.empty()) return;
         run = jobs_.front().run;
       }
-      const Result<void> result = run(target);
+      const Result<void> result = Guarded(run, target);
       Done done;
       {
         const std::lock_guard lock(mutex_);
@@ -69,7 +72,19 @@ class CommandQueue {
     Done done;
   };
 
-  std::mutex mutex_;
+  size_t size() const {
+    const std::lock_guard lock(mutex_);
+    return jobs_.size();
+  }
+  static Result<void> Guarded(const Run& run, Target& target) {
+    try {
+      return run(target);
+    } catch (const std::exception& e) {
+      return Error{ErrorCode::kInternal, std::string("the command failed: ") + e.what()};
+    }
+  }
+
+  mutable std::mutex mutex_;
   std::deque<Job> jobs_;  // guarded by mutex_; the first may be running
   bool closed_ = false;   // guarded by mutex_
 };

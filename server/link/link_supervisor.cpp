@@ -294,6 +294,7 @@ void LinkSupervisor::AwaitBuild(int64_t now_ns) {
   worker->Start();
   {
     const std::lock_guard lock(mutex_);
+    if (closed_) worker->CloseCommands(*closed_);
     worker_ = std::move(worker);
     ++supervision_.restarts;
   }
@@ -361,6 +362,10 @@ Result<void> LinkSupervisor::SetCamera(const CameraOrder& order, CommandObserver
 }
 
 void LinkSupervisor::CloseCommands(const Error& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = why;
+  }
   if (const auto worker = current()) worker->CloseCommands(why);
 }
 

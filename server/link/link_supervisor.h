@@ -85,7 +85,8 @@ class LinkSupervisor {
   Result<void> Tare(const TareOptions& options, TareObserver observer);
   /// Likewise. What was taken lasts until the server ends, also with a fresh worker.
   Result<void> SetCamera(const CameraOrder& order, CommandObserver observer);
-  /// At shutdown: answers the commands that wait for a thread, whether or not it hangs.
+  /// At shutdown: answers the commands that wait for a thread, whether or not it hangs, and refuses further
+  /// ones, also those for a worker that comes later.
   void CloseCommands(const Error& why);
   /// Computes the forces by `model` (none: by tolerance, frame by frame) from the next frame on, also after a
   /// restart. Builds the model first, which takes up to seconds. `observer` learns whether the FEM thread
@@ -144,7 +145,8 @@ class LinkSupervisor {
   // Guarded by mutex_.
   std::shared_ptr<LinkWorker> worker_;
   Supervision supervision_;
-  SourceCondition past_;  // of the last worker, with all restarts before the current one's
+  std::optional<Error> closed_;  // why no commands are accepted any more
+  SourceCondition past_;         // of the last worker, with all restarts before the current one's
 };
 
 }  // namespace taclink::server

@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "tests/integration/support.h"
+#include "wire/enum_names.h"
 
 namespace taclink::server {
 namespace {
@@ -213,6 +214,12 @@ TEST_F(EventsTest, ATareEndsWithTheServer) {
   second.join();
   EXPECT_EQ(under_way, 1);
   EXPECT_EQ(ended, 1);
+}
+
+TEST(EventKinds, AreNamedAsInTheProtocol) {
+  for (size_t i = 0; i < kEventKinds; ++i)
+    EXPECT_STREQ(Name(static_cast<EventKind>(i)),
+                 wire::NamesOf<v1::EventKind>().Name(static_cast<int>(i) + 1));
 }
 
 }  // namespace

@@ -37,10 +37,9 @@ int Run(const Program& program, int argc, char** argv) {
     if (e.get_exit_code() == 0) return app.exit(e);
     // CLI11 only says that a subcommand is missing.
     const bool unknown = argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty();
-    return Complain(program.name,
-                    unknown ? "no command '" + std::string(argv[1]) + "'; see taclink --help"
-                            : std::string(e.what()) + help,
-                    kUsage);
+    return Complain(
+        program.name,
+        unknown ? "no command '" + std::string(argv[1]) + "'" + help : std::string(e.what()) + help, kUsage);
   }
   try {
     const auto result = selected();

@@ -145,7 +145,8 @@ class Client {
   std::shared_ptr<Connection> connection_;
 };
 
-// Names of version 0.1 for messages that replace them one to one. They will be removed in the next release.
+// Names of version 0.1, whose types had the fields of these messages. They will be removed in the next
+// release.
 using Arm [[deprecated("use taclink::v1::Arm")]] = v1::Arm;
 using Camera [[deprecated("use taclink::v1::Camera")]] = v1::Camera;
 using Contact [[deprecated("use taclink::v1::Contact")]] = v1::Contact;

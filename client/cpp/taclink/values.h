@@ -48,7 +48,8 @@ std::optional<int> EnumNumber(const google::protobuf::EnumDescriptor& type, std:
 std::vector<std::string> EnumNames(const google::protobuf::EnumDescriptor& type);
 
 /// The name of a value in lower case and without the prefix of its enum: LINK_STATUS_OK is "ok". Number 0
-/// (..._UNSPECIFIED) and numbers that this version does not have are "unknown". The text lasts as long as the
+/// (..._UNSPECIFIED) is "unknown", or "unspecified" in an enum with an UNKNOWN of its own; numbers that this
+/// version does not have are "unknown". The text lasts as long as the
 /// program.
 template <typename Enum>
   requires google::protobuf::is_proto_enum<Enum>::value
@@ -56,7 +57,7 @@ const char* Name(Enum value) {
   return EnumName(*google::protobuf::GetEnumDescriptor<Enum>(), static_cast<int>(value));
 }
 
-/// The value with that name. None: the enum has no such value; "unknown" is no value.
+/// The value with that name. None: no value but number 0 has that name.
 template <typename Enum>
   requires google::protobuf::is_proto_enum<Enum>::value
 std::optional<Enum> ValueOf(std::string_view name) {

@@ -6,13 +6,16 @@ prints must hold all of it. A field or kind that a client does not know fails he
 
 from __future__ import annotations
 
+import atexit
 import json
 import math
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from concurrent import futures
 from typing import Any
 
@@ -21,6 +24,7 @@ import grpc
 source, programs, client = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
 here = pathlib.Path(__file__).resolve().parent
 scratch = pathlib.Path(tempfile.mkdtemp(prefix="taclink-conformance-"))
+atexit.register(shutil.rmtree, scratch, ignore_errors=True)
 subprocess.run(
     [sys.executable, "setup.py", "-q", "build_py", "--build-lib", str(scratch)],
     cwd=source / "client/python",
@@ -162,14 +166,19 @@ def check_command(address: str) -> list[str]:
     run = subprocess.Popen(
         [str(programs / "taclink"), "events", "--json", "--server", address], stdout=subprocess.PIPE, text=True
     )
+    patience = threading.Timer(120, run.kill)
+    patience.start()
     kinds = []
-    assert run.stdout is not None
-    for line in run.stdout:
-        kinds.append(json.loads(line).get("kind"))
-        if len(kinds) == len(events()):
-            break
-    run.terminate()
-    run.wait()
+    try:
+        assert run.stdout is not None
+        for line in run.stdout:
+            kinds.append(json.loads(line).get("kind"))
+            if len(kinds) == len(events()):
+                break
+    finally:
+        patience.cancel()
+        run.kill()
+        run.wait()
     expected = [enum_name(KIND, event.kind) for event in events()]
     return [] if kinds == expected else [f"taclink events prints {kinds}, not {expected}"]
 

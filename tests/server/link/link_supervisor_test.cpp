@@ -408,6 +408,16 @@ TEST_F(LinkSupervisorTest, WhatCamerasWereSetToOutlivesTheirWorker) {
   }
 }
 
+TEST_F(LinkSupervisorTest, CommandsAreRefusedOnceClosedAlsoByALaterWorker) {
+  Run(Measure);
+  link_->CloseCommands({ErrorCode::kUnavailable, "the server is stopping"});
+  const auto unexpected = [](const Result<void>&) { FAIL() << "a refused command has no observer"; };
+  EXPECT_EQ(link_->SetCamera({}, unexpected).error().code, ErrorCode::kUnavailable);
+  link_->Restart();
+  UntilRestarted(1);
+  EXPECT_EQ(link_->SetCamera({}, unexpected).error().code, ErrorCode::kUnavailable);
+}
+
 TEST_F(LinkSupervisorTest, NobodyIsBlamedForAStandstillOfTheWholeProgram) {
   Gate gate;
   Run([&](const StereoFrame& frame, LinkState& state) {

@@ -28,7 +28,10 @@ export function ContactList({ link }: { link: string }) {
       <thead>
         <tr>
           <th scope="col">Contact</th>
-          <th scope="col" title="Integral of the inward load: of a hug, all that it presses with">
+          <th
+            scope="col"
+            title="Integral of the inward load; of a ring contact, whose resultant is about zero, all that it presses with"
+          >
             Pressed, N
           </th>
           <th scope="col" title="Of all loads of the contact, and its standard deviation">
