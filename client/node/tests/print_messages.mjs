@@ -4,6 +4,7 @@ import { connect } from "../lib/taclink.mjs";
 const [, , server, count] = process.argv;
 const { tactile, close } = await connect({ server });
 for await (const { frame } of tactile.streamFrames({ detail: "DETAIL_FULL" })) {
+  if (!frame) continue;
   console.log(JSON.stringify(frame));
   break;
 }

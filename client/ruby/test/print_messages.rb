@@ -16,6 +16,8 @@ end
 
 client = Taclink::Client.new(server: ARGV[0])
 client.tactile.stream_frames({ detail: :DETAIL_FULL }) do |response|
+  next unless response.frame
+
   puts JSON.generate(plain(response.frame))
   break
 end

@@ -84,6 +84,7 @@ class Server(grpc.GenericRpcHandler):
 
         def stream(_request: Any, context: Any) -> Any:
             if method.name == "StreamFrames":
+                yield tactile_pb2.StreamFramesResponse(status=tactile_pb2.StreamStatus())
                 yield tactile_pb2.StreamFramesResponse(frame=frame())
             elif method.name == "StreamEvents":
                 yield events_pb2.StreamEventsResponse(status=events_pb2.EventStreamStatus(run_id="one"))
