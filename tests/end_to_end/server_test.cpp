@@ -220,8 +220,9 @@ TEST_F(ServerTest, StoppedClientHarmsNobody) {
 }
 
 TEST_F(ServerTest, TheBenchMeasuresAServerOfItsOwn) {
-  const Finished bench = Taclink({"bench", "server", "--links", "2", "--clients", "3", "--detail", "geometry",
-                                  "--seconds", "1", "--json", Path("bench.json")});
+  const std::string program = std::string(kTaclink) + "-bench";  // beside it
+  const Finished bench = RunToEnd({program, "server", "--links", "2", "--clients", "3", "--detail",
+                                   "geometry", "--seconds", "1", "--json", Path("bench.json")});
   ASSERT_EQ(bench.exit_code, 0) << bench.err;
   const json row = json::parse(std::ifstream(Path("bench.json"))).at(0);
   EXPECT_EQ(row.at("links"), 2);
@@ -233,7 +234,7 @@ TEST_F(ServerTest, TheBenchMeasuresAServerOfItsOwn) {
   EXPECT_GT(row.at("memory_to_client_ms").at("p50").get<double>(), 0);
   EXPECT_GT(row.at("server_cores").get<double>(), 0);
   EXPECT_GT(row.at("server_mb").get<double>(), 0);
-  const Finished refused = Taclink({"bench", "server", "--links", "1", "--taclinkd", "/no/such/program"});
+  const Finished refused = RunToEnd({program, "server", "--links", "1", "--taclinkd", "/no/such/program"});
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_THAT(refused.err, HasSubstr("/no/such/program"));
 }
