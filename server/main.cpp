@@ -98,12 +98,13 @@ void AddReloads(Reloader& reloader, RpcServer& server, Arm& arm) {
   reloader.AddAlways("log",
                      [](const Config& next) { return SetUpLog(next.log); });  // also opens its file anew
   reloader.Add("log", [](const Config&) { return Result<void>(); });
-  reloader.Add("limits", [&server](const Config& next) {
-    server.SetLimits(ToServiceLimits(next.limits));
-    SPDLOG_INFO(
-        "of the limits, those of streams and their queues hold from now on, the others from the next start");
-    return Result<void>();
-  });
+  reloader.Add("limits",
+               [&server](const Config& next) {
+                 server.SetLimits(ToServiceLimits(next.limits));
+                 return Result<void>();
+               },
+               {"max_links", "max_calls_per_connection", "max_message_kb", "memory_mb", "keepalive_s",
+                "keepalive_timeout_s", "handshake_timeout_s", "idle_timeout_s"});
   reloader.AddAlways("links", [&arm](const Config&) {
     for (size_t link = 0; link < arm.links().size(); ++link) arm.worker(link).Wake();
     return Result<void>();
@@ -235,7 +236,8 @@ int Check(const Options& options, const Config& config) {
 
 void AddOptions(CLI::App& app, Options& options) {
   app.set_version_flag("--version", std::string(TACLINK_VERSION));
-  app.add_option("--config", options.config, "Configuration file (default: a simulated arm of four links)");
+  app.add_option("--config", options.config, "Configuration file (default: a simulated arm of four links)")
+      ->check([](const std::string& path) { return path.empty() ? "must name a file" : std::string(); }, "");
   CLI::Option* replay = app.add_option(
       "--replay", options.replay,
       "Log to play again and again in place of the cameras; the arm is the one that it describes");

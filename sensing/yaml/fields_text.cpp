@@ -1,4 +1,6 @@
-#include <cstdio>
+#include <array>
+#include <charconv>
+#include <string>
 
 #include "sensing/yaml/fields.h"
 
@@ -15,9 +17,14 @@ std::string QuotedText(const std::string& text) {
   return out + '"';
 }
 
+// The shortest text that reads back to the same number, with a point where there is an exponent: YAML 1.1
+// takes 1e-05 for a text.
 std::string NumberText(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.12g", value);
+  std::array<char, 32> buffer;
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
+  std::string text(buffer.data(), end);
+  const size_t exponent = text.find('e');
+  if (exponent != std::string::npos && text.find('.') == std::string::npos) text.insert(exponent, ".0");
   return text;
 }
 

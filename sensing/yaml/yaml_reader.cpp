@@ -126,7 +126,8 @@ bool YamlMap::Failed(const std::string& key) const {
 
 void YamlMap::FailAt(const YAML::Node& node, const std::string& key, const std::string& what,
                      bool is_missing_key) {
-  const int line = LineOf(node, line_);
+  const bool is_empty = node.IsDefined() && node.IsNull();
+  const int line = is_empty ? KeyLine(node_, key, line_) : LineOf(node, line_);
   // Of a mapping that is missing as a whole only that is reported.
   const std::string map = is_missing_key && !absent_.empty() ? "" : path_;
   const std::string& name = is_missing_key && !absent_.empty() ? absent_ : key;

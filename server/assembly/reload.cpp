@@ -20,9 +20,9 @@ std::vector<std::pair<std::string, std::string>> Sections(const std::string& con
 
 Reloader::Reloader(const Config& running) : running_(ConfigText(running)), last_(running_) {}
 
-void Reloader::Add(const std::string& section, Apply apply) {
+void Reloader::Add(const std::string& section, Apply apply, std::vector<std::string> fixed) {
   const std::lock_guard lock(mutex_);
-  sections_.push_back({section, std::move(apply)});
+  sections_.push_back({section, std::move(apply), std::move(fixed)});
 }
 
 void Reloader::AddAlways(const std::string& what, Apply apply) {
@@ -66,6 +66,10 @@ Reloader::Outcome Reloader::Reload(const Config& next) {
     const auto applied = hook->apply(next);
     if (applied) {
       outcome.applied.push_back(name);
+      for (const std::string& key : ChangedKeys(old_text, text)) {
+        const auto is_key = [&](const std::string& fixed) { return key == name + "." + fixed; };
+        if (std::ranges::any_of(hook->fixed, is_key)) outcome.needs_restart.push_back(key);
+      }
     } else {
       outcome.errors.push_back(name + ": " + applied.error().message);
     }

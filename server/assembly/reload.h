@@ -23,8 +23,9 @@ class Reloader {
 
   explicit Reloader(const Config& running);
 
-  /// How a top-level section of the configuration is taken over when it changed.
-  void Add(const std::string& section, Apply apply);
+  /// How a top-level section of the configuration is taken over when it changed, but for its keys `fixed`,
+  /// which hold until the server is started again.
+  void Add(const std::string& section, Apply apply, std::vector<std::string> fixed = {});
   /// Called by every reload, for files that may have changed under the same name.
   void AddAlways(const std::string& what, Apply apply);
   /// Any thread; the hooks run within.
@@ -34,6 +35,7 @@ class Reloader {
   struct Hook {
     std::string name;
     Apply apply;
+    std::vector<std::string> fixed = {};
   };
 
   std::mutex mutex_;

@@ -36,7 +36,6 @@ void DescribeLinks(FieldVisitor& visit, Config& config) {
                             std::to_string(config.limits.max_links) +
                             "; each takes some 100 MB, so these some " + std::to_string((count + 9) / 10) +
                             " GB: raise it where there is that much");
-    return;
   }
   LinkConfig fresh;
   fresh.realtime = config.realtime;

@@ -169,7 +169,8 @@ Result<void> Download(const RecordOptions& options) {
   std::string path = options.output.empty() ? options.log : options.output;
   if (std::filesystem::is_directory(path)) path += "/" + options.log;
   std::error_code none;
-  const uint64_t there = std::filesystem::exists(path) ? std::filesystem::file_size(path, none) : 0;
+  const bool is_new = !std::filesystem::exists(path);
+  const uint64_t there = is_new ? 0 : std::filesystem::file_size(path, none);
   std::ofstream out(path, std::ios::binary | std::ios::app);
   if (!out) return Error{ErrorCode::kPermissionDenied, path + " cannot be written"};
   bool written = true;
@@ -181,6 +182,7 @@ Result<void> Download(const RecordOptions& options) {
         return written;
       });
   out.close();
+  if (is_new && end == 0 && !done) std::filesystem::remove(path, none);
   if (!written || !out)
     return Error{ErrorCode::kResourceExhausted, path + " cannot be written; is the disk full?"};
   if (!done && done.error().code == ErrorCode::kUnavailable)

@@ -47,6 +47,14 @@ TEST(Reload, WhatHasAHookIsTakenOverAndTheRestNamed) {
   EXPECT_EQ(always, 3);
 }
 
+TEST(Reload, KeysOfASectionThatNeedARestartAreNamed) {
+  Reloader reloader(Parse(""));
+  reloader.Add("limits", [](const Config&) { return Result<void>(); }, {"memory_mb", "max_links"});
+  const auto outcome = reloader.Reload(Parse("limits: {max_streams: 7, memory_mb: 99}\n"));
+  EXPECT_THAT(outcome.applied, ElementsAre("limits"));
+  EXPECT_THAT(outcome.needs_restart, ElementsAre("limits.memory_mb"));
+}
+
 TEST(Reload, WhatFailsIsToldAndTriedAgain) {
   Reloader reloader(Parse(""));
   int tries = 0;

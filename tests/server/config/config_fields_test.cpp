@@ -161,6 +161,32 @@ TEST(ConfigFields, WhatFollowsFromAnErrorIsNotReported) {
   EXPECT_EQ(version.error().message, "arm.yaml:1: 'taclink_config' must be 1, the version of this format");
 }
 
+TEST(ConfigFields, AnEmptyValueIsReportedAtItsKey) {
+  const auto config =
+      ParseConfig("t.yaml",
+                  "taclink_config: 1\nlimits:\n  max_streams:\n\n  # a comment\n  queue_mb: 5\n"
+                  "arm:\n  name: x\n  links:\n"
+                  "    - {name: a, model: cylinder, source: simulated, scene: press}\n",
+                  "");
+  ASSERT_FALSE(config.ok());
+  EXPECT_THAT(config.error().message, HasSubstr("t.yaml:3: 'limits.max_streams'"));
+}
+
+TEST(ConfigFields, NumbersReadBackToTheSameOnes) {
+  const auto text = [](const std::string& limit_mm) {
+    const auto config = ParseConfig("t.yaml",
+                                    "taclink_config: 1\narm:\n  name: x\n  links:\n"
+                                    "    - {name: a, model: cylinder, source: simulated, scene: press, "
+                                    "drift: {limit_mm: " +
+                                        limit_mm + ", rate_limit_mm_s: 0.00001}}\n",
+                                    "");
+    EXPECT_TRUE(config.ok()) << config.error().message;
+    return ConfigText(*config);
+  };
+  EXPECT_THAT(text("0.50000000000001"), HasSubstr("limit_mm: 0.50000000000001,"));
+  EXPECT_THAT(text("0.5"), HasSubstr("rate_limit_mm_s: 1.0e-05,"));
+}
+
 TEST(ConfigFields, EveryKeyIsReadAndPrinted) {
   const std::string text = TextOf(kEverything);
   EXPECT_EQ(TextOf(text), text);
