@@ -95,8 +95,7 @@ Result<Config> Configure(const Options& options) {
 
 // Everything that a change of the configuration can do without a restart.
 void AddReloads(Reloader& reloader, RpcServer& server, Arm& arm) {
-  reloader.AddAlways("log",
-                     [](const Config& next) { return SetUpLog(next.log); });  // also opens its file anew
+  reloader.AddAlways("log", [](const Config& next) { return SetUpLog(next.log); });  // also reopens its file
   reloader.Add("log", [](const Config&) { return Result<void>(); });
   reloader.Add("limits",
                [&server](const Config& next) {

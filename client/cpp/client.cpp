@@ -72,7 +72,9 @@ ErrorCode CodeOf(grpc::StatusCode code) {
 Error FromStatus(const grpc::Status& status, const std::string& address) {
   const ErrorCode code = CodeOf(status.error_code());
   if (code == ErrorCode::kUnavailable) {
-    return {code, "lost the server at " + address + " (" + status.error_message() + "); check that it runs"};
+    // The server's own answer (a link that restarts) and a lost connection have the same code.
+    return {code, "the call to the server at " + address + " failed: " + status.error_message() +
+                      "; try again, and check that the server runs"};
   }
   if (code == ErrorCode::kTimeout)
     return {code, "the server at " + address + " did not answer in time; try again"};

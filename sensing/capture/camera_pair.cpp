@@ -21,7 +21,7 @@ constexpr int kMinBuffers = static_cast<int>(FramePairer::kDepth) + 2;
 /// A camera that is late by so much, and so many frames, is done without.
 constexpr int64_t kSilenceNs = 300'000'000;
 constexpr double kSilenceFrames = 3;
-/// After so much, and so many frames, it is opened anew; the first picture may take longer.
+/// After so much, and so many frames, it is reopened; the first picture may take longer.
 constexpr int64_t kReopenNs = 1'500'000'000, kFirstPictureNs = 4'000'000'000;
 constexpr double kReopenFrames = 6;
 constexpr int64_t kRetryNs = 300'000'000;
@@ -180,7 +180,7 @@ void CameraPair::JudgeSilence(CameraId id) {
   const int64_t patience_ns =
       std::max(camera.pictures_here > 0 ? kReopenNs : kFirstPictureNs, FramesNs(id, kReopenFrames));
   if (silent_ns >= patience_ns) {
-    Lose(id, options_.names[Index(id)] + ": gives no pictures; opening it anew");
+    Lose(id, options_.names[Index(id)] + ": gives no pictures; reopening it");
   } else if (silent_ns >= std::max(kSilenceNs, FramesNs(id, kSilenceFrames)) && !pairer_.lost(id)) {
     SetTrouble(Of(id), options_.names[Index(id)] + ": gives no pictures");
     DoWithout(id);

@@ -39,7 +39,7 @@ struct FramePair {
 /// take (low light makes some slower than asked), measured from the timestamps, of the faster camera.
 ///
 /// Pictures of one camera come in order; those of the two may be interleaved in any way, as long as one is
-/// not more than kDepth pictures late. A timestamp that does not rise within a camera starts anew. While one
+/// not more than kDepth pictures late. A timestamp that does not rise within a camera starts again. While one
 /// camera is lost each picture of the other is a pair of its own. Allocates nothing.
 class FramePairer {
  public:
@@ -84,7 +84,7 @@ class FramePairer {
     double interval_ns = 0;
     uint64_t dropped_total = 0;
     bool lost = false;
-    bool restarted = false;  ///< since last_pair_: its count may have begun anew
+    bool restarted = false;  ///< since last_pair_: its count may have begun again
   };
 
   void Follow(Camera& camera, const PictureTag& picture);

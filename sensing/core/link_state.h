@@ -74,7 +74,7 @@ struct PressureEstimate {
 struct StageTimes {
   double decode = 0;
   double detect = 0;     ///< the pictures are read: markers followed in their windows, or spots found in all
-  double register_ = 0;  ///< labels: checked, or found anew; with a search of the full pictures after a loss
+  double register_ = 0;  ///< labels: checked, or found again; with a search of the full pictures after a loss
   double reconstruct = 0;
   double force = 0;  ///< forces and contacts
 };

@@ -48,7 +48,7 @@ constexpr const char* Name(AcquireReason reason) {
 struct CameraTracking {
   double share_read = 0;  ///< of the picture's pixels, 1 when acquired
   int verified = 0;       ///< markers that look as before, but for a small shift
-  int measured = 0;       ///< markers whose spot was measured anew
+  int measured = 0;       ///< markers whose spot was measured again
   int searched = 0;       ///< markers without a label that were looked for
   int found = 0;          ///< of these, with success
   int dropped = 0;        ///< labels given up in this frame: the spot is gone, or in doubt

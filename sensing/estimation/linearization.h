@@ -19,7 +19,7 @@ class Linearization {
  public:
   explicit Linearization(const SkinMechanics& mechanics);
 
-  /// Makes everything anew. False: the stiffness is singular there, or not finite.
+  /// Makes everything again. False: the stiffness is singular there, or not finite.
   bool At(const ShellState& state, double pressure_mpa);
   /// Moves to a state nearby and keeps stiffness, columns and frames: only what the skin is out of balance by
   /// is that of the new state, exactly. What steps lead to is then the same equilibrium, in more of them.

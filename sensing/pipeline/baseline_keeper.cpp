@@ -90,7 +90,7 @@ void BaselineKeeper::Wait(const FrameTimes& times, LinkState& state, const Clock
   if (!waits_since_ns_) waits_since_ns_ = now_ns;
   if (now_ns - *waits_since_ns_ > kMostWaitedNs)
     AbortTare("for 3 s there was no answer to tare by: " + state.status_reason +
-              "; or take the rest shape anew with nothing at the skin (calibrate)");
+              "; or take the rest shape again with nothing at the skin (calibrate)");
 }
 
 void BaselineKeeper::Tell(const FrameTimes& times, LinkState& state, const Clock& clock) const {

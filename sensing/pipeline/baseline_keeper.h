@@ -52,8 +52,8 @@ class BaselineKeeper {
 
   /// None: it has not drifted far.
   std::optional<Reason> DriftReason() const;
-  /// What touched when a tare was forced is part of the baseline until rest is taken anew: a tare that is not
-  /// forced cannot see whether it has gone.
+  /// What touched when a tare was forced is part of the baseline until rest is taken again: a tare that is
+  /// not forced cannot see whether it has gone.
   bool is_forced() const { return baseline_.origin == BaselineOrigin::kForcedTare; }
 
  private:

@@ -10,7 +10,7 @@
 namespace taclink {
 namespace {
 
-// Frames nearer to the one before are left out; after a longer pause comparison begins anew.
+// Frames nearer to the one before are left out; after a longer pause comparison begins again.
 constexpr int64_t kStepNs = 15'000'000, kLongestNs = 250'000'000;
 // Frames that are remembered: more than the window and the longest lag at 66 Hz.
 constexpr size_t kRing = 128;

@@ -233,7 +233,7 @@ void AddAgreementReason(const Evidence& evidence, LinkState& state) {
     state.reasons.push_back(
         {ReasonId::kLate,
          Text("the %s camera shows the skin's motion %.2f s later than the other: its pictures are late; "
-              "plug it in anew, on a port of its own, or lower the frame rate; then touch the skin quickly",
+              "plug it in again, on a port of its own, or lower the frame rate; then touch the skin quickly",
               Name(evidence.motion->camera), evidence.motion->late_s),
          evidence.motion->late_s});
   } else if (lost) {
@@ -390,7 +390,7 @@ void AddBaselineReason(const Evidence& evidence, LinkState& state) {
   state.reasons.push_back(
       {ReasonId::kForcedBaseline,
        "the baseline was taken by force: what touched or moved then is part of it, and may "
-       "explain this; take the rest shape anew with nothing at the skin (calibrate)"});
+       "explain this; take the rest shape again with nothing at the skin (calibrate)"});
 }
 
 bool IsGrave(ReasonId id) {

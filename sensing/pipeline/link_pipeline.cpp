@@ -127,7 +127,7 @@ struct LinkPipeline::Stages {
   }
 
   void BeginRest(const std::optional<StereoRig>& rig, int pairs, BaselineOrigin origin) {
-    keeper.AbortTare("the rest shape is being taken anew");
+    keeper.AbortTare("the rest shape is being taken again");
     rest_origin = origin;
     rest.emplace(model, rig, pairs);
     rest_pressure.Clear();
@@ -228,7 +228,7 @@ struct LinkPipeline::Stages {
     }
   }
 
-  // Checks the labels of the markers followed; where that fails, finds them anew, in the same frame.
+  // Checks the labels of the markers followed; where that fails, finds them again, in the same frame.
   void Label(LinkState& state) {
     TrackingReport& report = state.tracking;
     report.mode = TrackingMode::kTracked;

@@ -66,7 +66,7 @@ class LinkPipeline {
   /// construction.
   void Restart();
 
-  /// Takes the next pairs as rest pictures: finds the cameras and the baseline anew. Until they are complete
+  /// Takes the next pairs as rest pictures: finds the cameras and the baseline again. Until they are complete
   /// nothing is measured (status kCalibrating).
   void BeginRest(int pairs);
   /// Gives that up, if it was not complete: goes on as before, where there is a baseline.

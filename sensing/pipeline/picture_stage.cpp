@@ -44,7 +44,7 @@ std::optional<Reason> PictureStage::TroubleOf(CameraId id, const RawImage& image
         ReasonId::kFrozen,
         camera +
             ": the picture is the one before, pixel by pixel, which a sensor's noise never repeats: "
-            "the camera hangs; plug it in anew"};
+            "the camera hangs; plug it in again"};
   return std::nullopt;
 }
 

@@ -9,7 +9,7 @@
 
 namespace taclink::server {
 
-/// Families of metrics, made anew at each scrape.
+/// Families of metrics, made again at each scrape.
 class MetricsText {
  public:
   using Labels = std::vector<prometheus::ClientMetric::Label>;

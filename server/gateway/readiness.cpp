@@ -26,9 +26,8 @@ Readiness CheckReadiness(const Arm& arm, const Security& security) {
                         : "not ready: no link has frames\n";
   out.text += not_ready;
   if (!access.trouble.empty())
-    out.text += access.refuses_all
-                    ? "security: nobody is let in, for no token is good; the log says why\n"
-                    : "security: tokens or certificates can't be read anew; the log says why\n";
+    out.text += access.refuses_all ? "security: nobody is let in, for no token is good; the log says why\n"
+                                   : "security: tokens or certificates can't be reloaded; the log says why\n";
   return out;
 }
 

@@ -24,8 +24,8 @@ class LinkStatisticsCollector {
  public:
   LinkStatisticsCollector();
 
-  /// A frame was published. A sequence that does not rise means that the source began anew; an exposure at 0,
-  /// that there is no latency.
+  /// A frame was published. A sequence that does not rise means that the source began again; an exposure at
+  /// 0, that there is no latency.
   void Record(uint64_t sequence, int64_t exposure_ns, int64_t published_ns);
   void RecordPictures(const std::array<CameraCounts, kCameraCount>& cameras);
   LinkStatistics Snapshot(int64_t now_ns) const;

@@ -263,7 +263,7 @@ void LinkSupervisor::BeginBuild(int64_t now_ns) {
   Enter(Phase::kBuilding, Supervision::State::kRestarting, "a fresh worker is being made", now_ns);
   build_ = std::make_shared<Build>();
   if (!factories_.source || !factories_.processor) {
-    build_->result = Error{ErrorCode::kUnsupported, "nothing is known of how to make it anew"};
+    build_->result = Error{ErrorCode::kUnsupported, "it cannot be restarted in this mode"};
     build_->done = true;
     return;
   }

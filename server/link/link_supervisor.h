@@ -20,7 +20,7 @@
 
 namespace taclink::server {
 
-/// Make a link's parts anew, after its worker died. May throw and may take long.
+/// Make a link's parts again, after its worker died. May throw and may take long.
 struct LinkFactories {
   std::function<Result<std::unique_ptr<FrameSource>>()> source = {};
   std::function<Result<std::unique_ptr<LinkProcessor>>()> processor = {};

@@ -16,7 +16,7 @@
 namespace taclink::server {
 
 /// Sends what spdlog's macros (SPDLOG_INFO and so on, which tell where they stand) are told where `options`
-/// say. May be called again; a file is opened anew, as log rotation wants it. Errors: kUnavailable (file).
+/// say. May be called again; a file is reopened, as log rotation wants it. Errors: kUnavailable (file).
 Result<void> SetUpLog(const LogOptions& options);
 
 /// A line for each message, whatever is in it: what a terminal or a reader of lines could take for more than

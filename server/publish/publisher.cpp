@@ -168,7 +168,7 @@ void Publisher::Round() {
 
 void Publisher::Push(const std::string& link, const char* kind, std::shared_ptr<const std::string> bytes,
                      std::string tail, bool frame) {
-  // Not the frame's sequence: a link that is started anew begins again with 1, one without pictures stays.
+  // Not the frame's sequence: a link that is restarted begins again with 1, one without pictures stays.
   outbox_.Push({.subject = prefix_ + link + "." + kind,
                 .id = arm_.events().history().run_id() + "." + std::to_string(++messages_),
                 .bytes = std::move(bytes),

@@ -10,7 +10,7 @@
 namespace taclink::server {
 namespace {
 
-constexpr int64_t kShortestRoundNs = 100'000'000;  // of a range that begins anew again and again
+constexpr int64_t kShortestRoundNs = 100'000'000;  // of a range that starts over repeatedly
 constexpr double kLongestNs = 1e18;
 
 int64_t Bounded(uint64_t time_ns) {

@@ -25,7 +25,7 @@ struct PlayerOptions {
   int64_t from_utc_ns = 0;
   int64_t to_utc_ns = 0;  ///< 0: the log's end
   double speed = 1;       ///< kSlowest to kFastest times as fast as it happened; 0: whenever it is asked
-  bool loop = false;      ///< begins anew at the end of the range
+  bool loop = false;      ///< begins again at the end of the range
   bool paused = false;    ///< begins so, before the first message
 };
 
@@ -35,7 +35,7 @@ struct PlayerStatus {
   double speed = 1;
   bool paused = false;
   bool ended = false;
-  uint64_t loops = 0;    ///< the range began anew
+  uint64_t loops = 0;    ///< the range began again
   uint64_t damaged = 0;  ///< places that could not be read
 };
 

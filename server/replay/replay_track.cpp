@@ -43,7 +43,7 @@ void ReplaySchedule::Reached(uint64_t round) {
   uint64_t before = round_;
   while (before < round) {
     if (!round_.compare_exchange_weak(before, round)) continue;
-    SPDLOG_INFO("the log has ended and begins anew, round {}", round + 1);
+    SPDLOG_INFO("the log has ended and begins again, round {}", round + 1);
     return;
   }
 }

@@ -35,7 +35,7 @@ std::string TlsChanges(const TlsMaterial& before, const TlsMaterial& after) {
   add("certificate", before.certificate != after.certificate);
   add("key", before.key != after.key);
   add("client_ca", before.client_ca != after.client_ca);
-  return out.empty() ? out : out + " read anew";
+  return out.empty() ? out : out + " reloaded";
 }
 
 // Whose tokens have expired between two moments.

@@ -31,11 +31,11 @@ struct SecurityStatus {
   uint64_t tries_throttled = 0;                                      ///< of the latter two, too many
 };
 
-/// Who may call, and what TLS needs: as configured, read anew when the files change. All of it may be called
+/// Who may call, and what TLS needs: as configured, reloaded when the files change. All of it may be called
 /// by any thread.
 class Security {
  public:
-  /// `good`: something was read anew, or can be again; else something is wrong. `what` holds no secret.
+  /// `good`: something was reloaded, or can be again; else something is wrong. `what` holds no secret.
   using Listener = std::function<void(bool good, const std::string& what)>;
 
   /// Nothing is configured: everybody is an operator, no TLS.

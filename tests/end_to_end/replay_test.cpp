@@ -79,7 +79,7 @@ TEST_F(ReplayTest, WhatWasRecordedIsPlayedAndServed) {
   const Finished restart = Taclink({"restart", "--link", "a", "--server", address});
   EXPECT_EQ(restart.exit_code, 1);
   EXPECT_THAT(restart.err, HasSubstr("plays a log"));
-  EXPECT_TRUE(server.ReadUntil("begins anew", seconds(60), true).has_value());
+  EXPECT_TRUE(server.ReadUntil("begins again", seconds(60), true).has_value());
   server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait(seconds(60)).exit_code, 0);
 }

@@ -145,7 +145,7 @@ class RecorderWatch(Client):
 
 
 class WatchProcess:
-    """`taclink watch` in a process that can be stopped and killed; started anew by `revive`, in the main thread."""
+    """`taclink watch` in a process that can be stopped and killed; started again by `revive`, in the main thread."""
 
     name = "watch process"
 

@@ -1,4 +1,4 @@
-"""The server under test: a process that ends and is started anew, life after life."""
+"""The server under test: a process that ends and is started again, life after life."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ TEST_P(FailingCallTest, IsToldAndNoFrameIsUncounted) {
       PassUntil([](const auto& status) { return status.state() == v1::RECORDER_STATE_TROUBLE; });
   EXPECT_THAT(trouble.trouble(), HasSubstr(std::strerror(fault.number)));
   EXPECT_THAT(trouble.trouble(), HasSubstr(folder_));
-  // It lasts, and logs are tried anew.
+  // It lasts, and logs are tried again.
   for (int i = 0; i < 12; ++i) {
     Publish(1);
     PassARound(1.1);

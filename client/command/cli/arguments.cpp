@@ -1,6 +1,9 @@
 #include "client/command/cli/arguments.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -22,7 +25,7 @@ Check Within(double min, double max) {
   const auto problem = [=](const std::string& text) -> std::string {
     double value = 0;
     if (CLI::detail::lexical_cast(text, value) && value >= min && value <= max) return {};
-    return "'" + text + "' is not a number from " + std::to_string(min) + " to " + std::to_string(max);
+    return "'" + text + "' is not a number from " + fmt::format("{} to {}", min, max);
   };
   return Check(CLI::Validator([problem](std::string& text) { return problem(text); }, "NUMBER"));
 }
@@ -30,7 +33,13 @@ Check Between(int min, int max) {
   return Check(CLI::Range(min, max));
 }
 Check Positive() {
-  return Check(CLI::PositiveNumber);
+  // CLI11's PositiveNumber prints both ends of the range of double.
+  const auto problem = [](const std::string& text) -> std::string {
+    double value = 0;
+    if (CLI::detail::lexical_cast(text, value) && value > 0 && std::isfinite(value)) return {};
+    return "'" + text + "' is not a positive number";
+  };
+  return Check(CLI::Validator([problem](std::string& text) { return problem(text); }, "POSITIVE"));
 }
 Check OneOf(std::initializer_list<const char*> names) {
   return OneOf(std::vector<std::string>(names.begin(), names.end()));

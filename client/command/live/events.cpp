@@ -36,7 +36,7 @@ void PrintLost(bool json, const client::EventReader& reader, uint64_t& told) {
 void PrintStart(bool json, const client::EventReader& reader) {
   if (reader.status().run_changed()) {
     fmt::print("{}\n", json ? Json({{"run_changed", true}, {"run_id", reader.status().run_id()}}).dump()
-                            : "-- the server was started anew: the end of its former run is unknown --");
+                            : "-- the server was restarted: the end of its former run is unknown --");
   }
   std::fflush(stdout);
 }
@@ -81,7 +81,7 @@ void AddEvents(const Arguments& app, Selected& selected) {
   AddServerOption(command, options->server);
   command.AddOption("--links", options->links, "Names of links, separated by commas (all)").Delimiter(',');
   const auto check = [](const std::string& name) {
-    return client::ValueOf<v1::EventKind>(name) ? std::string() : "'" + name + "' is no kind of event";
+    return client::ValueOf<v1::EventKind>(name) ? std::string() : "'" + name + "' is not a kind of event";
   };
   command
       .AddOption("--kinds", options->kinds, "Kinds of events, separated by commas (all): contact_begin, ...")

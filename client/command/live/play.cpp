@@ -154,7 +154,7 @@ void AddPlay(const Arguments& record, Selected& selected) {
   command.AddOption("--from", options->from_s, "Begin so many seconds after the log's first message")
       .Must(Within(0, 1e9));
   command.AddOption("--to", options->to_s, "End there; 0: at its last one").Must(Within(0, 1e9));
-  command.AddFlag("--loop", options->loop, "Begin anew at the end");
+  command.AddFlag("--loop", options->loop, "Begin again at the end");
   command.AddFlag("--events", options->events, "Also events, as 'events' prints them");
   command.AddFlag("--contacts", options->contacts, "Also the arm's contacts, as 'contacts' prints them");
   command.AddFlag("--json", options->json, "One JSON object a line");

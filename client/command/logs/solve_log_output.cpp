@@ -33,7 +33,7 @@ mcap::WriterOptions ToWriter(bool pictures) {
   return {.compression = mcap::Compression::kZstd};
 }
 
-// Of messages that are made anew, whose fields may be more than the old log knew; null: of copied ones.
+// Of messages that are made again, whose fields may be more than the old log knew; null: of copied ones.
 const google::protobuf::Descriptor* FreshType(const std::string& topic_text,
                                               const std::vector<LinkSettings>& links) {
   const auto topic = wire::log::ParseTopic(topic_text);

@@ -63,7 +63,7 @@ class SolvedLog {
 
   std::unique_ptr<wire::log::LogWriter> writer_;
   std::map<uint16_t, const google::protobuf::Descriptor*>
-      fresh_;  // old channels whose messages are made anew
+      fresh_;  // old channels whose messages are made again
   mcap::TextMap totals_;
   std::map<std::string, uint16_t> schemas_;  // by the type, or "#" and the old id
   std::map<uint16_t, uint16_t> channels_;    // by the old id

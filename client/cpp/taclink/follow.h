@@ -9,7 +9,7 @@
 #include "taclink/client.h"
 #include "taclink/events.h"
 
-/// Streams that are handed to callbacks and begin anew when the server goes away and comes back.
+/// Streams that are handed to callbacks and begin again when the server goes away and comes back.
 namespace taclink::client {
 
 /// Why nothing comes now, and when it is tried again.

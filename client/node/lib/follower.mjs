@@ -63,7 +63,7 @@ export class Follower {
   async #consumer() {
     const { config, created } = this.#info;
     const { state, created: now } = await streamInfo(this.#connection, config.name);
-    if (now !== created) throw new StreamLost(`stream ${config.name} was made anew; start again`);
+    if (now !== created) throw new StreamLost(`stream ${config.name} was made again; start again`);
     const manager = await this.#connection.jetstreamManager({ checkAPI: false });
     const { name } = await manager.consumers.add(config.name, {
       filter_subject: this.#subject,

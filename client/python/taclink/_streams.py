@@ -97,7 +97,7 @@ class EventState(StreamState[Event]):
 
     @property
     def run_changed(self) -> bool:
-        """The server was started anew: what happened at the end of its former run is unknown."""
+        """The server was started again: what happened at the end of its former run is unknown."""
         return self._run_changed
 
     @property

@@ -103,7 +103,7 @@ class Client:
         covariances, nodal forces). max_rate_hz: of each link; 0: all. every: all wait in order in a bounded
         queue; else only the newest of each link waits. A link that changes by less than the deadbands (N of a
         contact's force, m of a marker) is sent once a second only (Frame.unchanged); both 0: always.
-        reconnect: a broken stream is opened anew, with growing pauses, until it is closed; before each try
+        reconnect: a broken stream is reopened, with growing pauses, until it is closed; before each try
         on_reconnect(error, attempt, delay_s) is called. The first opening is not retried.
 
         Errors: NotFound (no such link), InvalidArgument.
@@ -187,7 +187,7 @@ class Client:
         on_progress: Callable[[int, int], object] | None = None,
         timeout: float | None = None,
     ) -> CalibrationResult:
-        """Finds a link's cameras and rest shape anew; nothing may touch its skin. Waits for the end.
+        """Finds a link's cameras and rest shape again; nothing may touch its skin. Waits for the end.
 
         pairs: of pictures to average over, 1 to 300. save: also write the link's configured calibration file on
         the server. force: even if the newest frame shows contacts. on_progress(taken, wanted): as pairs are
@@ -349,7 +349,7 @@ class Client:
         """Plays a log: what frames(), contacts() and events() gave then, at its pace, with the times of then.
 
         links: of frames and events; none: all. from_utc_ns, to_utc_ns: times of the log, both included; 0: its
-        first, its last. speed: 0.1 to 100; 0: as fast as it is read. loop: begins anew at the end of the range.
+        first, its last. speed: 0.1 to 100; 0: as fast as it is read. loop: begins again at the end of the range.
         paused: begins so. frames, events, contacts, arm: wanted. timeout: for opening the log.
         Errors: NotFound (no such log or link), InvalidArgument (range, speed), DataLoss (damaged beyond reading).
         """

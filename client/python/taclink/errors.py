@@ -108,7 +108,8 @@ def _message(kind: type[TaclinkError], details: str, address: str) -> str:
             "TLS needs ca_file, one with client_ca also certificate_file and key_file"
         )
     if kind is Unavailable:
-        return f"lost the server at {address} ({details}); check that it runs"
+        # The server's own answer (a link that restarts) and a lost connection have the same code.
+        return f"the call to the server at {address} failed: {details}; try again, and check that the server runs"
     if kind is Timeout:
         return f"the server at {address} did not answer in time; try again"
     if kind is Unsupported:

@@ -65,7 +65,7 @@ class Replay(ReplayState, Stream[ReplayMessage]):
         self._order(speed=speed)
 
     def set_loop(self, loop: bool) -> None:
-        """Whether it begins anew at the end of the range."""
+        """Whether it begins again at the end of the range."""
         self._order(loop=loop)
 
     def pictures(self, link: str, utc_ns: int) -> ReplayPictures:

@@ -69,6 +69,13 @@ class Server:
         assert self._process is not None
         self._process.send_signal(number)
 
+    def pause(self) -> None:
+        """Stops the process, as if it hung; SIGSTOP acts some time after it was sent."""
+        self.signal(signal.SIGSTOP)
+        assert self._process is not None
+        stat = Path(f"/proc/{self._process.pid}/stat")
+        until(lambda: stat.read_text().rpartition(")")[2].split()[0] == "T", "the server is stopped")
+
     def kill(self) -> None:
         """As a crash ends it."""
         self.signal(signal.SIGKILL)

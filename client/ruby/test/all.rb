@@ -3,7 +3,7 @@
 # Runs every test: ruby test/all.rb
 require 'tmpdir'
 
-# Generated code is made anew, and does not stay.
+# Generated code is made again, and does not stay.
 CACHE = Dir.mktmpdir('taclink-ruby-cache-')
 ENV['XDG_CACHE_HOME'] = CACHE
 # gRPC would write what the tests expect to fail.

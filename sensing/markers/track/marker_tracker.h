@@ -48,7 +48,7 @@ struct MarkerTrackerOptions {
 ///
 /// 1. Verify. A marker that looks as before but for a small shift is registered to its reference patch.
 /// 2. Measure. One that moved further, or looks different, is looked for where its motion predicts, and its
-///    spot is measured anew; that is the new reference. So no error adds up.
+///    spot is measured again; that is the new reference. So no error adds up.
 /// 3. Search. One without a label is looked for where the predicted shape has it, often at first, then less.
 /// 4. Check. Labels that contradict the geometry are dropped: those out of order along their path, two on one
 ///    spot, rays that do not meet on the marker's ring; one that is found again must be where it is
@@ -76,7 +76,7 @@ class MarkerTracker {
   /// If the frame was followed too, the better of both results is kept, without labels in which they differ.
   void Adopt(const Pictures& gray, const LabelledMarkers& acquired, LabelledMarkers& labels,
              TrackingReport& report);
-  /// A label that later stages don't believe: it is looked for anew, where the prediction has it.
+  /// A label that later stages don't believe: it is looked for again, where the prediction has it.
   void Reject(CameraId id, int marker) { Drop(cameras_[Index(id)].tracks[static_cast<size_t>(marker)]); }
   /// Nothing is known of where the markers are.
   void Forget();

@@ -18,7 +18,7 @@ const limited = (decompress) => (bytes, size) => {
   return new Uint8Array(decompress(bytes, Number(size)));
 };
 let decompressLz4;
-/** After one damaged frame it refuses all that follow, until it is loaded anew. */
+/** After one damaged frame it refuses all that follow, until it is loaded again. */
 async function loadLz4() {
   delete require.cache[require.resolve("@foxglove/wasm-lz4")];
   decompressLz4 = require("@foxglove/wasm-lz4");

@@ -117,7 +117,7 @@ TEST_F(CameraPairTest, TheTopCameraMayBeTheLostOne) {
     EXPECT_EQ(frame_.sequence, last + 1);
   }
   cameras_[kTop].plugged = true;
-  cameras_[kTop].first_sequence = 5000;  // it counts anew
+  cameras_[kTop].first_sequence = 5000;  // it counts again
   const uint64_t last = frame_.sequence;
   const int64_t last_ns = frame_.times.exposure_monotonic_ns;
   ASSERT_TRUE(Until(IsPair));

@@ -12,7 +12,7 @@ namespace {
 /// and then only.
 class CameraEvidenceTest : public ::testing::Test {
  protected:
-  static constexpr int kHidden = 100;  // from the top camera, whenever a baseline is taken anew
+  static constexpr int kHidden = 100;  // from the top camera, whenever a baseline is taken again
 
   static CameraEvidenceOptions Points() {
     CameraEvidenceOptions options;

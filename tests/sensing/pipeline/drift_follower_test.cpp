@@ -114,7 +114,7 @@ TEST_F(DriftFollowerTest, HoldsWhereNothingIsKnown) {
   Frame(0, 1);
   EXPECT_FALSE(follower_.following());
   EXPECT_EQ(drift_mm(), 0);
-  now_s_ -= 50;  // the source began anew
+  now_s_ -= 50;  // the source began again
   Frame(0, 1);
   EXPECT_FALSE(follower_.following());
   EXPECT_EQ(drift_mm(), 0);

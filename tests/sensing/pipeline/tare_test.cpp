@@ -216,7 +216,7 @@ TEST_F(TareTest, NeedsABaselineAndOneAtATime) {
   pipeline_->BeginRest(3);
   const auto end = pipeline_->TakeTareEnd();
   ASSERT_TRUE(end.has_value());
-  EXPECT_THAT(end->error().message, HasSubstr("anew"));
+  EXPECT_THAT(end->error().message, HasSubstr("again"));
 }
 
 TEST_F(TareTest, CreepIsFollowedReportedAndTared) {

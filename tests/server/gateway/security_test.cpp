@@ -1,4 +1,4 @@
-// Files that guard a server: read, checked, read anew.
+// Files that guard a server: read, checked, reloaded.
 #include "server/security/security.h"
 
 #include <gmock/gmock.h>
@@ -342,7 +342,7 @@ TEST_F(SecurityTest, WhatChangedIsToldWithoutSecrets) {
       "tokens: eve (viewer) is now eve (operator), added new (viewer, until 2999-01-01T00:00:00Z), removed "
       "otto (operator)\n");
   WriteServer(authority_);
-  EXPECT_EQ(changes(), "certificates: certificate, key read anew\n");
+  EXPECT_EQ(changes(), "certificates: certificate, key reloaded\n");
   EXPECT_EQ(changes(), "") << "told once";
 }
 

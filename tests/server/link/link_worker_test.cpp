@@ -152,7 +152,7 @@ TEST_F(LinkWorkerTest, ALostSourceIsReportedAndComesBack) {
   ASSERT_NE(NextFrame(), nullptr);
   script_->PushError(ErrorCode::kUnavailable, "/dev/video0 was unplugged");
   EXPECT_THAT(NextStatus(LinkStatus::kLost)->state().status_reason, HasSubstr("unplugged"));
-  script_->Push(1);  // it counts anew
+  script_->Push(1);  // it counts again
   clock_.Advance(milliseconds(100));
   EXPECT_EQ(NextStatus(LinkStatus::kOk)->state().sequence, 1u);
   worker_->Stop();

@@ -209,7 +209,7 @@ TEST_F(PublisherTest, SaysWhatIsWrong) {
       << publisher_->Status().trouble;
 }
 
-// A link that is started anew counts from 1 again, one without pictures does not count on.
+// A link that is started again counts from 1 again, one without pictures does not count on.
 TEST_F(PublisherTest, FramesOfTheSameNumberAreAllKept) {
   NatsServer nats;
   Start(nats.url());

@@ -57,7 +57,7 @@ class Played {
       case Kind::kPaused:
         return "paused";
       case Kind::kBegunAnew:
-        return "anew";
+        return "again";
       case Kind::kEnded:
         return "ended";
     }
@@ -185,7 +185,7 @@ TEST(LogPlayer, ARangeBetweenMessagesIsEmptyAndLasts) {
   TestLog log;
   Played player(log.Frames(100),
                 {.from_utc_ns = kT0 + 301 * kMs, .to_utc_ns = kT0 + 309 * kMs, .loop = true});
-  EXPECT_EQ(player.Told(), "ended") << "it would begin anew for ever";
+  EXPECT_EQ(player.Told(), "ended") << "it would begin again for ever";
 }
 
 TEST(LogPlayer, ARangeBesideTheLogIsRefused) {
@@ -210,7 +210,7 @@ TEST(LogPlayer, TheRangeBeginsAnewInStep) {
   Played player(log.Frames(11), {.loop = true});
   for (int round = 0; round < 3; ++round) {
     if (round > 0) {
-      EXPECT_EQ(player.Told(), "anew");
+      EXPECT_EQ(player.Told(), "again");
     }
     EXPECT_EQ(player->status().loops, static_cast<uint64_t>(round));
     for (int i = 0; i < 11; ++i) {
@@ -225,7 +225,7 @@ TEST(LogPlayer, TheRangeBeginsAnewInStep) {
 TEST(LogPlayer, ARoundOfOneMessageDoesNotSpin) {
   TestLog log;
   Played player(log.Frames(1), {.loop = true});
-  EXPECT_THAT(player.Told(4), ElementsAre("a0", "anew", "a0", "anew"));
+  EXPECT_THAT(player.Told(4), ElementsAre("a0", "again", "a0", "again"));
   EXPECT_EQ(player.now_ns, kNow + 200 * kMs);
 }
 
@@ -309,7 +309,7 @@ TEST(LogPlayer, WhatCannotBeReadIsCountedAndPassedOver) {
   for (int round = 0; round < 2; ++round) {
     EXPECT_EQ(player.Told(static_cast<int>(expected.size())), expected);
     EXPECT_EQ(player->status().damaged, 1u) << "a place, not how often it was met";
-    EXPECT_EQ(player.Told(), "anew");
+    EXPECT_EQ(player.Told(), "again");
   }
 }
 

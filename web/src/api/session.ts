@@ -17,7 +17,7 @@ export class Session {
   readonly caller = signal<GetCallerResponse | undefined>(undefined);
   readonly mayOperate = computed(() => this.caller.value?.role === Role.OPERATOR);
   readonly maySee = computed(() => (this.caller.value?.role ?? 0) >= Role.VIEWER);
-  /** Changes whenever the token does: what is open under the old one has to begin anew. */
+  /** Changes whenever the token does: what is open under the old one has to begin again. */
   readonly generation = signal(0);
 
   private token = sessionStorage.getItem(TOKEN_KEY) ?? localStorage.getItem(TOKEN_KEY) ?? "";

@@ -121,7 +121,7 @@ export class ArmStore {
     this.announce();
   }
 
-  /** Another run of the server: its events are numbered anew, and levels begin at normal. */
+  /** Another run of the server: its events are numbered again, and levels begin at normal. */
   forgetEvents(): void {
     this.events.value = [];
     this.levels.clear();

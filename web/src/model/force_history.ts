@@ -15,7 +15,7 @@ export class ForceHistory {
     this.contacts = new Array(capacity);
   }
 
-  /** `totalN` NaN: nothing was measured. A time before the newest one starts anew: the clock, or a replay, went back. */
+  /** `totalN` NaN: nothing was measured. A time before the newest one starts again: the clock, or a replay, went back. */
   add(timeS: number, totalN: number, contacts: { id: string; forceN: number }[]): void {
     if (this.count > 0) {
       const newest = this.newestS;

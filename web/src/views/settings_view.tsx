@@ -114,7 +114,7 @@ function Calibration({ link, onClose }: { link: Link; onClose: () => void }) {
 
   return (
     <Dialog title={`Calibrate ${link.name}`} onClose={close}>
-      <p>Finds both cameras and the rest shape anew. Nothing may touch the skin meanwhile.</p>
+      <p>Finds both cameras and the rest shape again. Nothing may touch the skin meanwhile.</p>
       <label>
         <input
           type="checkbox"
@@ -325,7 +325,7 @@ function Worker({ link }: { link: Link }) {
   const restart = async () => {
     try {
       await app.session.operations.restartLink({ link: link.name });
-      app.tell(`${link.name} is started anew. Without a calibration file nothing may touch it now.`);
+      app.tell(`${link.name} is started again. Without a calibration file nothing may touch it now.`);
     } catch (error) {
       app.tell(`Restart of ${link.name}: ${messageOf(error)}`, true);
     }

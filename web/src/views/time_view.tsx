@@ -127,7 +127,7 @@ function collect(store: ArmStore, what: What, link: string, fromS: number, toS: 
   return { names, data: [times, ...series], thresholds, events };
 }
 
-/** The chart; made anew when there are other curves. */
+/** The chart; made again when there are other curves. */
 class ForceChart {
   private plot: uPlot | undefined;
   private names = "";

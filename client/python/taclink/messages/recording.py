@@ -89,7 +89,7 @@ class LogDescription:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ReplayStatus:
-    """Sent first, after each order, when the range begins anew, once a second and last."""
+    """Sent first, after each order, when the range begins again, once a second and last."""
 
     from_utc_ns: int  # of the range
     to_utc_ns: int
@@ -97,7 +97,7 @@ class ReplayStatus:
     speed: float
     paused: bool
     ended: bool
-    loops: int  # the range began anew
+    loops: int  # the range began again
     lateness_s: float  # latest that a message was sent, since the status before
     damaged: int  # places of the log that could not be read
 
