@@ -259,6 +259,11 @@ void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFra
     out.mutable_pressure_estimate()->set_pressure_pa(state.pressure_estimate->mpa * kPascalsPerMpa);
     out.mutable_pressure_estimate()->set_sigma_pa(state.pressure_estimate->sigma_mpa * kPascalsPerMpa);
   }
+  if (const auto& estimate = state.specific_force_estimate) {
+    Fill(estimate->mps2, 1, *out.mutable_specific_force_estimate()->mutable_specific_force_mps2());
+    FillCovariance(estimate->covariance, 1,
+                   *out.mutable_specific_force_estimate()->mutable_covariance_m2_s4());
+  }
   out.set_force_model(ToWire(state.forces.model));
   out.set_baseline_age_s(state.baseline_age_s);
   Fill(state.baseline, *out.mutable_baseline());
@@ -324,6 +329,11 @@ Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
   if (frame.has_pressure_estimate())
     state.pressure_estimate = {frame.pressure_estimate().pressure_pa() / kPascalsPerMpa,
                                frame.pressure_estimate().sigma_pa() / kPascalsPerMpa};
+  if (frame.has_specific_force_estimate()) {
+    const v1::SpecificForceEstimate& estimate = frame.specific_force_estimate();
+    state.specific_force_estimate = {FromWire(estimate.specific_force_mps2(), 1),
+                                     CovarianceFrom(estimate.covariance_m2_s4(), 1).value_or(Mat3::Zero())};
+  }
   state.total_force_n = FromWire(frame.total_force_n(), 1);
   state.forces.model = FromWire(frame.force_model());
   state.forces.residual = frame.force_residual();

@@ -31,7 +31,7 @@ std::unique_ptr<StateEstimator> Make(const LinkModel& model, const ForceMethod& 
 }
 
 // Displacements count from the slack skin.
-PressurePair PressuresOf(const PathTruth& path) {
+LoadsPair PressuresOf(const PathTruth& path) {
   return {.now = {path.path.pressure_mpa, PressureSigma(PressureOrigin::kSimulated)}, .baseline = {}};
 }
 

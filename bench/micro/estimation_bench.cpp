@@ -89,8 +89,7 @@ void Estimation(benchmark::State& state) {
   std::vector<SkinShape> frames = Frames(model, motion);
   NodalForces forces;
   std::vector<Contact> contacts;
-  const PressurePair pressure{.now = {kPressureMpa, PressureSigma(PressureOrigin::kSimulated)},
-                              .baseline = {}};
+  const LoadsPair pressure{.now = {kPressureMpa, PressureSigma(PressureOrigin::kSimulated)}, .baseline = {}};
   const auto estimate = [&](SkinShape& frame) {
     estimator.Estimate(pressure, frame, forces);
     estimator.FindContacts(finder, frame, forces, contacts);
@@ -134,8 +133,7 @@ void LiveEstimation(benchmark::State& state) {
   std::vector<SkinShape> frames = Frames(model, static_cast<Motion>(state.range(0)));
   NodalForces forces;
   std::vector<Contact> contacts;
-  const PressurePair pressure{.now = {kPressureMpa, PressureSigma(PressureOrigin::kSimulated)},
-                              .baseline = {}};
+  const LoadsPair pressure{.now = {kPressureMpa, PressureSigma(PressureOrigin::kSimulated)}, .baseline = {}};
   std::vector<double> times_ms;
   double tangents = 0;
   size_t next = 0;

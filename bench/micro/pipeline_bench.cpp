@@ -94,7 +94,7 @@ struct Stages {
   }
 
   void Estimate() {
-    PressureReading told{0, PressureSigma(PressureOrigin::kSimulated)};
+    MeasuredLoads told{0, PressureSigma(PressureOrigin::kSimulated)};
     skin.Run(labels, told, {}, *estimator, finder, state, told);
   }
 

@@ -146,7 +146,7 @@ void RunEstimator(const LinkModel& model, const ForceMethod& method, const TrueS
   options.refinement = method.refinement;
   const auto estimator = MakeStateEstimator(model, options);
   const auto estimate = [&](double pressure_mpa, const SkinShape& shape) {
-    const PressureReading now{pressure_mpa, PressureSigma(PressureOrigin::kSimulated)};
+    const MeasuredLoads now{pressure_mpa, PressureSigma(PressureOrigin::kSimulated)};
     return SolveMarkers(model, *estimator, {.now = now, .baseline = {}}, shape);
   };
   SkinShape clean;

@@ -85,8 +85,9 @@ struct LinkModel {
   std::string name;
   std::string description;
 
-  double length_mm = 0;     ///< between the clamped ends
-  double thickness_mm = 0;  ///< of the skin
+  double length_mm = 0;      ///< between the clamped ends
+  double thickness_mm = 0;   ///< of the skin
+  double density_kg_m3 = 0;  ///< of the skin; 0: not known, its weight is left out
   RadiusProfile profile = RadiusProfile::Constant(1);
   double profile_depth_mm =
       0;  ///< how deep below the outer surface `profile` runs: 0 outer, t/2 middle, t inner
@@ -110,6 +111,8 @@ struct LinkModel {
   }
   int PathOf(int marker) const { return marker % markers.paths; }  ///< from 0
   int RingOf(int marker) const { return marker / markers.paths; }  ///< from 0
+  /// Force per area of the undeformed mid-surface and specific force, N/mm^2 per m/s^2, which is kg/mm^2.
+  double MassPerArea() const { return 1e-9 * density_kg_m3 * thickness_mm; }
   /// Where a marker's centre is on an undeformed skin.
   Vec3 RestMarker(int marker) const;
   /// All of them, by index.

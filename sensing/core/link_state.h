@@ -70,6 +70,12 @@ struct PressureEstimate {
   double mpa = 0, sigma_mpa = 0;
 };
 
+/// A specific force that the estimate found: gravity less the link's acceleration, link frame.
+struct SpecificForceEstimate {
+  Vec3 mps2 = Vec3::Zero();
+  Mat3 covariance = Mat3::Zero();  ///< (m/s^2)^2
+};
+
 /// How long each stage of a frame took, ms; 0: did not run.
 struct StageTimes {
   double decode = 0;
@@ -95,6 +101,8 @@ struct LinkState {
   std::optional<double> pressure_mpa;  ///< measured; none: assumed, or the sensor's is stale
   PressureReport pressure;
   std::optional<PressureEstimate> pressure_estimate;  ///< what the skin's shape and the sensor say together
+  /// Likewise, of the skin's shape and the measured attitude; none: the attitude counts as exact.
+  std::optional<SpecificForceEstimate> specific_force_estimate;
 
   std::array<CameraCounts, kCameraCount> cameras;
   TrackingReport tracking;

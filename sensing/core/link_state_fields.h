@@ -81,13 +81,14 @@ auto Fields(S& pressure) {
 
 template <Is<LinkState> S>
 auto Fields(S& state) {
-  auto& [sequence, times, status, status_reason, reasons, pressure_mpa, pressure, pressure_estimate, cameras,
-         tracking, shape, forces, contacts, total_force_n, baseline_age_s, baseline, stage_ms, replayed] =
-      state;
+  auto& [sequence, times, status, status_reason, reasons, pressure_mpa, pressure, pressure_estimate,
+         specific_force_estimate, cameras, tracking, shape, forces, contacts, total_force_n, baseline_age_s,
+         baseline, stage_ms, replayed] = state;
   return std::tuple(Field{"sequence", sequence}, Field{"times", times}, Field{"status", status},
                     Field{"status_reason", status_reason}, Field{"reasons", reasons},
                     Field{"pressure_mpa", pressure_mpa}, Field{"pressure", pressure},
-                    Measured("pressure_estimate", pressure_estimate), Field{"cameras", cameras},
+                    Measured("pressure_estimate", pressure_estimate),
+                    Measured("specific_force_estimate", specific_force_estimate), Field{"cameras", cameras},
                     Field{"tracking", tracking}, Measured("shape", shape), Measured("forces", forces),
                     Measured("contacts", contacts), Measured("total_force_n", total_force_n),
                     Field{"baseline_age_s", baseline_age_s}, Field{"baseline", baseline},

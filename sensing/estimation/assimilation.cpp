@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sensing/shell/element_load.h"
-
 namespace taclink {
 namespace {
 
@@ -103,13 +101,12 @@ bool Assimilation::FindStep(const ShellState& state, const NonlinearShell::Loads
   return step_.allFinite();
 }
 
-AssimilationSummary Assimilation::Run(const MarkerObservations& observed, double pressure_mpa,
+AssimilationSummary Assimilation::Run(const MarkerObservations& observed, const KnownLoads& known,
                                       ShellState& state, Eigen::VectorXd& pulls_n) {
   observed_ = &observed;
   SetSprings(observed);
-  const FollowerPressure pressure(pressure_mpa);
-  const ElementLoad* all[] = {&pressure};
-  const NonlinearShell::Loads loads = all;
+  const AppliedLoads applied(mechanics_, known);
+  const NonlinearShell::Loads loads = applied.loads();
   const double unit = mechanics_.length_unit();
   AssimilationSummary summary;
   double value = Value(state, loads);

@@ -22,7 +22,7 @@ struct AssimilationSummary {
 };
 
 /// The shell's shape when springs pull its markers to where they are seen:
-///   min  Pi(u, p) + 1/2 sum_m (m(u) - d)' W_m (m(u) - d),
+///   min  Pi(u, q) + 1/2 sum_m (m(u) - d)' W_m (m(u) - d),
 /// Newton with a line search, where the Hessian is indefinite with a shift. Springs and not loads: nothing
 /// has to be known of where something touches, and no start from an earlier frame is needed; it leads there
 /// in less steps. The springs stretch by force / stiffness, so that the shape is a good place to linearize
@@ -31,8 +31,8 @@ class Assimilation {
  public:
   explicit Assimilation(const SkinMechanics& mechanics);
 
-  /// From `state`, at a gauge pressure. Sets `pulls_n`: the springs' forces on the markers, stacked.
-  AssimilationSummary Run(const MarkerObservations& observed, double pressure_mpa, ShellState& state,
+  /// From `state`, under known loads. Sets `pulls_n`: the springs' forces on the markers, stacked.
+  AssimilationSummary Run(const MarkerObservations& observed, const KnownLoads& known, ShellState& state,
                           Eigen::VectorXd& pulls_n);
 
  private:

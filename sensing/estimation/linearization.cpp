@@ -5,8 +5,6 @@
 #include <cassert>
 #include <cmath>
 
-#include "sensing/shell/element_load.h"
-
 namespace taclink {
 namespace {
 
@@ -112,18 +110,13 @@ std::array<Eigen::VectorXd, 3> Linearization::PulledAtSites(const Eigen::VectorX
   return pulled;
 }
 
-bool Linearization::At(const ShellState& state, double pressure_mpa) {
+bool Linearization::At(const ShellState& state, const KnownLoads& loads) {
   const NonlinearShell& shell = mechanics_.shell();
   is_made_ = false;
   state_ = tangent_state_ = state;
-  pressure_mpa_ = pressure_mpa;
-  const FollowerPressure pressure(pressure_mpa), unit(1);
-  const ElementLoad* loads[] = {&pressure};
-  const ElementLoad* one[] = {&unit};
-  shell.Gradient(state_, one, pressure_force_);
-  shell.Gradient(state_, {}, without_);
-  pressure_force_ -= without_;
-  shell.Hessian(state_, loads, gradient_, hessian_);
+  loads_ = loads;
+  mechanics_.GradientByLoads(state_, gradient_by_loads_);
+  shell.Hessian(state_, AppliedLoads(mechanics_, loads).loads(), gradient_, hessian_);
   if (!gradient_.allFinite() || !factor_.Factorise(hessian_)) return false;
   const MarkerMap& map = mechanics_.markers();
   map.WriteJacobian(shell, state_, jacobian_);
@@ -131,13 +124,17 @@ bool Linearization::At(const ShellState& state, double pressure_mpa) {
   map.Displacements(state_, base_mm_);
   factor_.Solve(gradient_, motion_);
   base_mm_.noalias() -= jacobian_ * motion_;
-  factor_.Solve(pressure_force_, motion_);
-  by_pressure_.noalias() = -(jacobian_ * motion_);
-  tangent_pressure_mpa_ = pressure_mpa;
+  by_known_loads_.setZero(jacobian_.rows(), KnownLoads::kCount);
+  for (int k = 0; k < KnownLoads::kCount; ++k) {
+    if (gradient_by_loads_.col(k).isZero(0)) continue;
+    factor_.Solve(gradient_by_loads_.col(k), motion_);
+    by_known_loads_.col(k).noalias() = -(jacobian_ * motion_);
+  }
+  tangent_loads_ = loads;
   tangent_gradient_ = gradient_;
   tangent_base_mm_ = base_mm_;
   SetFrames();
-  is_made_ = base_mm_.allFinite() && by_pressure_.allFinite();
+  is_made_ = base_mm_.allFinite() && by_known_loads_.allFinite();
   return is_made_;
 }
 
@@ -236,29 +233,27 @@ Eigen::VectorXf Linearization::Column(Direction direction, int site) const {
   return AtSite(site).lazyProduct(load);
 }
 
-void Linearization::SetPressure(double pressure_mpa) {
-  const double more_mpa = pressure_mpa - pressure_mpa_;
-  gradient_ += more_mpa * pressure_force_;
-  base_mm_ += more_mpa * by_pressure_;
-  pressure_mpa_ = pressure_mpa;
+void Linearization::SetKnownLoads(const KnownLoads& loads) {
+  const Vec4 more = loads.Stacked() - loads_.Stacked();
+  gradient_ += gradient_by_loads_ * more;
+  base_mm_ += by_known_loads_ * more;
+  loads_ = loads;
 }
 
-bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {
+bool Linearization::Rebase(const ShellState& state, const KnownLoads& loads) {
   const bool is_tangent_state =
       state.mids_mm == tangent_state_.mids_mm && state.directors == tangent_state_.directors;
   state_ = state;
-  pressure_mpa_ = pressure_mpa;
+  loads_ = loads;
   if (is_tangent_state) {
-    // The pressure's forces are linear in the pressure.
+    // The forces of known loads are linear in these.
     gradient_ = tangent_gradient_;
     base_mm_ = tangent_base_mm_;
-    pressure_mpa_ = tangent_pressure_mpa_;
-    SetPressure(pressure_mpa);
+    loads_ = tangent_loads_;
+    SetKnownLoads(loads);
     return base_mm_.allFinite();
   }
-  const FollowerPressure pressure(pressure_mpa);
-  const ElementLoad* loads[] = {&pressure};
-  mechanics_.shell().Gradient(state_, loads, gradient_);
+  mechanics_.shell().Gradient(state_, AppliedLoads(mechanics_, loads).loads(), gradient_);
   if (!gradient_.allFinite()) return false;
   factor_.Solve(gradient_, motion_);
   mechanics_.markers().Displacements(state_, base_mm_);
@@ -266,10 +261,10 @@ bool Linearization::Rebase(const ShellState& state, double pressure_mpa) {
   return base_mm_.allFinite();
 }
 
-double Linearization::Step(const SiteLoads& loads, double pressure_error_mpa, double longest_mm,
+double Linearization::Step(const SiteLoads& loads, const Vec4& known_error, double longest_mm,
                            ShellState& state) {
   const NonlinearShell& shell = mechanics_.shell();
-  Eigen::VectorXd force = -gradient_ - pressure_error_mpa * pressure_force_;
+  Eigen::VectorXd force = -gradient_ - gradient_by_loads_ * known_error;
   for (int site = 0; site < mechanics_.site_count(); ++site) {
     const int node = mechanics_.NodeOfSite(site), dof = shell.Dof(node, 0);
     const Mat3& frame = frames_[static_cast<size_t>(site)];

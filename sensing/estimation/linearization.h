@@ -11,8 +11,9 @@
 
 namespace taclink {
 
-/// The skin's equilibrium to first order about a state: with loads f at the sites and a pressure error dp,
-///   m = base + sum_k sum_s Column(k, s) f_ks + by_pressure dp.
+/// The skin's equilibrium to first order about a state: with loads f at the sites and an error dq of the
+/// known loads,
+///   m = base + sum_k sum_s Column(k, s) f_ks + by_known_loads dq.
 /// Directions k of a site: inward, around, along; the last two act on the outer wall, with their moment. A
 /// state may be one that no stable equilibrium is near: the stiffness may be indefinite. One thread.
 class Linearization {
@@ -20,19 +21,19 @@ class Linearization {
   explicit Linearization(const SkinMechanics& mechanics);
 
   /// Makes everything again. False: the stiffness is singular there, or not finite.
-  bool At(const ShellState& state, double pressure_mpa);
+  bool At(const ShellState& state, const KnownLoads& loads);
   /// Moves to a state nearby and keeps stiffness, columns and frames: only what the skin is out of balance by
   /// is that of the new state, exactly. What steps lead to is then the same equilibrium, in more of them.
   /// False: not finite.
-  bool Rebase(const ShellState& state, double pressure_mpa);
-  /// The same state under another pressure, to first order.
-  void SetPressure(double pressure_mpa);
+  bool Rebase(const ShellState& state, const KnownLoads& loads);
+  /// The same state under other known loads, to first order.
+  void SetKnownLoads(const KnownLoads& loads);
   bool is_made() const { return is_made_; }
 
   const ShellState& state() const { return state_; }
   /// Where stiffness, columns and frames are from.
   const ShellState& tangent_state() const { return tangent_state_; }
-  double pressure_mpa() const { return pressure_mpa_; }
+  const KnownLoads& known_loads() const { return loads_; }
   const Eigen::VectorXd& base_mm() const { return base_mm_; }
   /// Directions of the load of a site, in its frame.
   enum Direction { kInward, kAround, kAlong };
@@ -45,7 +46,7 @@ class Linearization {
   Eigen::MatrixXf RingColumns() const;
   /// Gives back the columns' memory.
   void DropColumns();
-  const Eigen::VectorXd& by_pressure() const { return by_pressure_; }
+  const ByKnownLoads& by_known_loads() const { return by_known_loads_; }
   /// By site; columns inward, around, along; unit, perpendicular.
   const std::vector<Mat3>& frames() const { return frames_; }
 
@@ -63,9 +64,9 @@ class Linearization {
     std::array<Eigen::VectorXd, 3> forces_n;
     std::array<Eigen::VectorXd, 2> couples_nmm;
   };
-  /// Where loads and a pressure error take the state, to first order. Returns
+  /// Where loads and an error of the known ones take the state, to first order. Returns
   /// the longest motion of a node, mm.
-  double Step(const SiteLoads& loads, double pressure_error_mpa, double longest_mm, ShellState& state);
+  double Step(const SiteLoads& loads, const Vec4& known_error, double longest_mm, ShellState& state);
   /// The markers' displacements from the slack skin to first order, where the last Step led without a limit.
   void FirstOrderMarkers(Eigen::VectorXd& stacked_mm) const;
 
@@ -86,9 +87,10 @@ class Linearization {
   MarkerMap::Jacobian jacobian_;
   ShellState state_, tangent_state_;
   bool is_made_ = false;
-  double pressure_mpa_ = 0, tangent_pressure_mpa_ = 0;
+  KnownLoads loads_, tangent_loads_;
   Eigen::VectorXd tangent_gradient_, tangent_base_mm_;
-  Eigen::VectorXd gradient_, pressure_force_, base_mm_, without_, by_pressure_, motion_;
+  Eigen::VectorXd gradient_, base_mm_, motion_;
+  ByKnownLoads gradient_by_loads_, by_known_loads_;
   Eigen::MatrixXf adjoint_;                     // J K^-1: 3 markers x the five dofs of each site in place_
   std::vector<Eigen::Index> place_;             // by site, in adjoint_; -1: not made
   std::vector<BlockTridiagonal::Rows> filled_;  // rows of J that reach that row of nodes

@@ -39,26 +39,27 @@ LoadEstimator::LoadEstimator(const SkinMechanics& mechanics, const Neighborhoods
       camera_modes_(mechanics.model()),
       hills_(mechanics) {}
 
-bool LoadEstimator::Prepare(Linearization& skin, const InflatedSkin& inflated,
-                            const MarkerObservations& observed, const PressurePrior& prior,
+bool LoadEstimator::Prepare(Linearization& skin, const UntouchedSkin& untouched_skin,
+                            const MarkerObservations& observed, const KnownLoadsPrior& prior,
                             const Eigen::VectorXd& local_n,
                             std::shared_ptr<const UntouchedCovariance> untouched) {
   const bool is_touched = untouched != nullptr;
-  covariance_.SetState(skin, inflated);
+  covariance_.SetState(skin, untouched_skin);
   untouched_ =
       is_touched ? std::move(untouched) : UntouchedCovariance::Make(skin, covariance_, observed, prior);
   if (!untouched_) return false;
-  pressure_sigma_ = prior.sigma_mpa;
-  by_pressure_ = prior.sigma_mpa * skin.by_pressure();
+  known_errors_ = prior.now;
+  by_known_loads_ = skin.by_known_loads() * known_errors_;
   const Eigen::MatrixXf of_loads = covariance_.ColumnsOfLoads(skin, local_n),
                         of_noise = ColumnsOfNoise(observed);
   camera_modes_.Write(observed, camera_modes_mm_);
-  Eigen::MatrixXf more(of_loads.rows(), of_loads.cols() + of_noise.cols() + camera_modes_mm_.cols() + 1);
-  more << of_loads, of_noise, camera_modes_mm_.cast<float>(), by_pressure_.cast<float>();
+  Eigen::MatrixXf more(of_loads.rows(),
+                       of_loads.cols() + of_noise.cols() + camera_modes_mm_.cols() + known_errors_.cols());
+  more << of_loads, of_noise, camera_modes_mm_.cast<float>(), by_known_loads_.cast<float>();
   model_columns_ = of_loads.cols();
   if (!whitening_.Set({untouched_, &untouched_->factor}, std::move(more))) return false;
   model_covariance_.clear();
-  whitened_pressure_ = whitening_.Applied(by_pressure_);
+  whitened_known_loads_ = whitening_.Applied(by_known_loads_);
   hidden_.resize(0, 0);
   free_norms_.resize(0);
   limits_.by_site_n.resize(0);
@@ -85,9 +86,9 @@ void LoadEstimator::WriteModelCovariances() {
   for (size_t m = 0; m < model_covariance_.size(); ++m) {
     const auto all = whitening_.columns().middleRows<3>(3 * static_cast<Eigen::Index>(m));
     const auto of_loads = all.leftCols(model_columns_);
-    const auto of_pressure = all.rightCols<1>();
+    const auto of_known = all.rightCols(known_errors_.cols());
     model_covariance_[m] +=
-        Mat3((of_loads * of_loads.transpose() + of_pressure * of_pressure.transpose()).cast<double>());
+        Mat3((of_loads * of_loads.transpose() + of_known * of_known.transpose()).cast<double>());
   }
 }
 
@@ -143,13 +144,13 @@ void LoadEstimator::WriteCameraCovariances() {
   }
 }
 
-bool LoadEstimator::HasPressure(const PressurePrior& prior) const {
-  return untouched_ && prior.sigma_mpa <= kSameNoise * pressure_sigma_ &&
-         pressure_sigma_ <= kSameNoise * prior.sigma_mpa;
+bool LoadEstimator::HasKnownLoads(const KnownLoadsPrior& prior) const {
+  return untouched_ && prior.IsAbout(known_errors_);
 }
 
-bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const {
-  if (!HasPressure(prior) || !untouched_->HasBaseline(prior) || !untouched_->LosesFew(observed)) return false;
+bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const KnownLoadsPrior& prior) const {
+  if (!HasKnownLoads(prior) || !untouched_->HasBaseline(prior) || !untouched_->LosesFew(observed))
+    return false;
   constexpr double kMost = kSameNoise * kSameNoise;
   int worse = 0;
   for (size_t m = 0; m < noise_mm2_.size(); ++m) {
@@ -164,7 +165,7 @@ bool LoadEstimator::IsPreparedFor(const MarkerObservations& observed, const Pres
 // more, a column for each direction in which they are seen.
 Eigen::MatrixXf LoadEstimator::ColumnsOfNoise(const MarkerObservations& observed) {
   noise_mm2_ = untouched_->noise_mm2;
-  Eigen::MatrixXf columns(by_pressure_.size(), 0);
+  Eigen::MatrixXf columns(by_known_loads_.rows(), 0);
   for (size_t m = 0; m < noise_mm2_.size(); ++m) {
     const SeenNoise now = SeenNoiseOf(observed.information[m], covariance_.unseen_mm());
     const Eigen::MatrixXd then_mm2 = now.axes.transpose() * noise_mm2_[m] * now.axes;

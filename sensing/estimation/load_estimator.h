@@ -56,9 +56,9 @@ struct LoadEstimate {
   double camera_shift_mm = 0;  ///< the latter's longest, of a marker
   /// Likewise, as each camera by itself sees them, across its lines of sight. Empty: nothing was fitted.
   std::array<Eigen::VectorXd, kCameraCount> by_camera_mm;
-  double pressure_error_mpa = 0;  ///< true less told
-  double baseline_error_mpa = 0;  ///< likewise, of the pressure under which the baseline was taken
-  double pressure_sigma_mpa = 0;  ///< of the corrected pressure
+  Vec4 known_error = Vec4::Zero();       ///< of the known loads: true less measured, as KnownLoads::Stacked()
+  Vec4 baseline_error = Vec4::Zero();    ///< likewise, of those under which the baseline was taken
+  Mat4 known_covariance = Mat4::Zero();  ///< of the corrected known loads
   double chi2_per_dof = 0;
   double region_chi2_per_dof = 0;  ///< the largest of 3 x 3 markers
   bool converged = true;
@@ -78,14 +78,14 @@ class LoadEstimator {
   /// neighborhood of each site, for the model's errors. `untouched`: of the skin without loads; columns are
   /// then made where loads are likely, and others when they are asked for. Null: this is that skin, and all
   /// columns are made. False: the covariance has no factor.
-  bool Prepare(Linearization& skin, const InflatedSkin& inflated, const MarkerObservations& observed,
-               const PressurePrior& prior, const Eigen::VectorXd& local_n,
+  bool Prepare(Linearization& skin, const UntouchedSkin& untouched_skin, const MarkerObservations& observed,
+               const KnownLoadsPrior& prior, const Eigen::VectorXd& local_n,
                std::shared_ptr<const UntouchedCovariance> untouched);
   /// Whether these observations are nearly as good, everywhere, as those that were prepared for, and count
   /// from the same baseline; what is missing now does not matter.
-  bool IsPreparedFor(const MarkerObservations& observed, const PressurePrior& prior) const;
-  /// Whether it was prepared for a pressure that is known about as well.
-  bool HasPressure(const PressurePrior& prior) const;
+  bool IsPreparedFor(const MarkerObservations& observed, const KnownLoadsPrior& prior) const;
+  /// Whether it was prepared for loads that are known about as well.
+  bool HasKnownLoads(const KnownLoadsPrior& prior) const;
 
   /// After Prepare. The linearization may have been rebased. Covariances and what is left unexplained are not
   /// written. `untouched_norms`: FreeNorms() of the skin without loads, shown the same observations, which
@@ -101,6 +101,10 @@ class LoadEstimator {
   void ConcludeUntouched(const MarkerObservations& observed) {
     Hide(observed);
     WriteMarkerCovariances();
+  }
+  /// After Prepare: of known loads whose errors are fitted, where all markers are seen.
+  Mat4 KnownCovariance() const {
+    return known_errors_ * whitening_.LastPosterior(known_errors_.cols()) * known_errors_.transpose();
   }
   /// Of what the last Fit or Hide was shown, where all columns are made; nothing is allocated as long as that
   /// stays.
@@ -224,8 +228,8 @@ class LoadEstimator {
   Whitening whitening_;
   Eigen::Index model_columns_ = 0;                          // of whitening_: that loads add
   std::vector<Mat3> model_covariance_, camera_covariance_;  // empty: not written since Prepare
-  Eigen::VectorXd by_pressure_, whitened_pressure_;         // stacked, of one standard deviation
-  double pressure_sigma_ = 0;
+  KnownLoadsErrors known_errors_;
+  Eigen::MatrixXd by_known_loads_, whitened_known_loads_;  // stacked, by known_errors_
   LoadColumns columns_;
   struct Region {
     std::vector<int> rows;

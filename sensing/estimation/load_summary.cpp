@@ -74,8 +74,9 @@ void LoadEstimator::Conclude(Linearization& skin, LoadEstimate& estimate) {
   by_cameras_mm = camera_modes_mm_ * modes;
   for (const CameraId id : kBothCameras) estimate.by_camera_mm[Index(id)] = camera_modes_.SeenBy(id) * modes;
   estimate.camera_shift_mm = by_cameras_mm.reshaped(3, by_cameras_mm.size() / 3).colwise().norm().maxCoeff();
-  const Eigen::VectorXd& by_baseline_mm = untouched_->by_baseline_mm;
-  estimate.beside_mm = covariance_.Direct(pulls_per_mm_) + by_baseline_mm.dot(pulls_per_mm_) * by_baseline_mm;
+  const Eigen::MatrixXd& by_baseline_mm = untouched_->by_baseline_mm;
+  estimate.beside_mm =
+      covariance_.Direct(pulls_per_mm_) + by_baseline_mm * (by_baseline_mm.transpose() * pulls_per_mm_);
   estimate.chi2_per_dof =
       solution_.residual.squaredNorm() /
       std::max<double>(1, static_cast<double>(std::count(is_shown_.begin(), is_shown_.end(), 1)));
@@ -129,13 +130,13 @@ void LoadEstimator::WriteStray(Linearization& skin, LoadEstimate& estimate) {
     all.forces_n[k] = mechanics_.spread() * contacts[k];
     all.forces_n[k].array() += covariance_.stray_sigmas_n()[k].array().square() * pulled[k].array();
   }
-  estimate.pressure_error_mpa = pressure_sigma_ * by_pressure_.dot(pulls_per_mm_);
+  estimate.known_error = known_errors_ * (by_known_loads_.transpose() * pulls_per_mm_);
   // Displacements count from the baseline, so that what is missing in it shows with the other sign.
-  estimate.baseline_error_mpa =
-      -untouched_->baseline_sigma_mpa * untouched_->by_baseline_mm.dot(pulls_per_mm_);
+  estimate.baseline_error =
+      -untouched_->baseline_errors * (untouched_->by_baseline_mm.transpose() * pulls_per_mm_);
 }
 
-// Of three columns a contact for its force, two for its place, and the pressure's: the posterior of those
+// Of three columns a contact for its force, two for its place, and the known loads': the posterior of those
 // beside what was fitted. The sites' own amplitudes are not free in it: their sum and place are.
 void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate) {
   const auto count = static_cast<Eigen::Index>(estimate.loads.size());
@@ -155,8 +156,8 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
     }
   }
   MakeColumns(skin, std::move(asked));
-  Eigen::MatrixXd design(data_.size(), 5 * count + 1);
-  Eigen::VectorXd prior = Eigen::VectorXd::Constant(5 * count + 1, 1e-9);
+  Eigen::MatrixXd design(data_.size(), 5 * count);
+  Eigen::VectorXd prior = Eigen::VectorXd::Constant(5 * count, 1e-9);
   for (Eigen::Index i = 0; i < count; ++i) {
     const EstimatedLoad& load = estimate.loads[static_cast<size_t>(i)];
     auto normal = design.col(5 * i);
@@ -183,13 +184,16 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
     prior.segment<2>(5 * i + 1).setConstant(1 / (sigma * sigma));
     prior.segment<2>(5 * i + 3).setConstant(0.04);  // five sites
   }
-  // The pressure's is the whitening's last column; what is hidden does not tell of it.
-  double left = whitening_.LastPosterior();
-  if (hidden_.cols() > 0) left += (hidden_.transpose() * whitened_pressure_).squaredNorm();
-  estimate.pressure_sigma_mpa = pressure_sigma_ * std::sqrt(left);
+  // The known loads' are the whitening's last columns; what is hidden does not tell of them.
+  Eigen::MatrixXd left = whitening_.LastPosterior(known_errors_.cols());
+  if (hidden_.cols() > 0) {
+    const Eigen::MatrixXd untold = hidden_.transpose() * whitened_known_loads_;
+    left += untold.transpose() * untold;
+  }
+  estimate.known_covariance = known_errors_ * left * known_errors_.transpose();
   if (count == 0) return;
-  Eigen::MatrixXd information = design.leftCols(5 * count).transpose() * design.leftCols(5 * count);
-  information.diagonal() += prior.head(5 * count);
+  Eigen::MatrixXd information = design.transpose() * design;
+  information.diagonal() += prior;
   const Eigen::MatrixXd covariance = information.llt().solve(Eigen::MatrixXd::Identity(5 * count, 5 * count));
   for (Eigen::Index i = 0; i < count; ++i) {
     EstimatedLoad& load = estimate.loads[static_cast<size_t>(i)];
@@ -225,8 +229,9 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
 void LoadEstimator::WriteRegions() {
   Eigen::MatrixXf covariance_mm2 = untouched_->covariance_mm2;  // lower half
   const Eigen::MatrixXf& all = whitening_.columns();
-  dense::AddOuter(all.leftCols(all.cols() - 1 - camera_modes_mm_.cols()), covariance_mm2);
-  dense::AddOuter(all.rightCols<1>(), covariance_mm2);
+  const Eigen::Index known = known_errors_.cols();
+  dense::AddOuter(all.leftCols(all.cols() - known - camera_modes_mm_.cols()), covariance_mm2);
+  dense::AddOuter(all.rightCols(known), covariance_mm2);
   const LinkModel& model = mechanics_.model();
   const int paths = model.markers.paths, rings = model.markers.rings();
   regions_.clear();

@@ -36,14 +36,14 @@ MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics, const Neighbo
   }
 }
 
-void MarkerCovariance::SetState(const Linearization& skin, const InflatedSkin& inflated) {
+void MarkerCovariance::SetState(const Linearization& skin, const UntouchedSkin& untouched) {
   const int markers = mechanics_.marker_count();
   moved_mm_.resize(markers);
   grown_mm_.resize(markers);
   for (int m = 0; m < markers; ++m) {
     const auto node = static_cast<size_t>(mechanics_.markers().node(m));
-    moved_mm_[m] = kByMotion * (skin.state().mids_mm[node] - inflated.state.mids_mm[node]).norm();
-    grown_mm_[m] = inflated.markers_mm.segment<3>(3 * m).norm();
+    moved_mm_[m] = kByMotion * (skin.state().mids_mm[node] - untouched.state.mids_mm[node]).norm();
+    grown_mm_[m] = untouched.markers_mm.segment<3>(3 * m).norm();
   }
   moved_mm_ =
       moved_mm_.cwiseMax(kSpreadShare * (near_.motion_near * moved_mm_.asDiagonal()).rowwise().maxCoeff());

@@ -21,7 +21,7 @@ class MarkerCovariance {
   MarkerCovariance(const SkinMechanics& mechanics, const Neighborhoods& near);
 
   /// Where the skin is, by which the errors of displacements that no force explains go.
-  void SetState(const Linearization& skin, const InflatedSkin& inflated);
+  void SetState(const Linearization& skin, const UntouchedSkin& untouched);
   /// Without loads: a floor, a share of the inflation, the bow and stray forces where nothing presses: inward
   /// at each site, around and along at a quarter of them each, which stand for four. Lower half, stacked
   /// markers. Makes all columns.

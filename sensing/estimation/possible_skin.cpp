@@ -13,7 +13,7 @@ constexpr double kSlackMm = 2;  // in length units: markers and tube are nowhere
 
 // No marker inside the tube, beyond an end or twice the radius, and no number that is not finite.
 bool SkinEstimator::IsPossible(const SkinEstimate& estimate) const {
-  if (!estimate.displacements_mm.allFinite() || !std::isfinite(estimate.pressure_mpa)) return false;
+  if (!estimate.displacements_mm.allFinite() || !estimate.known_loads.Stacked().allFinite()) return false;
   const LinkModel& model = mechanics_.model();
   const double slack_mm = kSlackMm * mechanics_.length_unit();
   for (int m = 0; m < mechanics_.marker_count(); ++m) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sensing/estimation/known_loads_fit.h"
+
 namespace taclink {
 namespace {
 
@@ -165,8 +167,7 @@ void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& es
 
 bool SkinEstimator::StepOnce(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate,
                              double& step_mm) {
-  return tangent.skin.Rebase(estimate.state, problem.pressure_mpa) &&
-         Step(tangent, problem, estimate, step_mm);
+  return tangent.skin.Rebase(estimate.state, problem.loads) && Step(tangent, problem, estimate, step_mm);
 }
 
 // From where the tangent was rebased last.
@@ -179,20 +180,20 @@ bool SkinEstimator::Step(Tangent& tangent, const SkinProblem& problem, SkinEstim
   estimate.work.trials += estimate.loads.trials;
   if (!estimate.loads.converged) return false;
   const double longest_mm = IsFirstOrder() ? kUnlimitedMm : kLongestStepMm * mechanics_.length_unit();
-  step_mm = tangent.skin.Step(estimate.loads.at_sites, estimate.loads.pressure_error_mpa, longest_mm,
-                              estimate.state);
+  step_mm =
+      tangent.skin.Step(estimate.loads.at_sites, estimate.loads.known_error, longest_mm, estimate.state);
   return std::isfinite(step_mm);
 }
 
 // About the skin without loads. True: that is all there is to do.
 bool SkinEstimator::SolveSmall(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate) {
   const bool linear = options_.model == ForceModel::kLinear;
-  const ShellState about = linear ? mechanics_.shell().Rest() : problem.inflated.state;
+  const ShellState about = linear ? mechanics_.shell().Rest() : problem.untouched.state;
   const double unit = mechanics_.length_unit();
   if (!tangent.IsGoodFor(problem, about)) {
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
     SkinProblem mine = problem;
-    if (linear) mine.pressure_mpa = 0;
+    if (linear) mine.loads = {};
     if (!Remake(tangent, mine, about, none, estimate)) return false;
   }
   estimate.state = about;
@@ -271,28 +272,32 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   if (is_new_frame) estimate.work = {};
   estimate.first_order_mm = estimate.unsettled_mm = 0;
   estimate.has_shape = false;
-  PressurePrior prior;
-  const InflatedSkin* baseline = mechanics_.Inflated(observation.baseline_pressure.mpa);
+  const MeasuredLoads &now = observation.loads, &then = observation.baseline_loads;
+  const UntouchedSkin* baseline = mechanics_.Untouched(then.Loads());
   if (baseline == nullptr) return;
   estimate.baseline_mm = baseline->markers_mm;
-  const bool baseline_matters =
-      observation.baseline_pressure.mpa != 0 && observation.baseline_pressure.sigma_mpa > 0;
-  if (baseline_matters) {
-    prior.baseline_sigma_mpa = observation.baseline_pressure.sigma_mpa;
-    prior.baseline_mm_per_mpa = baseline->markers_mm_per_mpa;
+  KnownLoadsPrior prior;
+  const double baseline_sigma_mpa = then.pressure_mpa != 0 ? then.pressure_sigma_mpa : 0;
+  if (baseline_sigma_mpa > 0 || !then.specific_force_covariance.isZero(0)) {
+    prior.baseline = ErrorsOf(baseline_sigma_mpa, then.specific_force_covariance);
+    prior.baseline_mm = baseline->markers_by_loads * prior.baseline;
   }
-  const double pressure_mpa = observation.pressure.mpa;
-  const InflatedSkin* inflated = mechanics_.Inflated(pressure_mpa);
-  if (inflated == nullptr) return;
-  estimate.inflated_mm = inflated->markers_mm;
-  prior.sigma_mpa =
-      std::max(observation.pressure.sigma_mpa, kLeastPressureSigma * mechanics_.pressure_step()) +
-      kModelPressureShare * std::abs(pressure_mpa);
-  if (IsStill(observation, *inflated, prior, estimate)) return;
+  const double pressure_sigma_mpa =
+      std::max(now.pressure_sigma_mpa, kLeastPressureSigma * mechanics_.pressure_step()) +
+      kModelPressureShare * std::abs(now.pressure_mpa);
+  prior.now = ErrorsOf(pressure_sigma_mpa, now.specific_force_covariance);
+  const KnownLoads reference =
+      FitKnownLoads(mechanics_, observation.markers, estimate.baseline_mm, now.Loads(), prior.now);
+  const UntouchedSkin* untouched = mechanics_.Untouched(reference);
+  if (untouched == nullptr) return;
+  estimate.untouched_mm = untouched->markers_mm;
+  const KnownLoads measured = untouched->loads;
+  if (IsStill(observation, *untouched, measured, prior, estimate)) return;
 
   estimate.failure = EstimateFailure::kNotConverged;
-  const bool may_stand = is_new_frame && IsStanding(observation, *inflated, prior);
-  SkinProblem problem = MakeProblem(observation, *inflated, std::move(prior), estimate.baseline_mm);
+  const bool may_stand = is_new_frame && IsStanding(observation, *untouched, prior);
+  SkinProblem problem =
+      MakeProblem(observation, *untouched, measured, std::move(prior), estimate.baseline_mm);
   const bool stands = may_stand && SolveStanding(problem, estimate);
   const bool is_solved = stands || SolveWithoutIsolated(problem, estimate);
   if (!is_solved) {
@@ -308,7 +313,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   else
     mechanics_.markers().Displacements(estimate.state, estimate.displacements_mm);
   estimate.displacements_mm += estimate.loads.beside_mm;
-  estimate.pressure_mpa = problem.pressure_mpa + estimate.loads.pressure_error_mpa;
+  estimate.known_loads = KnownLoads::FromStacked(problem.loads.Stacked() + estimate.loads.known_error);
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
                      : estimate.loads.converged ? EstimateFailure::kNone
                                                 : EstimateFailure::kNotConverged;
@@ -328,16 +333,15 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
   if (stands) return;
   solved_.reset();
   if (!is_settled_) return;
-  solved_ = Solved{observation, problem.pressure_mpa, estimate.model};
+  solved_ = Solved{observation, problem.untouched.loads, estimate.model};
   solved_->observation.markers.information = problem.observed.information;
 }
 
-SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
-                                       PressurePrior prior, const Eigen::VectorXd& baseline_mm) const {
-  SkinProblem problem{.observed = observation.markers,
-                      .inflated = inflated,
-                      .pressure_mpa = inflated.pressure_mpa,
-                      .prior = std::move(prior)};
+SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const UntouchedSkin& untouched,
+                                       const KnownLoads& measured, KnownLoadsPrior prior,
+                                       const Eigen::VectorXd& baseline_mm) const {
+  SkinProblem problem{
+      .observed = observation.markers, .untouched = untouched, .loads = measured, .prior = std::move(prior)};
   for (int m = 0; m < mechanics_.marker_count(); ++m)
     problem.observed.displacement_mm[static_cast<size_t>(m)] += baseline_mm.segment<3>(3 * m);
   return problem;
@@ -346,11 +350,11 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
 // What the touched skin's tangents take from the skin without loads. One from 2 mm of inflation away would do
 // for the covariance, but not for the norms: weak loads were missed.
 bool SkinEstimator::PrepareUntouched(const SkinProblem& problem, SkinEstimate& estimate) {
-  const bool is_good = still_->is_prepared && still_->IsNear(problem.inflated.state) &&
-                       still_->loads.HasPressure(problem.prior) &&
+  const bool is_good = still_->is_prepared && still_->IsNear(problem.untouched.state) &&
+                       still_->loads.HasKnownLoads(problem.prior) &&
                        still_->loads.untouched()->IsGoodFor(problem.observed, problem.prior);
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
-  if (!is_good && !Remake(*still_, problem, problem.inflated.state, none, estimate)) return false;
+  if (!is_good && !Remake(*still_, problem, problem.untouched.state, none, estimate)) return false;
   still_->loads.Hide(problem.observed);
   return true;
 }
@@ -359,8 +363,8 @@ bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   estimate.loads = {};
   estimate.unsettled_mm = 0;
   is_settled_ = true;
-  start_ = problem.inflated.state;
-  const bool is_small = IsFirstOrder() || FurthestOff(problem.inflated.state, problem.observed) <
+  start_ = problem.untouched.state;
+  const bool is_small = IsFirstOrder() || FurthestOff(problem.untouched.state, problem.observed) <
                                               2 * kStillReachMm * mechanics_.length_unit();
   if (is_small && SolveSmall(*still_, problem, estimate)) return true;
   if (IsFirstOrder()) return false;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "sensing/core/contact.h"
+#include "sensing/core/known_loads.h"
 #include "sensing/estimation/assimilation.h"
 #include "sensing/estimation/frame_work.h"
 #include "sensing/estimation/load_estimator.h"
@@ -13,27 +14,21 @@
 
 namespace taclink {
 
-/// Gauge pressure and how well it is known.
-struct PressureReading {
-  double mpa = 0;
-  double sigma_mpa = 0;
-};
-
 struct SkinObservation {
   /// Displacements count from the baseline.
   MarkerObservations markers;
-  PressureReading pressure, baseline_pressure;
+  MeasuredLoads loads, baseline_loads;
 };
 
 /// Why an estimate is no answer.
 enum class EstimateFailure : uint8_t {
   kNone,
-  kNoEquilibrium,  ///< no stable skin under that pressure
+  kNoEquilibrium,  ///< no stable skin under these known loads
   kNotConverged,   ///< no equilibrium that fits the markers was reached, or not by the work of a frame
   kImpossible,     ///< a marker beyond twice the radius, or a number that is none
 };
 
-/// Loads, pressure and shape of one moment: the shape is the equilibrium of these loads at this pressure.
+/// Loads, known loads and shape of one moment: the shape is the equilibrium of all of them.
 struct SkinEstimate {
   EstimateFailure failure = EstimateFailure::kNone;
   /// There is no answer, but a shape: where springs pull the skin's markers to what is seen. Without loads.
@@ -44,10 +39,10 @@ struct SkinEstimate {
   /// than noise, between that and what is seen (posterior of the model's error). What cameras that have moved
   /// make of them (loads.by_cameras_mm) is taken off.
   Eigen::VectorXd displacements_mm;
-  Eigen::VectorXd baseline_mm;  ///< of the model's markers in the baseline, likewise
-  Eigen::VectorXd inflated_mm;  ///< of the model's markers under this pressure without loads
+  Eigen::VectorXd baseline_mm;   ///< of the model's markers in the baseline, likewise
+  Eigen::VectorXd untouched_mm;  ///< of the model's markers under the known loads alone
   LoadEstimate loads;
-  double pressure_mpa = 0;  ///< with the estimated error taken off
+  KnownLoads known_loads;  ///< with the estimated error taken off
   /// The longest way of a point of the skin from where the tangent of a first-order model that was asked for
   /// is made; else 0.
   double first_order_mm = 0;
@@ -69,10 +64,10 @@ struct SkinEstimatorOptions {
   BackgroundRunner background = {};
 };
 
-/// From labeled markers and a pressure to loads, pressure and the nonlinear equilibrium shape together; see
-/// estimation.md. The answer follows from the observation alone: the frames before only make it faster, as a
-/// place to start from and as tangents that are still good. `linear` and `pressurised` are the same problem
-/// with the tangent at the slack or the inflated skin and one step. One thread.
+/// From labeled markers and known loads to loads, known loads and the nonlinear equilibrium shape together;
+/// see estimation.md. The answer follows from the observation alone: the frames before only make it faster,
+/// as a place to start from and as tangents that are still good. `linear` and `pressurised` are the same
+/// problem with the tangent at the slack or the inflated skin and one step. One thread.
 class SkinEstimator {
  public:
   explicit SkinEstimator(const LinkModel& model, const SkinEstimatorOptions& options = {});
@@ -105,12 +100,14 @@ class SkinEstimator {
   /// In length units: from the inflated skin, whose tangent is good enough there; and of a step.
   static constexpr double kStillReachMm = 0.4, kLongestStepMm = 5;
 
-  bool IsStill(const SkinObservation& observation, const InflatedSkin& inflated, const PressurePrior& prior,
-               SkinEstimate& estimate);
+  bool IsStill(const SkinObservation& observation, const UntouchedSkin& untouched, const KnownLoads& measured,
+               const KnownLoadsPrior& prior, SkinEstimate& estimate);
+  bool ExplainByKnownLoads(const MarkerObservations& observed, const UntouchedSkin& untouched,
+                           const KnownLoads& measured, const KnownLoadsPrior& prior, SkinEstimate& estimate);
   bool AddIfNoise(int marker, const Vec3& error, const Mat3& information);
   bool AreNeighborsStill() const;
-  bool IsStanding(const SkinObservation& observation, const InflatedSkin& inflated,
-                  const PressurePrior& prior);
+  bool IsStanding(const SkinObservation& observation, const UntouchedSkin& untouched,
+                  const KnownLoadsPrior& prior);
   bool SolveStanding(const SkinProblem& problem, SkinEstimate& estimate);
   double FurthestOff(const ShellState& state, const MarkerObservations& observed);
   double SeenMotion(const ShellState& state, const MarkerObservations& observed);
@@ -125,8 +122,9 @@ class SkinEstimator {
   bool Step(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate, double& step_mm);
   bool SolveSmall(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate);
   bool SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
-  SkinProblem MakeProblem(const SkinObservation& observation, const InflatedSkin& inflated,
-                          PressurePrior prior, const Eigen::VectorXd& baseline_mm) const;
+  SkinProblem MakeProblem(const SkinObservation& observation, const UntouchedSkin& untouched,
+                          const KnownLoads& measured, KnownLoadsPrior prior,
+                          const Eigen::VectorXd& baseline_mm) const;
   bool PrepareUntouched(const SkinProblem& problem, SkinEstimate& estimate);
   bool Solve(const SkinProblem& problem, SkinEstimate& estimate);
   bool SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& estimate);
@@ -155,7 +153,7 @@ class SkinEstimator {
   // The last frame whose contacts were looked for, to a settled end. None since Forget.
   struct Solved {
     SkinObservation observation;  // without the markers that were left out
-    double pressure_mpa = 0;
+    KnownLoads loads;             // of the untouched skin
     ForceModel model = ForceModel::kNonlinear;
   };
   std::optional<Solved> solved_;

@@ -2,11 +2,15 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <array>
 #include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
+#include "sensing/core/known_loads.h"
 #include "sensing/core/link_model.h"
+#include "sensing/shell/body_force.h"
 #include "sensing/shell/equilibrium.h"
 #include "sensing/shell/marker_map.h"
 #include "sensing/shell/nonlinear_shell.h"
@@ -14,17 +18,19 @@
 
 namespace taclink {
 
-/// The skin under pressure alone.
-struct InflatedSkin {
-  double pressure_mpa = 0;
+/// Derivatives of a stacked vector by KnownLoads::Stacked().
+using ByKnownLoads = Eigen::Matrix<double, Eigen::Dynamic, KnownLoads::kCount>;
+
+/// The skin under known loads alone, which nothing touches.
+struct UntouchedSkin {
+  KnownLoads loads;
   ShellState state;
-  Eigen::VectorXd markers_mm;          ///< displacements from the slack skin, stacked
-  Eigen::VectorXd markers_mm_per_mpa;  ///< their derivative by the pressure
-  std::vector<Vec3> mids_per_mpa, directors_per_mpa;
+  Eigen::VectorXd markers_mm;     ///< displacements from the slack skin without weight, stacked
+  ByKnownLoads markers_by_loads;  ///< their derivatives, mm/MPa and mm/(m/s^2)
 };
 
 /// What a link's estimates share: the shell, its markers, the sites where loads may act, and the skin under
-/// pressure alone. Sites are all free nodes, row by row (site = (row - 1) * columns + column). One thread.
+/// known loads alone. Sites are all free nodes, row by row (site = (row - 1) * columns + column). One thread.
 class SkinMechanics {
  public:
   /// `refinement`: elements per interval of the marker grid; 0: as many as the skin's dents ask for.
@@ -58,18 +64,37 @@ class SkinMechanics {
 
   /// Pressures that are solved are multiples of this, MPa.
   double pressure_step() const { return pressure_step_mpa_; }
+  /// N per mm^2 of the undeformed mid-surface and m/s^2.
+  double mass_per_area() const { return mass_per_area_; }
+  const std::vector<Eigen::Vector4d>& corner_areas_mm2() const { return corner_areas_mm2_; }
+  /// Derivatives of the shell's gradient by the known loads at a state.
+  void GradientByLoads(const ShellState& state, ByKnownLoads& out) const;
 
-  /// At the pressure, or at the nearest at which the skin stands: a reading scatters about zero, where a
-  /// little suction buckles it. Null: two steps nearer to zero there is no stable equilibrium that smaller
-  /// pressures lead to. Interpolated between pressures that were solved (cubic, a ten-thousandth of the
-  /// growth); valid until the next call.
-  const InflatedSkin* Inflated(double pressure_mpa);
+  /// At these loads, or at the nearest pressure at which the skin stands: a reading scatters about zero,
+  /// where a little suction buckles it. Null: two steps nearer to zero there is no stable equilibrium that
+  /// smaller loads lead to, or the loads are beyond all measure. Interpolated between equilibria on a grid of
+  /// pressure and specific force, by first-order expansions about the corners of a simplex, weighted so that
+  /// quadratic dependence is exact. Valid until the next call.
+  const UntouchedSkin* Untouched(const KnownLoads& loads);
 
  private:
-  const InflatedSkin* Solved(int part);
-  const InflatedSkin* Between(double pressure_mpa, int parts);
-  bool Solve(InflatedSkin& skin);
+  /// Pressure in parts of a step, specific force in steps.
+  using GridPoint = std::array<int, KnownLoads::kCount>;
+  struct Equilibrium : UntouchedSkin {
+    using NodeByLoads = Eigen::Matrix<double, 3, KnownLoads::kCount>;
+    std::vector<NodeByLoads> mids_by_loads, directors_by_loads;
+  };
+  struct Corner {
+    const Equilibrium* skin = nullptr;
+    double share = 0;
+  };
+  const Equilibrium* Solved(const GridPoint& point);
+  static GridPoint Before(const GridPoint& point);
+  const UntouchedSkin* Between(const KnownLoads& loads, int parts);
+  const UntouchedSkin* Blend(const KnownLoads& loads, std::span<const Corner> corners);
+  bool Solve(Equilibrium& skin);
   void MakeSpread();
+  void SetUpWeight();
 
   LinkModel model_;
   ShellMesh mesh_;
@@ -77,9 +102,27 @@ class SkinMechanics {
   MarkerMap markers_;
   Eigen::SparseMatrix<double> spread_;
   double length_unit_ = 1, force_unit_ = 1, pressure_step_mpa_ = 0;
+  double mass_per_area_ = 0, specific_force_step_mps2_ = 0;
+  std::vector<Eigen::Vector4d> corner_areas_mm2_;
+  ByKnownLoads gradient_by_specific_force_;  // constant; the pressure's column is zero
   EquilibriumSolver equilibrium_;
-  std::map<int, std::unique_ptr<InflatedSkin>> solved_;  // by pressure in parts of a step; null: none
-  InflatedSkin between_;
+  std::map<GridPoint, std::unique_ptr<Equilibrium>> solved_;  // null: there is none
+  UntouchedSkin between_;
+};
+
+/// Known loads as loads of the shell's elements. What is zero is left out.
+class AppliedLoads {
+ public:
+  AppliedLoads(const SkinMechanics& mechanics, const KnownLoads& loads);
+  AppliedLoads(const AppliedLoads&) = delete;
+  AppliedLoads& operator=(const AppliedLoads&) = delete;
+  NonlinearShell::Loads loads() const { return {all_.data(), count_}; }
+
+ private:
+  FollowerPressure pressure_;
+  BodyForce body_;
+  std::array<const ElementLoad*, 2> all_{};
+  size_t count_ = 0;
 };
 
 }  // namespace taclink

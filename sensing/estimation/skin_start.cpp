@@ -31,10 +31,10 @@ double SkinEstimator::FurthestOff(const ShellState& state, const MarkerObservati
   return furthest;
 }
 
-// A state near the markers: the inflated skin, the last frame's, or where springs pull either.
+// A state near the markers: the untouched skin, the last frame's, or where springs pull either.
 bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd& local_n) {
   const double unit = mechanics_.length_unit();
-  estimate.state = problem.inflated.state;
+  estimate.state = problem.untouched.state;
   double off_mm = FurthestOff(estimate.state, problem.observed);
   const auto consider = [&](bool is_there, const ShellState& state) {
     if (!is_there || off_mm < kStillReachMm * unit) return;
@@ -50,12 +50,12 @@ bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Ei
   Eigen::VectorXd pulls;
   const auto assimilate = [&] {
     const AssimilationSummary done =
-        assimilation_.Run(problem.observed, problem.pressure_mpa, estimate.state, pulls);
+        assimilation_.Run(problem.observed, problem.untouched.loads, estimate.state, pulls);
     estimate.work.assimilation_steps += done.iterations;
     return done.converged;
   };
   if (!assimilate() && (past_.has_last || past_.has_next)) {
-    estimate.state = problem.inflated.state;
+    estimate.state = problem.untouched.state;
     assimilate();
   }
   const int markers = mechanics_.marker_count();
@@ -78,7 +78,7 @@ bool SkinEstimator::SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& est
   for (const double most : {kSurelyIsolated, kPerhapsIsolated}) {
     if ((is_solved && estimate.unsettled_mm == 0) || IsSpent(estimate)) return is_solved;
     SkinProblem without = problem;
-    const int hidden = HideIsolated(mechanics_.model(), problem.inflated.markers_mm, most,
+    const int hidden = HideIsolated(mechanics_.model(), problem.untouched.markers_mm, most,
                                     mechanics_.length_unit(), without.observed);
     if (hidden == 0) continue;
     const bool was_solved = is_solved;

@@ -32,46 +32,69 @@ bool SkinEstimator::AddIfNoise(int marker, const Vec3& error, const Mat3& inform
 // each 3 x 3 of them, over each ring, radially, and all together. A load that explains less than that would
 // not be let in (kHillGain of LoadEstimator), so nothing has to be solved. True: the estimate is complete.
 // The tangent is made where there is none, for the shape's covariance. Else nothing is allocated.
-bool SkinEstimator::IsStill(const SkinObservation& observation, const InflatedSkin& inflated,
-                            const PressurePrior& prior, SkinEstimate& estimate) {
+bool SkinEstimator::IsStill(const SkinObservation& observation, const UntouchedSkin& untouched,
+                            const KnownLoads& measured, const KnownLoadsPrior& prior,
+                            SkinEstimate& estimate) {
   if (options_.model == ForceModel::kLinear) return false;
-  double told = 1 / (prior.sigma_mpa * prior.sigma_mpa), off = 0;
-  noise_chi2_ = noise_markers_ = 0;
-  for (int m = 0; m < mechanics_.marker_count(); ++m) {
-    const Mat3& information = observation.markers.information[static_cast<size_t>(m)];
-    const Vec3 error = observation.markers.displacement_mm[static_cast<size_t>(m)] +
-                       estimate.baseline_mm.segment<3>(3 * m) - inflated.markers_mm.segment<3>(3 * m);
-    if (!AddIfNoise(m, error, information)) return false;
-    const Vec3 by = information * inflated.markers_mm_per_mpa.segment<3>(3 * m);
-    told += by.dot(inflated.markers_mm_per_mpa.segment<3>(3 * m));
-    off += by.dot(error);
-  }
-  const double chi2_per_dof = (noise_chi2_ - off * off / told) / std::max(1, 3 * noise_markers_);
-  if (chi2_per_dof > kStillChi2PerDof || !AreNeighborsStill()) return false;
+  if (!ExplainByKnownLoads(observation.markers, untouched, measured, prior, estimate)) return false;
+  if (estimate.loads.chi2_per_dof > kStillChi2PerDof || !AreNeighborsStill()) return false;
   Tangent& tangent = *still_;
-  if (!tangent.is_prepared || !tangent.IsNear(inflated.state) ||
+  if (!tangent.is_prepared || !tangent.IsNear(untouched.state) ||
       !tangent.loads.IsPreparedFor(observation.markers, prior)) {
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
-    const SkinProblem problem = MakeProblem(observation, inflated, prior, estimate.baseline_mm);
-    if (!Remake(tangent, problem, inflated.state, none, estimate)) return false;
+    const SkinProblem problem = MakeProblem(observation, untouched, measured, prior, estimate.baseline_mm);
+    if (!Remake(tangent, problem, untouched.state, none, estimate)) return false;
   }
   used_ = &tangent;
   tangent.loads.ConcludeUntouched(observation.markers);
   Forget();
   estimate.loads.loads.clear();
-  estimate.loads.chi2_per_dof = chi2_per_dof;
   estimate.loads.region_chi2_per_dof = estimate.loads.camera_shift_mm = 0;
-  estimate.loads.by_cameras_mm.setZero(inflated.markers_mm.size());
+  estimate.loads.by_cameras_mm.setZero(untouched.markers_mm.size());
   for (Eigen::VectorXd& by_camera_mm : estimate.loads.by_camera_mm) by_camera_mm.resize(0);
   estimate.loads.converged = true;
-  estimate.loads.pressure_error_mpa = off / told;
-  estimate.loads.baseline_error_mpa = 0;
-  estimate.loads.pressure_sigma_mpa = prior.sigma_mpa;
-  estimate.state = inflated.state;
-  estimate.displacements_mm = inflated.markers_mm + off / told * inflated.markers_mm_per_mpa;
-  estimate.pressure_mpa = inflated.pressure_mpa + off / told;
+  estimate.loads.baseline_error.setZero();
+  estimate.loads.known_covariance = tangent.loads.KnownCovariance();
+  estimate.known_loads = KnownLoads::FromStacked(measured.Stacked() + estimate.loads.known_error);
+  estimate.state = untouched.state;
+  estimate.displacements_mm = untouched.markers_mm;
+  estimate.displacements_mm.noalias() +=
+      untouched.markers_by_loads * (estimate.known_loads.Stacked() - untouched.loads.Stacked());
   estimate.model = options_.model.value_or(ForceModel::kPressurised);
   estimate.failure = EstimateFailure::kNone;
+  return true;
+}
+
+// Least squares for the errors of the known loads alone, in units of the prior: sets the errors, and chi^2
+// per number that they leave. False: a marker by itself is off by more than noise.
+bool SkinEstimator::ExplainByKnownLoads(const MarkerObservations& observed, const UntouchedSkin& untouched,
+                                        const KnownLoads& measured, const KnownLoadsPrior& prior,
+                                        SkinEstimate& estimate) {
+  using Shares = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, KnownLoads::kCount, 1>;
+  using Information =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, KnownLoads::kCount, KnownLoads::kCount>;
+  const Eigen::Index count = prior.now.cols();
+  Information information = Information::Identity(count, count);
+  Shares pull = Shares::Zero(count);
+  const Vec4 beyond = untouched.loads.Stacked() - measured.Stacked();
+  double chi2 = 0;
+  noise_chi2_ = noise_markers_ = 0;
+  for (int m = 0; m < mechanics_.marker_count(); ++m) {
+    const Mat3& seen = observed.information[static_cast<size_t>(m)];
+    const Vec3 error = observed.displacement_mm[static_cast<size_t>(m)] +
+                       estimate.baseline_mm.segment<3>(3 * m) - untouched.markers_mm.segment<3>(3 * m);
+    if (!AddIfNoise(m, error, seen)) return false;
+    const Eigen::Matrix<double, 3, KnownLoads::kCount> by_loads =
+        untouched.markers_by_loads.middleRows<3>(3 * m);
+    const Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, KnownLoads::kCount> by = by_loads * prior.now;
+    const Vec3 from_measured = error + by_loads * beyond, weighed = seen * from_measured;
+    information.noalias() += by.transpose() * seen * by;
+    pull.noalias() += by.transpose() * weighed;
+    chi2 += from_measured.dot(weighed);
+  }
+  const Shares shares = information.llt().solve(pull);
+  estimate.loads.known_error = prior.now * shares;
+  estimate.loads.chi2_per_dof = (chi2 - pull.dot(shares)) / std::max(1, 3 * noise_markers_);
   return true;
 }
 
@@ -99,20 +122,19 @@ bool SkinEstimator::AreNeighborsStill() const {
 }
 
 // The markers are where they were when contacts were last looked for, but for the noise of both frames and
-// for what a little more pressure does. The test is that of an untouched skin.
-bool SkinEstimator::IsStanding(const SkinObservation& observation, const InflatedSkin& inflated,
-                               const PressurePrior& prior) {
+// for what a little change of the known loads does. The test is that of an untouched skin.
+bool SkinEstimator::IsStanding(const SkinObservation& observation, const UntouchedSkin& untouched,
+                               const KnownLoadsPrior& prior) {
   if (!solved_ || IsFirstOrder() || !used_->is_prepared || !still_->is_prepared ||
-      !still_->IsNear(inflated.state))
+      !still_->IsNear(untouched.state))
     return false;
   const SkinObservation& then = solved_->observation;
-  if (observation.baseline_pressure.mpa != then.baseline_pressure.mpa ||
+  if (observation.baseline_loads.Loads() != then.baseline_loads.Loads() ||
       !used_->loads.IsPreparedFor(observation.markers, prior))
     return false;
-  const double more_mpa = inflated.pressure_mpa - solved_->pressure_mpa;
-  if (std::abs(more_mpa) * inflated.markers_mm_per_mpa.cwiseAbs().maxCoeff() >
-      kStillReachMm * mechanics_.length_unit())
-    return false;
+  const Eigen::VectorXd grown_mm =
+      untouched.markers_by_loads * (untouched.loads.Stacked() - solved_->loads.Stacked());
+  if (grown_mm.cwiseAbs().maxCoeff() > kStillReachMm * mechanics_.length_unit()) return false;
   noise_chi2_ = noise_markers_ = 0;
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const auto i = static_cast<size_t>(m);
@@ -120,8 +142,8 @@ bool SkinEstimator::IsStanding(const SkinObservation& observation, const Inflate
     if (now.trace() > 0 && !(before.trace() > 0)) return false;  // what it tells is new
     const bool is_seen = now.trace() > 0 && before.trace() > 0;
     const Mat3 information = is_seen ? Mat3(0.25 * (now + before)) : Mat3::Zero();  // of the difference
-    const Vec3 moved = observation.markers.displacement_mm[i] - then.markers.displacement_mm[i] -
-                       more_mpa * inflated.markers_mm_per_mpa.segment<3>(3 * m);
+    const Vec3 moved =
+        observation.markers.displacement_mm[i] - then.markers.displacement_mm[i] - grown_mm.segment<3>(3 * m);
     if (!AddIfNoise(m, is_seen ? moved : Vec3::Zero(), information)) return false;
   }
   return noise_chi2_ <= kStillChi2PerDof * std::max(1, 3 * noise_markers_) && AreNeighborsStill();
@@ -131,7 +153,7 @@ bool SkinEstimator::IsStanding(const SkinObservation& observation, const Inflate
 // leads elsewhere.
 bool SkinEstimator::SolveStanding(const SkinProblem& problem, SkinEstimate& estimate) {
   still_->loads.Hide(problem.observed);
-  used_->skin.SetPressure(problem.pressure_mpa);
+  used_->skin.SetKnownLoads(problem.loads);
   estimate.model = solved_->model;
   double step_mm = 0;
   if (!Step(*used_, problem, estimate, step_mm)) return false;

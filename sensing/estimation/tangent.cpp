@@ -45,8 +45,8 @@ bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Ei
   const bool is_kept = is_prepared && IsNear(state);
   local_n = local;
   // The model's errors are those at `state`, whichever state the last step was from.
-  is_prepared = (is_kept ? skin.Rebase(state, problem.pressure_mpa) : skin.At(state, problem.pressure_mpa)) &&
-                loads.Prepare(skin, problem.inflated, problem.observed, problem.prior, local, untouched);
+  is_prepared = (is_kept ? skin.Rebase(state, problem.loads) : skin.At(state, problem.loads)) &&
+                loads.Prepare(skin, problem.untouched, problem.observed, problem.prior, local, untouched);
   return is_prepared;
 }
 

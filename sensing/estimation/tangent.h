@@ -13,9 +13,9 @@ namespace taclink {
 /// What one frame asks.
 struct SkinProblem {
   MarkerObservations observed = {};  ///< from the slack skin
-  InflatedSkin inflated = {};
-  double pressure_mpa = 0;
-  PressurePrior prior = {};
+  UntouchedSkin untouched = {};      ///< a place to linearize at, near what the skin would be untouched
+  KnownLoads loads = {};             ///< as measured
+  KnownLoadsPrior prior = {};
 };
 
 /// A linearized skin with all that its loads are weighed with. It is made of one frame and good for others

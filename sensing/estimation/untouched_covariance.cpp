@@ -1,5 +1,7 @@
 #include "sensing/estimation/untouched_covariance.h"
 
+#include <Eigen/Eigenvalues>
+
 #include "sensing/core/median.h"
 #include "sensing/estimation/camera_noise.h"
 #include "sensing/shell/dense.h"
@@ -37,20 +39,39 @@ std::vector<Mat3> NoiseOfAll(const MarkerObservations& observed, double unseen_m
 
 }  // namespace
 
+KnownLoadsErrors ErrorsOf(double pressure_sigma_mpa, const Mat3& specific_force_covariance) {
+  KnownLoadsErrors errors = KnownLoadsErrors::Zero(KnownLoads::kCount, 1);
+  errors(0, 0) = pressure_sigma_mpa;
+  if (specific_force_covariance.isZero(0)) return errors;
+  const Eigen::SelfAdjointEigenSolver<Mat3> modes(specific_force_covariance);
+  errors.conservativeResize(Eigen::NoChange, KnownLoads::kCount);
+  errors.rightCols<3>().setZero();
+  errors.bottomRightCorner<3, 3>() =
+      modes.eigenvectors() * modes.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  return errors;
+}
+
+bool KnownLoadsPrior::IsAbout(const KnownLoadsErrors& errors) const {
+  if (errors.cols() != now.cols()) return false;
+  const Vec4 mine = now.rowwise().norm(), others = errors.rowwise().norm();
+  return (mine.array() <= kSameNoise * others.array()).all() &&
+         (others.array() <= kSameNoise * mine.array()).all();
+}
+
 std::shared_ptr<const UntouchedCovariance> UntouchedCovariance::Make(Linearization& skin,
                                                                      const MarkerCovariance& model,
                                                                      const MarkerObservations& observed,
-                                                                     const PressurePrior& prior) {
+                                                                     const KnownLoadsPrior& prior) {
   auto made = std::make_shared<UntouchedCovariance>();
   Eigen::MatrixXd all_mm2;
   model.WriteUntouched(skin, all_mm2);
   made->unseen_mm = model.unseen_mm();
   made->noise_mm2 = NoiseOfAll(observed, made->unseen_mm);
-  made->baseline_sigma_mpa = prior.baseline_sigma_mpa;
-  made->by_baseline_mm.setZero(all_mm2.rows());
-  if (prior.baseline_mm_per_mpa.size() == all_mm2.rows())
-    made->by_baseline_mm = prior.baseline_sigma_mpa * prior.baseline_mm_per_mpa;
-  all_mm2.selfadjointView<Eigen::Lower>().rankUpdate(made->by_baseline_mm);
+  made->baseline_errors = prior.baseline;
+  made->by_baseline_mm = prior.baseline_mm;
+  made->by_baseline_mm.conservativeResize(all_mm2.rows(), prior.baseline_mm.cols());
+  if (made->by_baseline_mm.cols() > 0)  // Eigen divides by their number
+    all_mm2.selfadjointView<Eigen::Lower>().rankUpdate(made->by_baseline_mm);
   for (size_t m = 0; m < observed.information.size(); ++m) {
     const auto at = 3 * static_cast<Eigen::Index>(m);
     auto block = all_mm2.block<3, 3>(at, at);
@@ -64,11 +85,11 @@ std::shared_ptr<const UntouchedCovariance> UntouchedCovariance::Make(Linearizati
   return made;
 }
 
-bool UntouchedCovariance::HasBaseline(const PressurePrior& prior) const {
+bool UntouchedCovariance::HasBaseline(const KnownLoadsPrior& prior) const {
   constexpr double kSameMm = 1e-6;
-  const Eigen::VectorXd& baseline = prior.baseline_mm_per_mpa;
-  if (baseline.size() != by_baseline_mm.size()) return by_baseline_mm.isZero(kSameMm);
-  return (prior.baseline_sigma_mpa * baseline - by_baseline_mm).isZero(kSameMm);
+  const Eigen::MatrixXd& baseline_mm = prior.baseline_mm;
+  if (baseline_mm.cols() != by_baseline_mm.cols()) return by_baseline_mm.isZero(kSameMm);
+  return baseline_mm.cols() == 0 || (baseline_mm - by_baseline_mm).isZero(kSameMm);
 }
 
 bool UntouchedCovariance::LosesFew(const MarkerObservations& observed) const {
@@ -81,7 +102,7 @@ bool UntouchedCovariance::LosesFew(const MarkerObservations& observed) const {
   return !IsMany(lost, noise_mm2.size());
 }
 
-bool UntouchedCovariance::IsGoodFor(const MarkerObservations& observed, const PressurePrior& prior) const {
+bool UntouchedCovariance::IsGoodFor(const MarkerObservations& observed, const KnownLoadsPrior& prior) const {
   int better = 0;
   for (size_t m = 0; m < noise_mm2.size(); ++m) {
     const auto [then, now] = ChangeOf(noise_mm2[m], observed.information[m], unseen_mm);

@@ -1,5 +1,6 @@
 #include "sensing/estimation/whitening.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "sensing/shell/dense.h"
@@ -17,7 +18,8 @@ bool Whitening::Set(std::shared_ptr<const Eigen::MatrixXf> lower, Eigen::MatrixX
   Eigen::MatrixXd factor = gram.cast<double>();
   factor.diagonal().array() += 1;
   if (!dense::Cholesky(factor)) return false;
-  if (count > 0) last_posterior_ = 1 / (factor(count - 1, count - 1) * factor(count - 1, count - 1));
+  const Eigen::Index last = std::min<Eigen::Index>(count, kMostLast);
+  last_factor_ = factor.bottomRightCorner(last, last);
   // K' = (I + A')^-1 A^-1.
   Eigen::MatrixXf single = factor.cast<float>(), shrink = Eigen::MatrixXf::Identity(count, count);
   dense::SolveLower(single, shrink);
@@ -26,6 +28,13 @@ bool Whitening::Set(std::shared_ptr<const Eigen::MatrixXf> lower, Eigen::MatrixX
   shrunk_.setZero(columns_.rows(), count);
   dense::SetProduct(1, whitened_, shrink, shrunk_);
   return shrunk_.allFinite();
+}
+
+// The corner of (A A')^-1 is that of the corner of A, which is lower triangular.
+Whitening::SmallMatrix Whitening::LastPosterior(Eigen::Index count) const {
+  SmallMatrix inverse = SmallMatrix::Identity(count, count);
+  last_factor_.bottomRightCorner(count, count).triangularView<Eigen::Lower>().solveInPlace(inverse);
+  return inverse.transpose() * inverse;
 }
 
 void Whitening::Apply(Eigen::Ref<Eigen::MatrixXf> x) const {

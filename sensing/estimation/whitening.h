@@ -11,6 +11,10 @@ namespace taclink {
 /// [andrews1968], [whitaker2002]. Single precision. Constant between calls of Set, by one thread at a time.
 class Whitening {
  public:
+  static constexpr int kMostLast = 4;
+  using SmallMatrix =
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostLast, kMostLast>;
+
   /// `lower`: L; `columns`: U. False: one of them is not finite.
   bool Set(std::shared_ptr<const Eigen::MatrixXf> lower, Eigen::MatrixXf columns);
   Eigen::Index size() const { return columns_.rows(); }
@@ -23,13 +27,14 @@ class Whitening {
   /// C x.
   Eigen::VectorXd Covariance(const Eigen::VectorXd& x) const;
   const Eigen::MatrixXf& columns() const { return columns_; }
-  /// Variance of the last column's share in an error that all rows tell; 1 before. At least one column.
-  double LastPosterior() const { return last_posterior_; }
+  /// Covariance of the last `count` (at most kMostLast) columns' shares in an error that all rows show;
+  /// before, it is the identity.
+  SmallMatrix LastPosterior(Eigen::Index count) const;
 
  private:
   std::shared_ptr<const Eigen::MatrixXf> lower_;
   Eigen::MatrixXf columns_, whitened_, shrunk_;  // U, W, W K'
-  double last_posterior_ = 1;
+  SmallMatrix last_factor_;                      // the lower right corner of A, up to kMostLast
 };
 
 }  // namespace taclink

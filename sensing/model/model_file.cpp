@@ -78,6 +78,7 @@ void ReadMaterial(YamlMap map, int version, LinkModel& model) {
 void ReadSkin(YamlMap map, int version, LinkModel& model) {
   model.length_mm = map.Number("length_mm", kPositive);
   model.thickness_mm = map.Number("thickness_mm", kPositive);
+  model.density_kg_m3 = map.Number("density_kg_m3", 0.0, {.min = 0, .max = 2e4});
   const size_t surface = map.Choice("surface", {"outer", "middle", "inner"}, 0);
   model.profile_depth_mm = model.thickness_mm * 0.5 * static_cast<double>(surface);
   model.profile = ReadProfile(map.Map("profile"), model.length_mm);

@@ -62,13 +62,12 @@ std::optional<Result<TareSummary>> BaselineKeeper::TakeTareEnd() {
   return std::exchange(tare_end_, std::nullopt);
 }
 
-void BaselineKeeper::Apply(const PressureReading& pressure, const SkinEstimate& estimate,
-                           const SkinShape& shape) {
-  frame_pressure_ = pressure;
+void BaselineKeeper::Apply(const MeasuredLoads& loads, const SkinEstimate& estimate, const SkinShape& shape) {
+  frame_loads_ = loads;
   off_mm_ = shape.displacements_mm;
   for (size_t m = 0; m < off_mm_.size(); ++m) {
     const auto at = 3 * static_cast<Eigen::Index>(m);
-    off_mm_[m] -= estimate.inflated_mm.segment<3>(at) - estimate.baseline_mm.segment<3>(at);
+    off_mm_[m] -= estimate.untouched_mm.segment<3>(at) - estimate.baseline_mm.segment<3>(at);
     // A baseline that is taken or follows takes up what the cameras did, too.
     if (estimate.loads.by_cameras_mm.size() > 0) off_mm_[m] += estimate.loads.by_cameras_mm.segment<3>(at);
     if (drift_) off_mm_[m] += follower_.drift_mm()[m];
@@ -104,7 +103,7 @@ void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state
   // Degraded by nothing but the drift itself.
   const bool good = state.status == LinkStatus::kOk || (state.measured() && state.reasons.size() == 1 &&
                                                         state.reasons[0].id == ReasonId::kDrift);
-  const bool sure = good && std::abs(PressureChange(frame_pressure_.mpa)) <= kSamePressureMpa;
+  const bool sure = good && std::abs(PressureChange(frame_loads_.pressure_mpa)) <= kSamePressureMpa;
   follower_.Update(MonotonicNs(times, clock), sure ? std::optional(StrongestLoad(state)) : std::nullopt,
                    off_mm_);
 }
@@ -112,7 +111,7 @@ void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state
 void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& state,
                                    const LabelledMarkers& labels, SkinStage& skin, StateEstimator& estimator,
                                    const Clock& clock) {
-  const Result<bool> complete = tare_->Add(state, labels, off_mm_, frame_pressure_);
+  const Result<bool> complete = tare_->Add(state, labels, off_mm_, frame_loads_);
   if (complete && !*complete) return;
   if (!complete) {
     tare_end_ = complete.error();
@@ -122,11 +121,11 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
                             .shift_mm = tare_->shift_mm(),
                             .previous_age_s = AgeS(times, clock)};
     // The pressures were good enough for their frames' estimates.
-    const PressureReading pressure = tare_->pressure();
-    const auto inflation = estimator.InflationAt(pressure.mpa);
-    skin.Tare(tare_->markers(), pressure, inflation.value_or(estimator.estimate().baseline_mm));
-    Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, pressure.mpa,
-         times, clock);
+    const MeasuredLoads loads = tare_->loads();
+    const auto untouched = estimator.UntouchedAt(loads.Loads());
+    skin.Tare(tare_->markers(), loads, untouched.value_or(estimator.estimate().baseline_mm));
+    Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare,
+         loads.pressure_mpa, times, clock);
   }
   tare_.reset();
 }

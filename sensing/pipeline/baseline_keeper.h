@@ -40,7 +40,7 @@ class BaselineKeeper {
   std::optional<Result<TareSummary>> TakeTareEnd();
 
   /// A frame's shape, of which what the pressure alone has changed since the baseline is left out.
-  void Apply(const PressureReading& pressure, const SkinEstimate& estimate, const SkinShape& shape);
+  void Apply(const MeasuredLoads& loads, const SkinEstimate& estimate, const SkinShape& shape);
   /// Instead of Apply and Learn: there is a shape, but no answer to what moved it. Tells; a tare waits for an
   /// answer, and ends without one after a while.
   void Wait(const FrameTimes& times, LinkState& state, const Clock& clock);
@@ -69,8 +69,8 @@ class BaselineKeeper {
   double pressure_mpa_ = 0;
   DriftFollower follower_;
 
-  PressureReading frame_pressure_;  // of the frame in work
-  std::vector<Vec3> off_mm_;        // likewise: against the baseline as it was taken, without pressure's part
+  MeasuredLoads frame_loads_;  // of the frame in work
+  std::vector<Vec3> off_mm_;   // likewise: against the baseline as it was taken, without pressure's part
 
   std::optional<TareCollector> tare_;
   std::optional<int64_t> waits_since_ns_;  // for an answer; monotonic

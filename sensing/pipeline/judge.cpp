@@ -92,10 +92,10 @@ Gap WidestGap(const LinkModel& model, const SkinShape& shape, double wide_mm) {
 double DeepestDent(const Evidence& evidence) {
   double deepest_mm = 0;
   const SkinEstimate& estimate = evidence.estimate;
-  if (estimate.displacements_mm.size() != estimate.inflated_mm.size()) return 0;
+  if (estimate.displacements_mm.size() != estimate.untouched_mm.size()) return 0;
   for (int m = 0; m < evidence.model.markers.count(); ++m) {
     const Vec3 rest = evidence.model.RestMarker(m);
-    const Vec3 moved = (estimate.displacements_mm - estimate.inflated_mm).segment<3>(3 * m);
+    const Vec3 moved = (estimate.displacements_mm - estimate.untouched_mm).segment<3>(3 * m);
     deepest_mm = std::max(deepest_mm, -rest.head<2>().dot(moved.head<2>()) / rest.head<2>().norm());
   }
   return deepest_mm;
@@ -194,25 +194,26 @@ void AddPressureReasons(const Evidence& evidence, LinkState& state) {
          "nobody tells the pressure: forces hold for a skin that was slack when its baseline was taken; "
          "configure pressure_kpa (0 if it is never inflated), or a sensor"});
   if (!state.pressure_estimate) return;
-  const PressureReading &told = evidence.told, &baseline = evidence.baseline;
+  const MeasuredLoads &told = evidence.told, &baseline = evidence.baseline;
   const double now_mpa = state.pressure_estimate->mpa;
-  const double baseline_off_mpa = std::abs(evidence.estimate.loads.baseline_error_mpa),
-               most_baseline_off_mpa = kPressureDeviations * baseline.sigma_mpa;
-  const double off_mpa = std::abs(now_mpa - told.mpa), most_off_mpa = kPressureDeviations * told.sigma_mpa;
+  const double baseline_off_mpa = std::abs(evidence.estimate.loads.baseline_error[0]),
+               most_baseline_off_mpa = kPressureDeviations * baseline.pressure_sigma_mpa;
+  const double off_mpa = std::abs(now_mpa - told.pressure_mpa),
+               most_off_mpa = kPressureDeviations * told.pressure_sigma_mpa;
   if (baseline_off_mpa > most_baseline_off_mpa)
     state.reasons.push_back(
         {ReasonId::kPressureMismatch,
          Text("the skin's shape says %.3f kPa, and %.3f kPa when the baseline was taken; told were %.3f and "
               "%.3f kPa; check the sensor and the baseline's pressure, or tare",
-              1e3 * now_mpa, 1e3 * (baseline.mpa + evidence.estimate.loads.baseline_error_mpa),
-              1e3 * told.mpa, 1e3 * baseline.mpa),
+              1e3 * now_mpa, 1e3 * (baseline.pressure_mpa + evidence.estimate.loads.baseline_error[0]),
+              1e3 * told.pressure_mpa, 1e3 * baseline.pressure_mpa),
          baseline_off_mpa, most_baseline_off_mpa});
   else if (off_mpa > most_off_mpa && evidence.is_told)
     state.reasons.push_back(
         {ReasonId::kPressureMismatch,
          Text("the skin's shape says %.3f kPa, the sensor %.3f kPa; check the sensor, its hose and the "
               "baseline's pressure",
-              1e3 * now_mpa, 1e3 * told.mpa),
+              1e3 * now_mpa, 1e3 * told.pressure_mpa),
          off_mpa, most_off_mpa});
 }
 

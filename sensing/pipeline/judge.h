@@ -34,9 +34,9 @@ struct Evidence {
   std::optional<CameraId> sees_alone;        ///< see RestComparison
   std::optional<Reason> drift;               ///< none: the baseline has not drifted far
   bool is_baseline_forced = false;           ///< taken although something touched or moved
-  PressureReading told;                      ///< the pressure that was taken as told
+  MeasuredLoads told;                        ///< the pressure that was taken as told
   bool is_told = true;                       ///< false: by nobody, or by a sensor that fell silent
-  PressureReading baseline;                  ///< and that of the baseline
+  MeasuredLoads baseline;                    ///< and that of the baseline
   const SkinEstimate& estimate;
 };
 

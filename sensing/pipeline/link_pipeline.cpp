@@ -13,7 +13,7 @@
 #include "sensing/pipeline/baseline_keeper.h"
 #include "sensing/pipeline/camera_motion.h"
 #include "sensing/pipeline/judge.h"
-#include "sensing/pipeline/mean_pressure.h"
+#include "sensing/pipeline/mean_loads.h"
 #include "sensing/pipeline/picture_stage.h"
 #include "sensing/pipeline/rest_pose.h"
 #include "sensing/pipeline/skin_stage.h"
@@ -35,13 +35,13 @@ void SetStatus(LinkState& state, LinkStatus status, std::string reason) {
 }
 
 // Cameras are told from a skin whose shape is known.
-std::string CalibrationAdvice(const PressureReading& pressure) {
-  if (std::abs(pressure.mpa) <= 3 * pressure.sigma_mpa) return {};
+std::string CalibrationAdvice(const MeasuredLoads& loads) {
+  if (std::abs(loads.pressure_mpa) <= 3 * loads.pressure_sigma_mpa) return {};
   char text[160];
   std::snprintf(
       text, sizeof text,
       "; the skin is under %.3f kPa: cameras are calibrated without pressure, or have a saved calibration",
-      1e3 * pressure.mpa);
+      1e3 * loads.pressure_mpa);
   return text;
 }
 
@@ -66,7 +66,7 @@ struct LinkPipeline::Stages {
   MarkerDetector detector;
   std::array<Detections, kCameraCount> detections;
   std::optional<RestPose> rest;  // while rest pairs are taken
-  MeanPressure rest_pressure;    // of these
+  MeanLoads rest_loads;          // of these
   RestProgress rest_progress;
   std::string last_refusal;                            // of these pairs, while more are taken
   bool calibrates = false;                             // the cameras are told from them
@@ -130,7 +130,7 @@ struct LinkPipeline::Stages {
     keeper.AbortTare("the rest shape is being taken again");
     rest_origin = origin;
     rest.emplace(model, rig, pairs);
-    rest_pressure.Clear();
+    rest_loads.Clear();
     rest_progress = {.taken = 0, .wanted = pairs, .refusal = {}};
     last_refusal.clear();
     calibrates = !rig;
@@ -168,32 +168,32 @@ struct LinkPipeline::Stages {
   }
 
   // A pair before the baseline is known.
-  void TakeRest(const FrameTimes& times, const PressureReading& pressure, LinkState& state) {
+  void TakeRest(const FrameTimes& times, const MeasuredLoads& loads, LinkState& state) {
     Forget(state);
-    const auto inflation = estimator->InflationAt(pressure.mpa);
-    if (!inflation)
+    const auto untouched = estimator->UntouchedAt(loads.Loads());
+    if (!untouched)
       return SetStatus(
           state, LinkStatus::kCalibrating,
           "no skin of this model is stable under the pressure that is told; check the pressure and "
           "the model's material");
     if (const auto& trouble = camera_pictures.trouble())
       return SetStatus(state, LinkStatus::kCalibrating, trouble->text);
-    rest_pressure.Add(pressure);
-    if (const std::string trouble = rest_pressure.Trouble(); !trouble.empty()) {
+    rest_loads.Add(loads);
+    if (const std::string trouble = rest_loads.Trouble(); !trouble.empty()) {
       rest->StartAgain();
-      rest_pressure.Clear();
+      rest_loads.Clear();
       rest_progress.taken = 0;
       return SetStatus(state, LinkStatus::kCalibrating, trouble);
     }
-    const auto complete = rest->Add(detections, pictures, *inflation);
+    const auto complete = rest->Add(detections, pictures, *untouched);
     rest_progress.taken = rest->taken();
     rest_progress.refusal = complete ? std::nullopt : std::optional(complete.error());
     if (!complete) {
-      if (calibrates) rest_progress.refusal->message += CalibrationAdvice(pressure);
+      if (calibrates) rest_progress.refusal->message += CalibrationAdvice(loads);
       last_refusal = rest_progress.refusal->message;
-      rest_pressure.Clear();
+      rest_loads.Clear();
       const bool begins_again = rest->taken() > 0;
-      if (begins_again) rest_pressure.Add(pressure);
+      if (begins_again) rest_loads.Add(loads);
       refused_ns = times.exposure_monotonic_ns;
       wait_ns = begins_again ? 0 : std::clamp(2 * wait_ns, kFirstWaitNs, kLongestWaitNs);
       return SetStatus(state, LinkStatus::kCalibrating, last_refusal);
@@ -210,9 +210,9 @@ struct LinkPipeline::Stages {
     cameras.camera_sigma_px = std::max(cameras.camera_sigma_px, rest->noise_px());
     cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
     skin.emplace(model, *calibration, cameras, rest->noise_px());
-    const PressureReading mean = rest_pressure.mean();
-    skin->SetBaseline(rest->markers(), mean, estimator->InflationAt(mean.mpa).value_or(*inflation));
-    keeper.Take(rest_origin, mean.mpa, times, clock);
+    const MeasuredLoads mean = rest_loads.mean();
+    skin->SetBaseline(rest->markers(), mean, estimator->UntouchedAt(mean.Loads()).value_or(*untouched));
+    keeper.Take(rest_origin, mean.pressure_mpa, times, clock);
     predicted_mm.clear();
     rest.reset();
   }
@@ -328,13 +328,14 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.pressure = frame.pressure;
   state.stage_ms = {};
   const bool stale = frame.pressure.stale;
-  PressureReading told{
-      .mpa = stale ? frame.pressure.mpa : frame.pressure_mpa.value_or(s.options.pressure_mpa.value_or(0)),
-      .sigma_mpa = s.options.pressure_sigma_mpa.value_or(PressureSigma(frame.pressure.origin))};
+  MeasuredLoads told{
+      .pressure_mpa =
+          stale ? frame.pressure.mpa : frame.pressure_mpa.value_or(s.options.pressure_mpa.value_or(0)),
+      .pressure_sigma_mpa = s.options.pressure_sigma_mpa.value_or(PressureSigma(frame.pressure.origin))};
   // A sensor that fell silent, or none at all: the shape tells the pressure.
   const bool is_told = !stale && (frame.pressure_mpa || s.options.pressure_mpa ||
                                   frame.pressure.origin != PressureOrigin::kNone);
-  const std::optional<PressureReading> known = is_told ? std::optional(told) : std::nullopt;
+  const std::optional<MeasuredLoads> known = is_told ? std::optional(told) : std::nullopt;
 
   const auto timed = [&s](double& stage_ms, auto&& stage) {
     const int64_t start = s.clock.MonotonicNs();
@@ -359,12 +360,8 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   s.TakeBackRejected(state);
   s.predicted_mm = state.shape.positions_mm;
   const SkinEstimate& estimate = s.estimator->estimate();
-  if (estimate.failure == EstimateFailure::kNone) {
-    s.keeper.Apply(told, estimate, state.shape);
-    state.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
-  } else {
-    state.pressure_estimate.reset();
-  }
+  if (estimate.failure == EstimateFailure::kNone) s.keeper.Apply(told, estimate, state.shape);
+  s.estimator->WriteKnownLoads(state);
   state.total_force_n.setZero();
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   Judge({.model = s.model,
@@ -376,7 +373,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
          .is_baseline_forced = s.keeper.is_forced(),
          .told = told,
          .is_told = is_told,
-         .baseline = s.skin->baseline_pressure(),
+         .baseline = s.skin->baseline_loads(),
          .estimate = estimate},
         state);
   // A tare ends where nothing is measured; where there is a shape without forces it waits for a while.

@@ -37,8 +37,8 @@ bool LeaveOutliersOut(const Eigen::VectorXd& by_cameras_mm, SkinShape& shape) {
 
 }  // namespace
 
-LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, PressurePair pressure,
-                       SkinShape shape, bool is_told) {
+LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, LoadsPair loads, SkinShape shape,
+                       bool is_told) {
   LinkState state;
   state.shape = std::move(shape);
   ContactFinder finder(model);
@@ -49,10 +49,10 @@ LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, Pressu
       seen.displacement_mm.push_back(measured.displacement_mm);
       seen.information.push_back(measured.information_per_mm2);
     }
-    pressure.now = estimator.PressureFromShape(seen, pressure);
+    loads.now = estimator.PressureFromShape(seen, loads);
   }
   for (int pass = 0; pass < kMostPasses; ++pass) {
-    estimator.Estimate(pressure, state.shape, state.forces);
+    estimator.Estimate(loads, state.shape, state.forces);
     // Of the last pass nothing is left out, for it is in the answer.
     const bool is_last = pass + 1 == kMostPasses;
     if (estimate.failure != EstimateFailure::kNone || is_last ||
@@ -62,17 +62,16 @@ LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, Pressu
   }
   estimator.FindContacts(finder, state.shape, state.forces, state.contacts);
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
-  if (state.forces.converged)
-    state.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
+  estimator.WriteKnownLoads(state);
   Judge({.model = model,
          .camera_trouble = {},
          .agreement = {},
          .motion = {},
          .sees_alone = {},
          .drift = {},
-         .told = pressure.now,
+         .told = loads.now,
          .is_told = is_told,
-         .baseline = pressure.baseline,
+         .baseline = loads.baseline,
          .estimate = estimate},
         state);
   return state;

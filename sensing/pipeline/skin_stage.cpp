@@ -30,19 +30,19 @@ SkinStage::SkinStage(const LinkModel& model, const CalibrationSummary& calibrati
       baseline_mm_(Eigen::VectorXd::Zero(3 * model.markers.count())),
       about_mm_(baseline_mm_) {}
 
-void SkinStage::SetBaseline(const LabelledMarkers& rest, const PressureReading& pressure,
-                            const Eigen::VectorXd& inflation_mm) {
-  baseline_pressure_ = pressure;
-  baseline_mm_ = about_mm_ = inflation_mm;
-  evidence_.SetBaseline(rest, inflation_mm);
+void SkinStage::SetBaseline(const LabelledMarkers& rest, const MeasuredLoads& loads,
+                            const Eigen::VectorXd& untouched_mm) {
+  baseline_loads_ = loads;
+  baseline_mm_ = about_mm_ = untouched_mm;
+  evidence_.SetBaseline(rest, untouched_mm);
   rest_.SetBaseline(rest);
 }
 
-void SkinStage::Tare(const LabelledMarkers& now, const PressureReading& pressure,
-                     const Eigen::VectorXd& inflation_mm) {
-  baseline_pressure_ = pressure;
-  baseline_mm_ = about_mm_ = inflation_mm;
-  evidence_.SetBaseline(now, inflation_mm, true);
+void SkinStage::Tare(const LabelledMarkers& now, const MeasuredLoads& loads,
+                     const Eigen::VectorXd& untouched_mm) {
+  baseline_loads_ = loads;
+  baseline_mm_ = about_mm_ = untouched_mm;
+  evidence_.SetBaseline(now, untouched_mm, true);
   rest_.SetBaseline(now);
 }
 
@@ -66,7 +66,7 @@ void SkinStage::CompareWithRest(const LabelledMarkers& markers, std::span<const 
                                 const SkinEstimate& estimate) {
   sees_alone_.reset();
   const auto size = 3 * static_cast<Eigen::Index>(model_.markers.count());
-  if (estimate.failure != EstimateFailure::kNone || estimate.inflated_mm.size() != size ||
+  if (estimate.failure != EstimateFailure::kNone || estimate.untouched_mm.size() != size ||
       estimate.baseline_mm.size() != size)
     return;
   for (const CameraId id : kBothCameras) {
@@ -75,7 +75,7 @@ void SkinStage::CompareWithRest(const LabelledMarkers& markers, std::span<const 
     expected_mm.resize(static_cast<size_t>(model_.markers.count()));
     for (size_t m = 0; m < expected_mm.size(); ++m) {
       const auto at = 3 * static_cast<Eigen::Index>(m);
-      expected_mm[m] = estimate.inflated_mm.segment<3>(at) - estimate.baseline_mm.segment<3>(at);
+      expected_mm[m] = estimate.untouched_mm.segment<3>(at) - estimate.baseline_mm.segment<3>(at);
       if (by_camera_mm.size() == size) expected_mm[m] += by_camera_mm.segment<3>(at);
       if (!drift_mm.empty()) expected_mm[m] += drift_mm[m];
     }
@@ -83,9 +83,9 @@ void SkinStage::CompareWithRest(const LabelledMarkers& markers, std::span<const 
   sees_alone_ = rest_.SeesAlone(markers, expected_mm_);
 }
 
-void SkinStage::Run(const LabelledMarkers& markers, const std::optional<PressureReading>& pressure,
+void SkinStage::Run(const LabelledMarkers& markers, const std::optional<MeasuredLoads>& pressure,
                     std::span<const Vec3> drift_mm, StateEstimator& estimator, ContactFinder& finder,
-                    LinkState& state, PressureReading& told) {
+                    LinkState& state, MeasuredLoads& told) {
   SkinShape& shape = state.shape;
   evidence_.Observe(markers);
   const auto count = static_cast<size_t>(model_.markers.count());
@@ -93,16 +93,16 @@ void SkinStage::Run(const LabelledMarkers& markers, const std::optional<Pressure
     Measure(about_mm_, drift_mm, shape);
     // Nothing would be shown of what took long to find.
     if (pass == 0 && (shape.seen() < kLostShare * model_.markers.count() || !AreOfOneSkin(agreement()))) {
-      estimator.GiveUp({told, baseline_pressure_}, shape, state.forces);
+      estimator.GiveUp({told, baseline_loads_}, shape, state.forces);
       about_mm_ = baseline_mm_;
       break;
     }
     if (pressure) {
       told = *pressure;
     } else if (pass == 0) {
-      told = estimator.PressureFromShape(observed_, {baseline_pressure_, baseline_pressure_});
+      told = estimator.PressureFromShape(observed_, {baseline_loads_, baseline_loads_});
     }
-    estimator.Estimate({told, baseline_pressure_}, shape, state.forces);
+    estimator.Estimate({told, baseline_loads_}, shape, state.forces);
     const SkinEstimate& estimate = estimator.estimate();
     if (estimate.failure != EstimateFailure::kNone) {
       about_mm_ = estimate.has_shape ? estimate.displacements_mm : baseline_mm_;

@@ -21,25 +21,25 @@ class SkinStage {
   SkinStage(const LinkModel& model, const CalibrationSummary& calibration,
             const CameraEvidenceOptions& options, double noise_px = 0);
 
-  /// Takes the markers of the untouched skin (means over frames, with the means' covariances), under a gauge
-  /// pressure; `inflation_mm`: what that pressure does, stacked.
-  void SetBaseline(const LabelledMarkers& rest, const PressureReading& pressure,
-                   const Eigen::VectorXd& inflation_mm);
+  /// Takes the markers of the untouched skin (means over frames, with the means' covariances), under known
+  /// loads; `untouched_mm`: what these do, stacked.
+  void SetBaseline(const LabelledMarkers& rest, const MeasuredLoads& loads,
+                   const Eigen::VectorXd& untouched_mm);
   /// Takes what is seen now as the untouched skin; markers that `now` does not show keep their baseline.
-  void Tare(const LabelledMarkers& now, const PressureReading& pressure, const Eigen::VectorXd& inflation_mm);
+  void Tare(const LabelledMarkers& now, const MeasuredLoads& loads, const Eigen::VectorXd& untouched_mm);
   /// In the frame that was run last.
   CameraAgreement agreement() const { return evidence_.Agreement(); }
   /// Likewise, where there was an answer: the camera that alone shows the skin elsewhere than pressure moves
   /// it.
   const std::optional<CameraId>& sees_alone() const { return sees_alone_; }
-  const PressureReading& baseline_pressure() const { return baseline_pressure_; }
+  const MeasuredLoads& baseline_loads() const { return baseline_loads_; }
 
   /// `drift_mm`: how far the untouched skin has gone since the baseline, by marker; empty: not. `pressure`:
   /// none: nobody tells it, and the shape does. Sets shape, forces and contacts; `told` is the pressure that
   /// was taken as told.
-  void Run(const LabelledMarkers& markers, const std::optional<PressureReading>& pressure,
+  void Run(const LabelledMarkers& markers, const std::optional<MeasuredLoads>& pressure,
            std::span<const Vec3> drift_mm, StateEstimator& estimator, ContactFinder& finder, LinkState& state,
-           PressureReading& told);
+           MeasuredLoads& told);
 
  private:
   void CompareWithRest(const LabelledMarkers& markers, std::span<const Vec3> drift_mm,
@@ -53,7 +53,7 @@ class SkinStage {
   std::optional<CameraId> sees_alone_;
   RestComparison::Expected expected_mm_;
   const CalibrationDoubt doubt_;
-  PressureReading baseline_pressure_;
+  MeasuredLoads baseline_loads_;
   Eigen::VectorXd baseline_mm_, about_mm_, now_mm_;
   MarkerObservations observed_;
   std::vector<Mat3> model_covariances_;

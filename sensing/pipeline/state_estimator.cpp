@@ -16,8 +16,10 @@ constexpr double kWeakInformation = 1e-9;
 // Of a pressure that the shape tells: what the model's inflation is wrong by, and the rest.
 constexpr double kFromShapeShare = 0.05, kFromShapeMpa = 1e-4;
 
-PressureReading FromShape(double mpa) {
-  return {.mpa = mpa, .sigma_mpa = kFromShapeMpa + kFromShapeShare * std::abs(mpa)};
+MeasuredLoads FromShape(double pressure_mpa, MeasuredLoads loads) {
+  loads.pressure_mpa = pressure_mpa;
+  loads.pressure_sigma_mpa = kFromShapeMpa + kFromShapeShare * std::abs(pressure_mpa);
+  return loads;
 }
 
 SkinEstimatorOptions SkinOptions(const ForceOptions& options) {
@@ -48,38 +50,37 @@ StateEstimator::StateEstimator(const LinkModel& model, const ForceOptions& optio
   }
 }
 
-std::optional<Eigen::VectorXd> StateEstimator::InflationAt(double pressure_mpa) {
-  const InflatedSkin* skin = skin_.mechanics().Inflated(pressure_mpa);
+std::optional<Eigen::VectorXd> StateEstimator::UntouchedAt(const KnownLoads& loads) {
+  const UntouchedSkin* skin = skin_.mechanics().Untouched(loads);
   if (skin == nullptr) return std::nullopt;
   return skin->markers_mm;
 }
 
-PressureReading StateEstimator::PressureFromShape(const MarkerObservations& observed,
-                                                  const PressurePair& pressure) {
+MeasuredLoads StateEstimator::PressureFromShape(const MarkerObservations& observed, const LoadsPair& loads) {
   constexpr int kSteps = 6;
-  const auto baseline = InflationAt(pressure.baseline.mpa);
-  double mpa = pressure.now.mpa;
-  if (!baseline) return FromShape(mpa);
+  const auto baseline = UntouchedAt(loads.baseline.Loads());
+  double mpa = loads.now.pressure_mpa;
+  if (!baseline) return FromShape(mpa, loads.now);
   std::vector<double> asked;
   for (int step = 0; step < kSteps; ++step) {
-    const InflatedSkin* skin = skin_.mechanics().Inflated(mpa);
-    if (skin == nullptr) return FromShape(pressure.now.mpa);
+    const UntouchedSkin* skin = skin_.mechanics().Untouched({mpa, loads.now.specific_force_mps2});
+    if (skin == nullptr) return FromShape(loads.now.pressure_mpa, loads.now);
     asked.clear();
     for (size_t m = 0; m < observed.information.size(); ++m) {
       const auto at = 3 * static_cast<Eigen::Index>(m);
-      const Vec3 by = skin->markers_mm_per_mpa.segment<3>(at);
+      const Vec3 by = skin->markers_by_loads.col(0).segment<3>(at);
       const double information = by.dot(observed.information[m] * by);
       if (!(information > kWeakInformation)) continue;
       const Vec3 off =
           observed.displacement_mm[m] + baseline->segment<3>(at) - skin->markers_mm.segment<3>(at);
       asked.push_back(by.dot(observed.information[m] * off) / information);
     }
-    if (asked.empty()) return FromShape(pressure.now.mpa);
+    if (asked.empty()) return FromShape(loads.now.pressure_mpa, loads.now);
     const double by = Median(asked);
-    mpa = skin->pressure_mpa + by;
+    mpa = skin->loads.pressure_mpa + by;
     if (std::abs(by) < 1e-6) break;
   }
-  return FromShape(mpa);
+  return FromShape(mpa, loads.now);
 }
 
 void StateEstimator::WriteShape(SkinShape& shape) const {
@@ -151,7 +152,7 @@ void StateEstimator::WriteLimits(NodalForces& forces) {
   }
 }
 
-void StateEstimator::Estimate(const PressurePair& pressure, SkinShape& shape, NodalForces& forces) {
+void StateEstimator::Estimate(const LoadsPair& loads, SkinShape& shape, NodalForces& forces) {
   const size_t markers = rest_mm_.size();
   observation_.markers.displacement_mm.resize(markers);
   observation_.markers.information.resize(markers);
@@ -161,28 +162,39 @@ void StateEstimator::Estimate(const PressurePair& pressure, SkinShape& shape, No
     observation_.markers.displacement_mm[m] = good ? measured.displacement_mm : Vec3::Zero();
     observation_.markers.information[m] = good ? measured.information_per_mm2 : Mat3::Zero();
   }
-  observation_.pressure = pressure.now;
-  observation_.baseline_pressure = pressure.baseline;
+  observation_.loads = loads.now;
+  observation_.baseline_loads = loads.baseline;
   skin_.Estimate(observation_, estimate_);
   WriteShape(shape);
   if (!thesis_) return WriteForces(forces);
   Eigen::VectorXd moved(3 * static_cast<Eigen::Index>(markers));
   for (size_t m = 0; m < markers; ++m)
     moved.segment<3>(3 * static_cast<Eigen::Index>(m)) = shape.displacements_mm[m];
-  thesis_->Estimate(moved, pressure.now.mpa - pressure.baseline.mpa, forces);
+  thesis_->Estimate(moved, loads.now.pressure_mpa - loads.baseline.pressure_mpa, forces);
   forces.camera_shift_mm = estimate_.loads.camera_shift_mm;
   forces.converged = estimate_.failure == EstimateFailure::kNone;  // or the shape is none
 }
 
-void StateEstimator::GiveUp(const PressurePair& pressure, SkinShape& shape, NodalForces& forces) {
+void StateEstimator::GiveUp(const LoadsPair& loads, SkinShape& shape, NodalForces& forces) {
   const ForceModel model = forces.model;
   skin_.Skip();
   estimate_.failure = EstimateFailure::kNotConverged;
   estimate_.has_shape = false;
-  if (const auto baseline = InflationAt(pressure.baseline.mpa)) estimate_.baseline_mm = *baseline;
+  if (const auto baseline = UntouchedAt(loads.baseline.Loads())) estimate_.baseline_mm = *baseline;
   WriteShape(shape);
   WriteForces(forces);
   forces.model = model;
+}
+
+void StateEstimator::WriteKnownLoads(LinkState& state) const {
+  state.pressure_estimate.reset();
+  state.specific_force_estimate.reset();
+  if (estimate_.failure != EstimateFailure::kNone) return;
+  const KnownLoads& loads = estimate_.known_loads;
+  const Mat4& covariance = estimate_.loads.known_covariance;
+  state.pressure_estimate = {loads.pressure_mpa, std::sqrt(covariance(0, 0))};
+  const Mat3 of_force = covariance.bottomRightCorner<3, 3>();
+  if (!of_force.isZero(0)) state.specific_force_estimate = {loads.specific_force_mps2, of_force};
 }
 
 void StateEstimator::FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,

@@ -23,9 +23,9 @@ struct ForceOptions {
   BackgroundRunner background = {};
 };
 
-/// Gauge pressures: of the moment, and under which the baseline was taken.
-struct PressurePair {
-  PressureReading now, baseline;
+/// Known loads: of the moment, and under which the baseline was taken.
+struct LoadsPair {
+  MeasuredLoads now, baseline;
 };
 
 /// From measured markers and the pressure to all that a state tells of the skin: shape, pressure, forces,
@@ -36,26 +36,28 @@ class StateEstimator {
 
   /// Uses `shape`'s measured displacements, from the baseline, and its sources; sets the rest of it, where it
   /// can. Where it can't, the forces are not converged, and the shape is what is measured: what was not stays
-  /// at the inflated skin's, with a covariance that says so. A frame may be looked at several times
+  /// at the untouched skin's, with a covariance that says so. A frame may be looked at several times
   /// (SkinEstimator::Continue, BeginAgain).
-  void Estimate(const PressurePair& pressure, SkinShape& shape, NodalForces& forces);
+  void Estimate(const LoadsPair& loads, SkinShape& shape, NodalForces& forces);
   /// Instead of Estimate, where too little is seen: as where none can be made. Forgets the frames before.
-  void GiveUp(const PressurePair& pressure, SkinShape& shape, NodalForces& forces);
+  void GiveUp(const LoadsPair& loads, SkinShape& shape, NodalForces& forces);
   /// The contacts of what was estimated last, none where there is no answer. Once a frame, for `finder` gives
   /// them the ids of those of the call before.
   void FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,
                     std::vector<Contact>& contacts);
+  /// Writes what was estimated of the known loads last; nothing where there is no answer.
+  void WriteKnownLoads(LinkState& state) const;
   /// Forgets the frames before.
   void Restart() { skin_.Restart(); }
 
   /// Of the last call.
   const SkinEstimate& estimate() const { return estimate_; }
   SkinEstimator& skin() { return skin_; }
-  /// What a pressure alone does to the markers, from the slack skin; none: there is no such skin.
-  std::optional<Eigen::VectorXd> InflationAt(double pressure_mpa);
+  /// What known loads alone do to the markers, from the slack skin; none: there is no such skin.
+  std::optional<Eigen::VectorXd> UntouchedAt(const KnownLoads& loads);
   /// The pressure that explains most markers, where nobody tells it: of each marker the one that its
   /// displacement along the inflation asks for, the median of them. Displacements from the baseline.
-  PressureReading PressureFromShape(const MarkerObservations& observed, const PressurePair& pressure);
+  MeasuredLoads PressureFromShape(const MarkerObservations& observed, const LoadsPair& loads);
 
  private:
   void WriteShape(SkinShape& shape) const;

@@ -53,7 +53,7 @@ std::optional<Error> TareCollector::Objection(const LinkState& state) const {
 }
 
 std::optional<Error> TareCollector::Motion() const {
-  if (const std::string trouble = pressure_.Trouble(); !trouble.empty())
+  if (const std::string trouble = loads_.Trouble(); !trouble.empty())
     return Refused(trouble + ", or force it");
   const int half = frames() / 2;
   double most = 0;
@@ -64,7 +64,7 @@ std::optional<Error> TareCollector::Motion() const {
 }
 
 Result<bool> TareCollector::Add(const LinkState& state, const LabelledMarkers& labels,
-                                std::span<const Vec3> off_mm, const PressureReading& pressure) {
+                                std::span<const Vec3> off_mm, const MeasuredLoads& loads) {
   if (!state.measured() || off_mm.size() != first_half_mm_.size())
     return Refused("nothing is measured: " + state.status_reason);
   if (auto objection = Objection(state)) {
@@ -74,7 +74,7 @@ Result<bool> TareCollector::Add(const LinkState& state, const LabelledMarkers& l
   auto& half = frames() < options_.frames / 2 ? first_half_mm_ : second_half_mm_;
   for (size_t m = 0; m < half.size(); ++m) half[m] += off_mm[m];
   mean_.Add(labels);
-  pressure_.Add(pressure);
+  loads_.Add(loads);
   if (frames() < options_.frames) return false;
   mean_.Finish();
   if (auto motion = Motion()) {

@@ -10,7 +10,7 @@
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
 #include "sensing/pipeline/marker_mean.h"
-#include "sensing/pipeline/mean_pressure.h"
+#include "sensing/pipeline/mean_loads.h"
 
 namespace taclink {
 
@@ -23,11 +23,11 @@ class TareCollector {
   /// pressure's part left out; empty where nothing is measured. True: complete. Errors: kFailedPrecondition
   /// (nothing is measured; unless forced also touched, moved, another pressure, too few markers).
   Result<bool> Add(const LinkState& state, const LabelledMarkers& labels, std::span<const Vec3> off_mm,
-                   const PressureReading& pressure);
+                   const MeasuredLoads& loads);
 
   /// Once complete: the mean, what it is off the old baseline, and whether it took force.
   const LabelledMarkers& markers() const { return mean_.markers(); }
-  PressureReading pressure() const { return pressure_.mean(); }
+  MeasuredLoads loads() const { return loads_.mean(); }
   double shift_mm() const;
   bool forced() const { return forced_; }
   int frames() const { return mean_.frames(); }
@@ -40,7 +40,7 @@ class TareCollector {
   const double touched_n_, moved_mm_;
   const int markers_;
   MarkerMean mean_;
-  MeanPressure pressure_;
+  MeanLoads loads_;
   std::vector<Vec3> first_half_mm_, second_half_mm_;  // sums of what is off
   bool forced_ = false;
 };

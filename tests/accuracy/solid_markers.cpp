@@ -26,6 +26,13 @@ void AddShapeErrors(const SolidScene& scene, const SkinShape& shape, AccuracyRow
   row.shape_rms_mm = std::sqrt(sum / static_cast<double>(scene.markers_mm.size()));
 }
 
+void SetSpecificForce(const Vec3& mps2, bool is_measured, MeasuredLoads& loads) {
+  constexpr double kGravity = 9.80665, kSigmaMps2 = 0.2;
+  if (is_measured) loads.specific_force_mps2 = mps2;
+  const double variance = is_measured ? kSigmaMps2 * kSigmaMps2 : kGravity * kGravity / 3;
+  loads.specific_force_covariance = variance * Mat3::Identity();
+}
+
 }  // namespace
 
 MarkerInput MakeMarkerInput(const SolidScene& scene, const MarkerCondition& condition) {
@@ -47,8 +54,14 @@ MarkerInput MakeMarkerInput(const SolidScene& scene, const MarkerCondition& cond
     const Vec3 way = Vec3(normal(random), normal(random), normal(random)).normalized();
     input.shape.measured[m].displacement_mm += 10 * lot(random) * way;
   }
-  input.pressure.now = {scene.pressure_kpa * 1e-3 + condition.pressure_error_pa * 1e-6, kPressureSigmaMpa};
-  input.pressure.baseline = {scene.baseline_kpa * 1e-3, scene.baseline_kpa > 0 ? kPressureSigmaMpa : 0};
+  input.loads.now = {scene.pressure_kpa * 1e-3 + condition.pressure_error_pa * 1e-6, kPressureSigmaMpa};
+  input.loads.baseline = {scene.baseline_kpa * 1e-3, scene.baseline_kpa > 0 ? kPressureSigmaMpa : 0};
+  if (!scene.specific_force_mps2.isZero()) {
+    SetSpecificForce(scene.specific_force_mps2, condition.attitude == AttitudeMeasured::kAlways,
+                     input.loads.now);
+    SetSpecificForce(scene.baseline_specific_force_mps2, condition.attitude != AttitudeMeasured::kNever,
+                     input.loads.baseline);
+  }
   return input;
 }
 
@@ -56,7 +69,7 @@ AccuracyRow SolveSolidMarkers(const SolidScene& scene, const MarkerCondition& co
                               StateEstimator& estimator) {
   const LinkModel model = SolidSkin();
   const MarkerInput input = MakeMarkerInput(scene, condition);
-  const LinkState state = SolveMarkers(model, estimator, input.pressure, input.shape);
+  const LinkState state = SolveMarkers(model, estimator, input.loads, input.shape);
   AccuracyRow row = MakeRow(condition.name, scene, state);
   if (row.is_ok) AddShapeErrors(scene, state.shape, row);
   return row;

@@ -7,13 +7,17 @@
 
 namespace taclink {
 
+/// Whether the specific force is measured, with a standard deviation of 0.2 m/s^2.
+enum class AttitudeMeasured { kAlways, kOfBaseline, kNever };
+
 /// What is done to a solid's exact marker displacements before they are solved.
 struct MarkerCondition {
   const char* name;
-  double noise_mm = 0;           ///< of each coordinate
-  double missing = 0;            ///< share of the markers
-  double pressure_error_pa = 0;  ///< measured minus true
-  int wrong = 0;                 ///< markers that are elsewhere, by up to 10 mm
+  double noise_mm = 0;                                    ///< of each coordinate
+  double missing = 0;                                     ///< share of the markers
+  double pressure_error_pa = 0;                           ///< measured minus true
+  int wrong = 0;                                          ///< markers that are elsewhere, by up to 10 mm
+  AttitudeMeasured attitude = AttitudeMeasured::kAlways;  ///< of solids with weight
 };
 inline constexpr std::array<MarkerCondition, 6> kMarkerConditions = {{{"exact"},
                                                                       {"noise", 0.1},
@@ -25,7 +29,7 @@ inline constexpr std::array<MarkerCondition, 6> kMarkerConditions = {{{"exact"},
 /// The same noise for the same scene and condition on every machine.
 struct MarkerInput {
   SkinShape shape;
-  PressurePair pressure;
+  LoadsPair loads;
 };
 MarkerInput MakeMarkerInput(const SolidScene& scene, const MarkerCondition& condition);
 

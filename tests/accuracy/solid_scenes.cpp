@@ -39,8 +39,8 @@ std::vector<Row> Table(const std::string& name) {
   return rows;
 }
 
-std::map<std::string, std::vector<Vec3>> Markers() {
-  std::ifstream file(Folder() + "scene_markers.csv");
+std::map<std::string, std::vector<Vec3>> Markers(const std::string& name) {
+  std::ifstream file(Folder() + name);
   std::map<std::string, std::vector<Vec3>> all;
   std::string line;
   while (std::getline(file, line)) {
@@ -58,6 +58,21 @@ double Number(const Row& row, const std::string& key) {
   return std::stod(row.at(key));
 }
 
+void AddContacts(const std::string& table, std::vector<SolidScene>& scenes) {
+  for (const Row& row : Table(table)) {
+    for (SolidScene& scene : scenes) {
+      if (scene.name != row.at("scene")) continue;
+      scene.contacts.push_back(
+          {.kind = row.at("kind"),
+           .glued = row.at("glued") == "1",
+           .force_n = {Number(row, "fx_n"), Number(row, "fy_n"), Number(row, "fz_n")},
+           .normal_force_n = Number(row, "normal_force_n"),
+           .center_mm = {Number(row, "cx_mm"), Number(row, "cy_mm"), Number(row, "cz_mm")},
+           .extent_mm = {Number(row, "ext_around_mm"), Number(row, "ext_along_mm")}});
+    }
+  }
+}
+
 }  // namespace
 
 bool SolidScene::IsDistributed() const {
@@ -69,7 +84,7 @@ bool SolidScene::IsDistributed() const {
 }
 
 std::vector<SolidScene> ReadSolidScenes() {
-  const auto markers = Markers();
+  const auto markers = Markers("scene_markers.csv");
   std::vector<SolidScene> scenes;
   for (const Row& row : Table("scenes.csv")) {
     SolidScene scene;
@@ -89,16 +104,31 @@ std::vector<SolidScene> ReadSolidScenes() {
     }
     scenes.push_back(std::move(scene));
   }
-  for (const Row& row : Table("scene_contacts.csv")) {
-    for (SolidScene& scene : scenes) {
-      if (scene.name != row.at("scene")) continue;
-      scene.contacts.push_back(
-          {.kind = row.at("kind"),
-           .glued = row.at("glued") == "1",
-           .force_n = {Number(row, "fx_n"), Number(row, "fy_n"), Number(row, "fz_n")},
-           .normal_force_n = Number(row, "normal_force_n"),
-           .center_mm = {Number(row, "cx_mm"), Number(row, "cy_mm"), Number(row, "cz_mm")},
-           .extent_mm = {Number(row, "ext_around_mm"), Number(row, "ext_along_mm")}});
+  AddContacts("scene_contacts.csv", scenes);
+  return scenes;
+}
+
+std::vector<SolidScene> ReadWeightScenes() {
+  const auto markers = Markers("weight_markers.csv");
+  std::vector<SolidScene> states;
+  for (const Row& row : Table("weight_states.csv")) {
+    SolidScene& state = states.emplace_back();
+    state.name = row.at("scene");
+    state.family = "weight";
+    state.pressure_kpa = Number(row, "pressure_kpa");
+    state.specific_force_mps2 = {Number(row, "gx_mps2"), Number(row, "gy_mps2"), Number(row, "gz_mps2")};
+    state.markers_mm = markers.at(state.name);
+  }
+  AddContacts("weight_contacts.csv", states);
+  std::vector<SolidScene> scenes;
+  for (const SolidScene& baseline : states) {
+    for (const SolidScene& state : states) {
+      if (!baseline.contacts.empty() || state.specific_force_mps2 == baseline.specific_force_mps2) continue;
+      SolidScene& scene = scenes.emplace_back(state);
+      scene.name = baseline.name + " to " + state.name;
+      scene.baseline_kpa = baseline.pressure_kpa;
+      scene.baseline_mm = baseline.markers_mm;
+      scene.baseline_specific_force_mps2 = baseline.specific_force_mps2;
     }
   }
   return scenes;

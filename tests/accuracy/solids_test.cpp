@@ -66,7 +66,7 @@ TEST(Solids, AnUntouchedSkinHasNoContact) {
   rest.pressure_kpa = rest.baseline_kpa;
   for (const char* name : {"a", "b", "c", "d", "e"}) {
     const MarkerInput input = MakeMarkerInput(rest, {name, 0.1, 0.1});
-    const LinkState state = SolveMarkers(model, estimator, input.pressure, input.shape);
+    const LinkState state = SolveMarkers(model, estimator, input.loads, input.shape);
     EXPECT_EQ(state.status, LinkStatus::kOk) << state.status_reason;
     EXPECT_TRUE(state.contacts.empty()) << name;
   }
@@ -85,7 +85,7 @@ TEST(SolidsTest, AHugIsOneContact) {
     for (const MarkerCondition& how : {MarkerCondition{"exact"}, MarkerCondition{"hug", 0.1}}) {
       SCOPED_TRACE(scene.name + " " + how.name);
       const MarkerInput shown = MakeMarkerInput(scene, how);
-      const LinkState state = SolveMarkers(model, estimator, shown.pressure, shown.shape);
+      const LinkState state = SolveMarkers(model, estimator, shown.loads, shown.shape);
       ASSERT_EQ(state.contacts.size(), 1u);
       const Contact& contact = state.contacts.front();
       EXPECT_TRUE(contact.is_ring_contact);
@@ -110,10 +110,10 @@ TEST(SolidsTest, ColdIsWarm) {
     const SolidScene& scene = scenes[random() % scenes.size()];
     const bool blind = frame % 3 == 1;
     const MarkerInput shown = MakeMarkerInput(scene, {"walk", 0.1, blind ? 0.7 : 0.0});
-    const LinkState with = SolveMarkers(model, warm, shown.pressure, shown.shape);
+    const LinkState with = SolveMarkers(model, warm, shown.loads, shown.shape);
     if (blind) continue;
     cold.Restart();
-    const LinkState without = SolveMarkers(model, cold, shown.pressure, shown.shape);
+    const LinkState without = SolveMarkers(model, cold, shown.loads, shown.shape);
     if (!without.forces.converged) continue;
     ++compared;
     bool same = with.forces.converged && with.contacts.size() == without.contacts.size();

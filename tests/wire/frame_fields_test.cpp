@@ -50,6 +50,10 @@ struct Setter {
     (*this)(path, value.emplace());
   }
   void operator()(const std::string&, PressureEstimate& value) const { value = {Number(), Number()}; }
+  void operator()(const std::string& path, SpecificForceEstimate& value) const {
+    (*this)(path, value.mps2);
+    (*this)(path, value.covariance);
+  }
   void operator()(const std::string&, MeasuredDisplacement& value) const { value.displacement_mm.setOnes(); }
   void operator()(const std::string&, RejectedMarker& value) const { value.marker = 1; }
   void operator()(const std::string&, std::array<CameraCounts, kCameraCount>& cameras) const {
@@ -127,6 +131,9 @@ struct Printer {
   }
   static std::string Text(const PressureEstimate& value) {
     return Text(value.mpa) + " " + Text(value.sigma_mpa);
+  }
+  static std::string Text(const SpecificForceEstimate& value) {
+    return Text(value.mps2) + " " + Text(value.covariance);
   }
   static std::string Text(const std::array<CameraCounts, kCameraCount>& cameras) {
     std::string text;

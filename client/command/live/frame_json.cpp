@@ -1,5 +1,8 @@
 #include "client/command/live/frame_json.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "client/command/cli/units.h"
 #include "client/cpp/taclink/values.h"
 
@@ -47,6 +50,17 @@ Json EstimateJson(const v1::LinkFrame& frame) {
   return Json::array({estimate.pressure_pa() * kKpaPerPascal, estimate.sigma_pa() * kKpaPerPascal});
 }
 
+Json SpecificForceJson(const v1::LinkFrame& frame) {
+  if (!frame.has_specific_force_estimate()) return nullptr;
+  const v1::SpecificForceEstimate& estimate = frame.specific_force_estimate();
+  Json sigmas = Json::array();
+  for (const int entry : {0, 3, 5}) {  // of the upper triangle, the diagonal
+    if (entry < estimate.covariance_m2_s4_size())
+      sigmas.push_back(std::sqrt(std::max(estimate.covariance_m2_s4(entry), 0.0)));
+  }
+  return {{"value", ToJson(estimate.specific_force_mps2())}, {"sigma", std::move(sigmas)}};
+}
+
 Json ReasonsJson(const v1::LinkFrame& frame) {
   Json reasons = Json::array();
   for (const v1::StatusReason& reason : frame.status_reasons())
@@ -92,6 +106,7 @@ std::string FrameJson(const v1::LinkFrame& frame) {
       {"pressure_kpa", NumberOrNull(frame.has_pressure_pa(), frame.pressure_pa() * kKpaPerPascal)},
       {"pressure", PressureJson(frame.pressure())},
       {"pressure_estimate_kpa", EstimateJson(frame)},
+      {"specific_force_estimate_mps2", SpecificForceJson(frame)},
       {"force_model", client::Name(frame.force_model())},
       {"markers", {{"seen", frame.markers_seen()}, {"inferred", frame.markers_inferred()}}},
       {"tracked", frame.tracking_mode() == v1::TRACKING_MODE_TRACKED},

@@ -225,7 +225,7 @@ Result<void> LogLinkSolver::SolveMarkers(v1::LinkFrame& solved) {
   }
   const double sigma_mpa =
       settings_.options.pressure_sigma_mpa.value_or(PressureSigma(recorded_.pressure.origin));
-  const PressurePair pressure{.now = {FramePressure(), sigma_mpa}, .baseline = {baseline_mpa_, sigma_mpa}};
+  const LoadsPair pressure{.now = {FramePressure(), sigma_mpa}, .baseline = {baseline_mpa_, sigma_mpa}};
   state_ = std::move(recorded_);
   MeasureAgain(state_.shape);
   SolveForces(pressure);
@@ -235,7 +235,7 @@ Result<void> LogLinkSolver::SolveMarkers(v1::LinkFrame& solved) {
   return {};
 }
 
-void LogLinkSolver::SolveForces(const PressurePair& pressure) {
+void LogLinkSolver::SolveForces(const LoadsPair& pressure) {
   const auto start = std::chrono::steady_clock::now();
   estimator_->Estimate(pressure, state_.shape, state_.forces);
   estimator_->FindContacts(*finder_, state_.shape, state_.forces, state_.contacts);
@@ -245,9 +245,7 @@ void LogLinkSolver::SolveForces(const PressurePair& pressure) {
   state_.total_force_n.setZero();
   for (const Contact& contact : state_.contacts) state_.total_force_n += contact.force_n;
   const SkinEstimate& estimate = estimator_->estimate();
-  state_.pressure_estimate.reset();
-  if (state_.forces.converged)
-    state_.pressure_estimate = {estimate.pressure_mpa, estimate.loads.pressure_sigma_mpa};
+  estimator_->WriteKnownLoads(state_);
   // What the pictures were like, the log knows.
   std::optional<Reason> trouble;
   if (state_.status != LinkStatus::kOk && state_.reasons.empty())

@@ -47,7 +47,7 @@ class LogLinkSolver {
   Result<RawImage> Image(CameraId camera, const std::optional<RecordedPicture>& picture) const;
   Result<void> SolveMarkers(v1::LinkFrame& solved);
   void FollowPressure();
-  void SolveForces(const PressurePair& pressure);
+  void SolveForces(const LoadsPair& pressure);
   bool IsPressureTold() const;
   double FramePressure() const;
 

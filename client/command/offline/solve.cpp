@@ -23,6 +23,8 @@ struct SolveOptions {
   double baseline_pressure_kpa = 0;
   std::optional<double> pressure_sigma_pa;
   std::optional<double> sigma_mm;
+  std::string gravity, baseline_gravity;
+  double gravity_sigma_mps2 = 0.2;
   std::string force_model = "auto";
   int force_refinement = 0;
   bool json = false;
@@ -102,6 +104,12 @@ Json PressureJson(const LinkState& state) {
   return Json::array({1e3 * state.pressure_estimate->mpa, 1e3 * state.pressure_estimate->sigma_mpa});
 }
 
+Json SpecificForceJson(const LinkState& state) {
+  if (!state.specific_force_estimate) return nullptr;
+  return {{"value", ToJson(state.specific_force_estimate->mps2)},
+          {"sigma", ToJson(Sigmas(state.specific_force_estimate->covariance))}};
+}
+
 void PrintJson(const LinkModel& model, const LinkState& state) {
   Json contacts = Json::array();
   for (const auto& contact : state.contacts) contacts.push_back(ContactJson(contact));
@@ -119,6 +127,7 @@ void PrintJson(const LinkModel& model, const LinkState& state) {
        state.has_forces() ? Json(state.forces.residual * state.forces.residual) : Json(nullptr)},
       {"camera_shift_mm", state.has_forces() ? Json(state.forces.camera_shift_mm) : Json(nullptr)},
       {"pressure_estimate_kpa", PressureJson(state)},
+      {"specific_force_estimate_mps2", SpecificForceJson(state)},
       {"contacts", contacts},
       {"total_force_n", state.has_forces() ? ToJson(state.total_force_n) : Json(nullptr)},
       {"detection_limits_n", state.has_forces() ? Json(state.forces.limits_n) : Json(nullptr)},
@@ -150,18 +159,63 @@ double SigmaMpa(const SolveOptions& options) {
   return 1e-6 * options.pressure_sigma_pa.value_or(1e6 * PressureSigma(PressureOrigin::kFile));
 }
 
+// A specific force "X,Y,Z" in m/s^2, "unknown", or nothing: as if the skin had no weight.
+struct GravityOption {
+  Vec3 mps2 = Vec3::Zero();
+  Mat3 covariance = Mat3::Zero();
+};
+constexpr double kStandardGravity = 9.80665;  // m/s^2
+
+Result<GravityOption> ParseGravity(const std::string& text, double sigma_mps2) {
+  GravityOption gravity;
+  if (text.empty()) return gravity;
+  // Any direction: each component has a third of the square.
+  if (text == "unknown") {
+    gravity.covariance = kStandardGravity * kStandardGravity / 3 * Mat3::Identity();
+    return gravity;
+  }
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &gravity.mps2.x(), &gravity.mps2.y(), &gravity.mps2.z(),
+                  &used) != 3 ||
+      static_cast<size_t>(used) != text.size() || !(gravity.mps2.norm() <= 100))
+    return Error{ErrorCode::kInvalidArgument,
+                 "'" + text + "' is not a specific force: give X,Y,Z in m/s^2, at most 100, or 'unknown'"};
+  gravity.covariance = sigma_mps2 * sigma_mps2 * Mat3::Identity();
+  return gravity;
+}
+
+Result<LoadsPair> ParseLoads(const SolveOptions& options, const LinkModel& model) {
+  const double baseline_kpa = options.baseline_pressure_kpa;
+  LoadsPair loads;
+  loads.now = {1e-3 * options.pressure_kpa.value_or(baseline_kpa), SigmaMpa(options)};
+  loads.baseline = {1e-3 * baseline_kpa, baseline_kpa == 0 ? 0 : SigmaMpa(options)};
+  if (options.gravity.empty() != options.baseline_gravity.empty())
+    return Error{ErrorCode::kInvalidArgument,
+                 "--gravity and --baseline-gravity go together: give both, either may be 'unknown'"};
+  if (!options.gravity.empty() && model.density_kg_m3 == 0)
+    return Error{ErrorCode::kFailedPrecondition,
+                 "model '" + model.name + "' has no skin.density_kg_m3, without which weight is not known"};
+  const auto now = ParseGravity(options.gravity, options.gravity_sigma_mps2);
+  if (!now) return now.error();
+  const auto baseline = ParseGravity(options.baseline_gravity, options.gravity_sigma_mps2);
+  if (!baseline) return baseline.error();
+  loads.now.specific_force_mps2 = now->mps2;
+  loads.now.specific_force_covariance = now->covariance;
+  loads.baseline.specific_force_mps2 = baseline->mps2;
+  loads.baseline.specific_force_covariance = baseline->covariance;
+  return loads;
+}
+
 Result<LinkState> SolveMarkerFile(const SolveOptions& options, const LinkModel& model) {
   auto shape = ReadMarkerCsv(options.markers, model, options.sigma_mm);
   if (!shape) return shape.error();
   const auto estimator = MakeStateEstimator(
       model, {.model = ForceModelNamed(options.force_model), .refinement = options.force_refinement});
-  const PressureReading now{1e-3 * options.pressure_kpa.value_or(options.baseline_pressure_kpa),
-                            SigmaMpa(options)};
-  const double baseline_kpa = options.baseline_pressure_kpa;
-  const PressureReading baseline{1e-3 * baseline_kpa, baseline_kpa == 0 ? 0 : SigmaMpa(options)};
+  const auto loads = ParseLoads(options, model);
+  if (!loads) return loads.error();
   const int64_t start = SystemClock().MonotonicNs();
-  LinkState state = SolveMarkers(model, *estimator, {.now = now, .baseline = baseline}, std::move(*shape),
-                                 options.pressure_kpa.has_value());
+  LinkState state =
+      SolveMarkers(model, *estimator, *loads, std::move(*shape), options.pressure_kpa.has_value());
   state.stage_ms.force = static_cast<double>(SystemClock().MonotonicNs() - start) * 1e-6;
   return state;
 }
@@ -239,6 +293,19 @@ void AddSolve(const Arguments& app, Selected& selected) {
           "--sigma-mm", options->sigma_mm,
           "With --markers: their standard deviation in x and y; z: 3 times; told by themselves if not given")
       .Must(Within(1e-4, 10));
+  const Option gravity = command.AddOption(
+      "--gravity", options->gravity,
+      "X,Y,Z: specific force in the link's frame (m/s^2, the direction in which things fall), or unknown");
+  command
+      .AddOption("--baseline-gravity", options->baseline_gravity,
+                 "Likewise, of the attitude in which the baseline was taken")
+      .Needs(gravity);
+  command
+      .AddOption("--gravity-sigma", options->gravity_sigma_mps2,
+                 "Standard deviation of each component of these, m/s^2")
+      .Must(Within(0, 100))
+      .ShowDefault()
+      .Needs(gravity);
   command.AddOption("--force-model", options->force_model, "auto: the cheapest that is good enough")
       .Must(OneOf(client::Names<v1::ForceModel>()));
   command

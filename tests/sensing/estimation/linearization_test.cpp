@@ -23,10 +23,10 @@ class LinearizationTest : public ::testing::TestWithParam<const char*> {
 // From the sites' side they are what they are from the markers' side.
 TEST_P(LinearizationTest, ColumnsOfSomeSitesAreThoseOfAll) {
   Linearization whole(mechanics_), part(mechanics_);
-  const InflatedSkin* inflated = mechanics_.Inflated(5e-4);
+  const UntouchedSkin* inflated = mechanics_.Untouched({.pressure_mpa = 5e-4});
   ASSERT_TRUE(inflated != nullptr);
-  ASSERT_TRUE(whole.At(inflated->state, inflated->pressure_mpa));
-  ASSERT_TRUE(part.At(inflated->state, inflated->pressure_mpa));
+  ASSERT_TRUE(whole.At(inflated->state, inflated->loads));
+  ASSERT_TRUE(part.At(inflated->state, inflated->loads));
   whole.MakeColumns(all_);
   const int last = mechanics_.site_count() - 1;
   part.MakeColumns(std::vector{last, 7, 130});
@@ -42,9 +42,9 @@ TEST_P(LinearizationTest, ColumnsOfSomeSitesAreThoseOfAll) {
 
 TEST_P(LinearizationTest, ARingsColumnIsTheMeanOfItsSites) {
   Linearization skin(mechanics_);
-  const InflatedSkin* inflated = mechanics_.Inflated(5e-4);
+  const UntouchedSkin* inflated = mechanics_.Untouched({.pressure_mpa = 5e-4});
   ASSERT_TRUE(inflated != nullptr);
-  ASSERT_TRUE(skin.At(inflated->state, inflated->pressure_mpa));
+  ASSERT_TRUE(skin.At(inflated->state, inflated->loads));
   skin.MakeColumns(all_);
   const Eigen::MatrixXf rings = skin.RingColumns();
   ASSERT_EQ(rings.cols(), mechanics_.site_rows());

@@ -7,6 +7,7 @@
 
 #include "sensing/estimation/skin_estimator.h"
 #include "sensing/model/model_file.h"
+#include "sensing/shell/body_force.h"
 #include "sensing/shell/element_load.h"
 #include "sensing/shell/equilibrium.h"
 
@@ -19,19 +20,22 @@ struct Pushed {
   bool ok = false;
 };
 inline Pushed Push(const LinkModel& model, double kpa, std::optional<double> angle, double z, double force_n,
-                   double width_mm) {
+                   double width_mm, const Vec3& specific_force_mps2 = Vec3::Zero()) {
   const ShellMesh mesh = MakeShellMesh(model, 2);
   const NonlinearShell shell(SkinSurface(mesh), model.material);
   EquilibriumSolver solver(shell, {.tolerance_n = 1e-7});
+  const std::vector<Eigen::Vector4d> areas_mm2 = CornerAreas(shell.surface());
   ShellState state = shell.Rest();
   Pushed pushed;
   for (int step = 1; step <= 8; ++step) {
     const FollowerPressure pressure(kpa * 1e-3 * step / 8);
-    const ElementLoad* loads[] = {&pressure};
+    const BodyForce weight(areas_mm2, model.MassPerArea() * specific_force_mps2 * step / 8);
+    const ElementLoad* loads[] = {&pressure, &weight};
     if (!solver.Solve(loads, {}, state).ok()) return pushed;
   }
   const FollowerPressure pressure(kpa * 1e-3);
-  const ElementLoad* loads[] = {&pressure};
+  const BodyForce weight(areas_mm2, model.MassPerArea() * specific_force_mps2);
+  const ElementLoad* loads[] = {&pressure, &weight};
   const Vec3 center = model.PointAtDepth(angle.value_or(0), z, model.thickness_mm / 2);
   const Vec3 inward = -model.OutwardNormal(angle.value_or(0), z);
   Eigen::VectorXd share = Eigen::VectorXd::Zero(mesh.node_count());
@@ -61,7 +65,7 @@ inline SkinObservation Observe(const Eigen::VectorXd& markers_mm, double kpa, do
     observation.markers.displacement_mm.push_back(markers_mm.segment<3>(3 * m));
     observation.markers.information.push_back(Mat3::Identity() / (sigma_mm * sigma_mm));
   }
-  observation.pressure = {kpa * 1e-3, 3e-5};
+  observation.loads = {kpa * 1e-3, 3e-5};
   return observation;
 }
 

@@ -32,7 +32,7 @@ class StandingSkinTest : public SkinEstimatorTest {
       EXPECT_LT((one.center - other.center).norm(), 0.2);
     }
     EXPECT_LT((cold.displacements_mm - estimate_.displacements_mm).cwiseAbs().maxCoeff(), kNoiseMm);
-    EXPECT_NEAR(cold.pressure_mpa, estimate_.pressure_mpa, 1e-5);
+    EXPECT_NEAR(cold.known_loads.pressure_mpa, estimate_.known_loads.pressure_mpa, 1e-5);
     EXPECT_NEAR(cold.loads.chi2_per_dof, estimate_.loads.chi2_per_dof, 0.05);
   }
 

@@ -19,13 +19,13 @@ void InAThread(const std::function<void()>& job) {
 class TangentTest : public ::testing::Test {
  protected:
   TangentTest() {
-    problem_.inflated = *mechanics_.Inflated(0);
-    problem_.prior.sigma_mpa = 3e-5;
+    problem_.untouched = *mechanics_.Untouched({});
+    problem_.prior.now = ErrorsOf(3e-5, Mat3::Zero());
     problem_.observed.displacement_mm.assign(kMarkers, Vec3::Zero());
     problem_.observed.information.assign(kMarkers, Mat3::Identity() / (kSigmaMm * kSigmaMm));
   }
   ShellState Dented(double mm) const {
-    ShellState state = problem_.inflated.state;
+    ShellState state = problem_.untouched.state;
     state.mids_mm[state.mids_mm.size() / 2].z() += mm;
     return state;
   }
@@ -67,7 +67,7 @@ TEST_F(TangentTest, IsGoodForForcesOfItsSize) {
 TEST_F(TangentTest, OfATouchedSkinWeighsAsIfItHadMadeAll) {
   Tangent still(mechanics_, near_, kReach), touched(mechanics_, near_, kReach),
       whole(mechanics_, near_, kReach);
-  ASSERT_TRUE(still.Make(problem_, problem_.inflated.state, none_, nullptr));
+  ASSERT_TRUE(still.Make(problem_, problem_.untouched.state, none_, nullptr));
   Eigen::VectorXd local = none_;
   local[300] = 0.5;
   ASSERT_TRUE(whole.Make(problem_, Dented(1), local, nullptr));

@@ -59,16 +59,24 @@ TEST_F(WhiteningTest, BearsLargeAndDependentColumns) {
   Check(columns);
 }
 
-// Of a share whose column is all but told: where 1 - |M' u|^2 would be rounding.
-TEST_F(WhiteningTest, KnowsWhatIsLeftOfTheLastShare) {
+// Of shares whose columns are all but known: where I - U' C^-1 U would be rounding.
+TEST_F(WhiteningTest, KnowsWhatIsLeftOfTheLastShares) {
   for (const double size : {1.0, 1e2, 1e4}) {
     Eigen::MatrixXd columns = Eigen::MatrixXd::Random(kRows, 9);
     columns.rightCols<1>() *= size;
     Check(columns);
-    const Eigen::MatrixXd single = columns.cast<float>().cast<double>(), others = single.leftCols(8);
-    const Eigen::VectorXd last = single.rightCols<1>();
-    const double told = last.dot((shared_ + others * others.transpose()).llt().solve(last));
-    EXPECT_NEAR(whitening_.LastPosterior() * (1 + told), 1, 1e-2) << size;
+    const Eigen::MatrixXd single = columns.cast<float>().cast<double>();
+    for (const Eigen::Index count : {1, 4}) {
+      const Eigen::MatrixXd others = single.leftCols(9 - count), last = single.rightCols(count);
+      const Eigen::MatrixXd told =
+          last.transpose() * (shared_ + others * others.transpose()).llt().solve(last);
+      const Eigen::MatrixXd information = told + Eigen::MatrixXd::Identity(count, count);
+      const Eigen::MatrixXd expected = information.llt().solve(Eigen::MatrixXd::Identity(count, count));
+      const Eigen::VectorXd sigmas = expected.diagonal().cwiseSqrt();
+      const Eigen::MatrixXd off = whitening_.LastPosterior(count) - expected;
+      EXPECT_LT((sigmas.cwiseInverse().asDiagonal() * off * sigmas.cwiseInverse().asDiagonal()).norm(), 2e-2)
+          << size << " " << count;
+    }
   }
 }
 

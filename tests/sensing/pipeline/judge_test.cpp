@@ -16,7 +16,7 @@ class JudgeTest : public ::testing::Test {
     const auto markers = static_cast<size_t>(model_.markers.count());
     state_.shape.sources.assign(markers, MarkerSource::kBoth);
     state_.forces.converged = true;
-    estimate_.displacements_mm = estimate_.inflated_mm =
+    estimate_.displacements_mm = estimate_.untouched_mm =
         Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(markers));
   }
   void Touch(double deg, double z_mm) {
@@ -59,7 +59,8 @@ class JudgeTest : public ::testing::Test {
   std::optional<MotionDisagreement> motion_;
   std::optional<CameraId> sees_alone_;
   bool is_told_ = true, is_baseline_forced_ = false;
-  PressureReading told_{.mpa = 1e-3, .sigma_mpa = 5e-5}, baseline_{.mpa = 5e-4, .sigma_mpa = 5e-5};
+  MeasuredLoads told_{.pressure_mpa = 1e-3, .pressure_sigma_mpa = 5e-5},
+      baseline_{.pressure_mpa = 5e-4, .pressure_sigma_mpa = 5e-5};
 };
 
 TEST_F(JudgeTest, WhatIsWellIsOk) {
@@ -197,9 +198,9 @@ TEST_F(JudgeTest, APressureThatDoesNotFitIsTold) {
 
 TEST_F(JudgeTest, ABaselinesPressureThatDoesNotFitIsTold) {
   state_.pressure_estimate = {.mpa = 1e-3, .sigma_mpa = 1e-6};
-  estimate_.loads.baseline_error_mpa = -1.4e-4;
+  estimate_.loads.baseline_error[0] = -1.4e-4;
   EXPECT_THAT(Reasons(), ::testing::IsEmpty());
-  estimate_.loads.baseline_error_mpa = -1.6e-4;
+  estimate_.loads.baseline_error[0] = -1.6e-4;
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureMismatch));
   EXPECT_THAT(state_.status_reason,
               ::testing::HasSubstr("0.340 kPa when the baseline was taken; told were 1.000 and 0.500 kPa"));

@@ -308,13 +308,13 @@ TEST_F(TareCollectorTest, APressureThatChangesIsRefusedUnlessForced) {
     if (!force) {
       EXPECT_THAT(end.error().message, HasSubstr("changed from 0.500 to 0.800 kPa"));
     }
-    EXPECT_NEAR(tare.pressure().mpa, 0.65e-3, 1e-11);
+    EXPECT_NEAR(tare.loads().pressure_mpa, 0.65e-3, 1e-11);
   }
   // What a sensor scatters is no change; the markers' mean belongs to the readings' mean.
   TareCollector tare(model_, {.frames = 4});
   for (const double kpa : {0.52, 0.48, 0.51}) ASSERT_FALSE(Take(tare, 0, kpa).value());
   ASSERT_TRUE(Take(tare, 0, 0.47).value());
-  EXPECT_NEAR(tare.pressure().mpa, 0.495e-3, 1e-11);
+  EXPECT_NEAR(tare.loads().pressure_mpa, 0.495e-3, 1e-11);
 }
 
 TEST_F(TareCollectorTest, FewMarkersAreRefusedUnlessForced) {

@@ -74,6 +74,14 @@ class PressureEstimate:
     sigma_pa: float  # standard deviation
 
 
+@dataclass(frozen=True, eq=False, kw_only=True, slots=True)
+class SpecificForceEstimate:
+    """Gravity less the link's acceleration, link frame: what the skin's shape and the measured attitude tell together."""
+
+    specific_force_mps2: FloatArray  # (3,)
+    covariance_m2_s4: FloatArray | None  # (3, 3); None: not known
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class FrameTimes:
     """ns; 0: has not happened. utc: since 1970-01-01; all else: the server's CLOCK_MONOTONIC."""
@@ -142,6 +150,7 @@ class Frame:
     pressure_pa: float | None  # gauge; None: not measured
     pressure: PressureReport | None  # None: a frame without a picture
     pressure_estimate: PressureEstimate | None  # None: nothing was estimated
+    specific_force_estimate: SpecificForceEstimate | None  # None: likewise, or the attitude counts as exact
     markers_seen: int
     markers_inferred: int
     contacts: tuple[Contact, ...]
@@ -200,6 +209,13 @@ def times_from(message: frame_pb2.FrameTimes, client_utc_ns: int) -> FrameTimes:
     return alike(FrameTimes, message, client_utc_ns=client_utc_ns)
 
 
+def _specific_force_from(message: frame_pb2.SpecificForceEstimate) -> SpecificForceEstimate:
+    return SpecificForceEstimate(
+        specific_force_mps2=vector(message.specific_force_mps2),
+        covariance_m2_s4=covariance(message.covariance_m2_s4),
+    )
+
+
 def _contact_from(message: frame_pb2.Contact) -> Contact:
     return alike(
         Contact,
@@ -253,6 +269,9 @@ def frame_from(message: frame_pb2.LinkFrame, client_utc_ns: int = 0, gap: int | 
         status_reasons=tuple(map(_reason_from, message.status_reasons)),
         pressure_estimate=alike(PressureEstimate, message.pressure_estimate)
         if message.HasField("pressure_estimate")
+        else None,
+        specific_force_estimate=_specific_force_from(message.specific_force_estimate)
+        if message.HasField("specific_force_estimate")
         else None,
         contacts=tuple(map(_contact_from, message.contacts)),
         total_force_n=vector(message.total_force_n)

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+
+#include "sensing/core/geometry.h"
+
+namespace taclink {
+
+using Vec4 = Eigen::Vector4d;
+using Mat4 = Eigen::Matrix4d;
+
+/// What acts on a whole skin and is measured by other means than its shape: the gauge pressure inside, and
+/// the specific force, which is gravity less the link's acceleration (link frame; at rest it points to where
+/// things fall).
+struct KnownLoads {
+  double pressure_mpa = 0;
+  Vec3 specific_force_mps2 = Vec3::Zero();
+
+  /// Pressure first, then the specific force.
+  static constexpr int kCount = 4;
+  Vec4 Stacked() const {
+    return {pressure_mpa, specific_force_mps2.x(), specific_force_mps2.y(), specific_force_mps2.z()};
+  }
+  static KnownLoads FromStacked(const Vec4& stacked) { return {stacked[0], stacked.tail<3>()}; }
+  bool operator==(const KnownLoads&) const = default;
+};
+
+/// Known loads with how well they are known.
+struct MeasuredLoads {
+  double pressure_mpa = 0, pressure_sigma_mpa = 0;
+  Vec3 specific_force_mps2 = Vec3::Zero();
+  Mat3 specific_force_covariance = Mat3::Zero();  ///< (m/s^2)^2; zero: it is taken as exact
+
+  KnownLoads Loads() const { return {pressure_mpa, specific_force_mps2}; }
+};
+
+}  // namespace taclink

@@ -1,0 +1,93 @@
+// The untouched skin under known loads: what is interpolated against equilibria that are solved for.
+#include "sensing/estimation/skin_mechanics.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "sensing/model/model_file.h"
+
+namespace taclink {
+namespace {
+
+class SkinMechanicsTest : public ::testing::TestWithParam<const char*> {
+ protected:
+  // In steps from the slack skin, on the same mesh.
+  Eigen::VectorXd Solved(const KnownLoads& loads) {
+    EquilibriumSolver solver(mechanics_.shell(), {.tolerance_n = 1e-9, .max_iterations = 200});
+    ShellState state = mechanics_.shell().Rest();
+    constexpr int kSteps = 10;
+    for (int step = 1; step <= kSteps; ++step) {
+      const AppliedLoads applied(mechanics_, KnownLoads::FromStacked(loads.Stacked() * step / kSteps));
+      EXPECT_TRUE(solver.Solve(applied.loads(), {}, state).ok());
+    }
+    Eigen::VectorXd markers_mm;
+    mechanics_.markers().Displacements(state, markers_mm);
+    return markers_mm;
+  }
+  static double Largest(const Eigen::VectorXd& stacked_mm) {
+    return std::sqrt(stacked_mm.reshaped(3, stacked_mm.size() / 3).colwise().squaredNorm().maxCoeff());
+  }
+
+  SkinMechanics mechanics_{LoadLinkModel(GetParam()).value()};
+};
+
+TEST_P(SkinMechanicsTest, IsTheEquilibriumUnderAnyKnownLoads) {
+  for (const KnownLoads& loads :
+       {KnownLoads{0, {0, -9.8, 0}}, KnownLoads{3.3e-4, {4.9, -6.9, -4.9}}, KnownLoads{1.07e-3, {1, 2, 9}},
+        KnownLoads{6.1e-4, {}}, KnownLoads{0, {3, 12, -4}}}) {
+    const UntouchedSkin* skin = mechanics_.Untouched(loads);
+    ASSERT_TRUE(skin != nullptr);
+    EXPECT_EQ(skin->loads.pressure_mpa, loads.pressure_mpa);
+    const Eigen::VectorXd expected_mm = Solved(loads);
+    EXPECT_LT(Largest(skin->markers_mm - expected_mm), 4e-3 * Largest(expected_mm) + 1e-3)
+        << loads.Stacked().transpose();
+    EXPECT_GT(Largest(expected_mm), 0.5);
+  }
+}
+
+TEST_P(SkinMechanicsTest, KnowsItsDerivatives) {
+  const KnownLoads at{4e-4, {3, -7, 2}};
+  const ByKnownLoads by_loads = mechanics_.Untouched(at)->markers_by_loads;
+  for (int k = 0; k < KnownLoads::kCount; ++k) {
+    const Vec4 step = Vec4::Unit(k) * (k == 0 ? 4e-5 : 0.5);
+    const Eigen::VectorXd difference_mm = Solved(KnownLoads::FromStacked(at.Stacked() + step)) -
+                                          Solved(KnownLoads::FromStacked(at.Stacked() - step));
+    const Eigen::VectorXd expected = difference_mm / (2 * step[k]);
+    EXPECT_LT((by_loads.col(k) - expected).norm(), 0.03 * expected.norm()) << k;
+  }
+}
+
+TEST_P(SkinMechanicsTest, RefusesLoadsBeyondAllMeasure) {
+  const double nan = std::nan("");
+  for (const KnownLoads& loads : {KnownLoads{nan, {}}, KnownLoads{0, {0, nan, 0}}, KnownLoads{1, {}},
+                                  KnownLoads{0, {1e5, 0, 0}}, KnownLoads{-1, {}}})
+    EXPECT_EQ(mechanics_.Untouched(loads), nullptr) << loads.Stacked().transpose();
+}
+
+// An arm that turns about all axes: what is kept is bounded, and what comes back is the same.
+TEST_P(SkinMechanicsTest, ForgetsAndFindsAgain) {
+  const KnownLoads first{2e-4, {9.8, 0, 0}};
+  const Eigen::VectorXd before_mm = mechanics_.Untouched(first)->markers_mm;
+  for (int i = 0; i < 30; ++i) {
+    const double a = 0.7 * i, b = 0.31 * i;
+    const Vec3 down = 9.8 * Vec3(std::cos(a) * std::cos(b), std::sin(a) * std::cos(b), std::sin(b));
+    ASSERT_TRUE(mechanics_.Untouched({0, down}) != nullptr) << i;
+  }
+  EXPECT_LT(Largest(mechanics_.Untouched(first)->markers_mm - before_mm), 1e-6);
+}
+
+// A model that does not say how heavy its skin is: as if it were weightless.
+TEST(WeightlessSkinTest, IsMovedByPressureAlone) {
+  LinkModel model = LoadLinkModel("cylinder").value();
+  model.density_kg_m3 = 0;
+  SkinMechanics mechanics(model);
+  EXPECT_TRUE(mechanics.Untouched({0, {0, -9.8, 0}})->markers_mm.isZero(1e-12));
+  EXPECT_TRUE(mechanics.Untouched({5e-4, {}})->markers_by_loads.rightCols<3>().isZero(0));
+}
+
+INSTANTIATE_TEST_SUITE_P(Skins, SkinMechanicsTest, ::testing::Values("cylinder", "barrel"));
+
+}  // namespace
+}  // namespace taclink
