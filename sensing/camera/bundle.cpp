@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <utility>
 
 namespace taclink {
 namespace {
@@ -157,20 +158,46 @@ class BuildCost final : public ceres::CostFunction {
   std::vector<Angle> angles_;
 };
 
-// A marker is where the model has it, within the mould's tolerance.
-class MouldCost final : public ceres::SizedCostFunction<3, 3> {
+// A marker is where the model has it, displaced by the modes, within the mould's tolerance. Blocks: its shift
+// and, if there are any, the modes' shares.
+class MouldCost final : public ceres::CostFunction {
  public:
-  explicit MouldCost(double sigma_mm) : per_sigma_(1 / sigma_mm) {}
+  MouldCost(double sigma_mm, Eigen::MatrixXd modes_mm)
+      : per_sigma_(1 / sigma_mm), modes_mm_(std::move(modes_mm)) {
+    set_num_residuals(3);
+    mutable_parameter_block_sizes()->push_back(3);
+    if (modes_mm_.cols() > 0) mutable_parameter_block_sizes()->push_back(static_cast<int>(modes_mm_.cols()));
+  }
   bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override {
-    for (int i = 0; i < 3; ++i) residuals[i] = per_sigma_ * blocks[0][i];
-    if (!jacobians || !jacobians[0]) return true;
-    Eigen::Map<Mat3> jacobian(jacobians[0]);
-    jacobian = per_sigma_ * Mat3::Identity();
+    const Eigen::Index modes = modes_mm_.cols();
+    Vec3 shift(blocks[0][0], blocks[0][1], blocks[0][2]);
+    if (modes > 0) shift -= modes_mm_ * Eigen::Map<const Eigen::VectorXd>(blocks[1], modes);
+    Eigen::Map<Vec3> residual(residuals);
+    residual = per_sigma_ * shift;
+    if (jacobians && jacobians[0]) Eigen::Map<Mat3>(jacobians[0], 3, 3) = per_sigma_ * Mat3::Identity();
+    if (jacobians && modes > 0 && jacobians[1])
+      Eigen::Map<RowMajor>(jacobians[1], 3, modes) = -per_sigma_ * modes_mm_;
     return true;
   }
 
  private:
   double per_sigma_;
+  Eigen::MatrixXd modes_mm_;
+};
+
+// Shares are of unit variance.
+class ShareCost final : public ceres::CostFunction {
+ public:
+  explicit ShareCost(int count) {
+    set_num_residuals(count);
+    mutable_parameter_block_sizes()->push_back(count);
+  }
+  bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override {
+    const int count = num_residuals();
+    std::copy_n(blocks[0], count, residuals);
+    if (jacobians && jacobians[0]) Eigen::Map<RowMajor>(jacobians[0], count, count).setIdentity();
+    return true;
+  }
 };
 
 class Adjustment {
@@ -183,6 +210,7 @@ class Adjustment {
       for (const BundleSample& s : camera.samples)
         shifts_.resize(std::max(shifts_.size(), static_cast<size_t>(s.marker) + 1), Vec3::Zero());
     }
+    shares_.resize(static_cast<size_t>(options.modes_mm.cols()), 0);
     for (View& view : views_) AddCamera(view);
     if (options.move_markers) AddMarkers();
   }
@@ -211,7 +239,8 @@ class Adjustment {
       result.cameras.push_back(view.projector.model());
     }
     result.marker_shift_mm = shifts_;
-    if (options_.with_covariance && summary.IsSolutionUsable()) result.covariance = Covariance();
+    result.mode_shares = Eigen::Map<const Eigen::VectorXd>(shares_.data(), options_.modes_mm.cols());
+    if (options_.with_covariance && summary.IsSolutionUsable()) WriteCovariances(result);
     return result;
   }
 
@@ -242,11 +271,21 @@ class Adjustment {
   void AddMarkers() {
     for (Vec3& shift : shifts_) {
       if (!problem_.HasParameterBlock(shift.data())) continue;
-      problem_.AddResidualBlock(new MouldCost(options_.tolerance.marker_mm), nullptr, shift.data());
+      const auto first = 3 * (&shift - shifts_.data());
+      if (!HasModes()) {
+        problem_.AddResidualBlock(new MouldCost(options_.tolerance.marker_mm, {}), nullptr, shift.data());
+        continue;
+      }
+      problem_.AddResidualBlock(
+          new MouldCost(options_.tolerance.marker_mm, options_.modes_mm.middleRows<3>(first)), nullptr,
+          shift.data(), shares_.data());
     }
+    if (HasModes())
+      problem_.AddResidualBlock(new ShareCost(static_cast<int>(shares_.size())), nullptr, shares_.data());
   }
+  bool HasModes() const { return options_.modes_mm.cols() > 0; }
 
-  Eigen::MatrixXd Covariance() {
+  void WriteCovariances(BundleResult& result) {
     ceres::Covariance::Options options;
     options.algorithm_type = ceres::SPARSE_QR;
     options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
@@ -259,10 +298,17 @@ class Adjustment {
       for (const double* other : blocks) pairs.emplace_back(other, view.block.data());
       rows += view.count;
     }
+    const bool has_modes = HasModes() && problem_.HasParameterBlock(shares_.data());
+    if (has_modes) pairs.emplace_back(shares_.data(), shares_.data());
     RowMajor scaled(rows, rows);
     if (!covariance.Compute(pairs, &problem_) || !covariance.GetCovarianceMatrix(blocks, scaled.data()))
-      return {};
-    return Unscaled(scaled);
+      return;
+    result.covariance = Unscaled(scaled);
+    if (!has_modes) return;
+    const auto modes = static_cast<Eigen::Index>(shares_.size());
+    RowMajor of_shares(modes, modes);
+    if (covariance.GetCovarianceBlock(shares_.data(), shares_.data(), of_shares.data()))
+      result.mode_covariance = of_shares;
   }
 
   // From the blocks' parameters to 13 a camera, in their own units.
@@ -282,6 +328,7 @@ class Adjustment {
   bool can_start_ = true;
   std::vector<View> views_;
   std::vector<Vec3> shifts_;
+  std::vector<double> shares_;  // of the modes
   UpdateViews callback_;
   ceres::Problem problem_;
   std::vector<ceres::ResidualBlockId> build_blocks_;

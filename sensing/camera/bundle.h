@@ -39,7 +39,10 @@ struct BundleCamera {
 struct BundleOptions {
   BuildTolerance tolerance = {};
   bool move_markers = true;  ///< false: they are where the model has them
-  double loss_width = 3;     ///< beyond so many sigmas a sample pulls less and less (Cauchy's loss)
+  /// Displacements that all markers have together, in shares of unit variance: stacked by marker number (3
+  /// rows each), a column for each. Empty: none. With `move_markers` only.
+  Eigen::MatrixXd modes_mm = {};
+  double loss_width = 3;  ///< beyond so many sigmas a sample pulls less and less (Cauchy's loss)
   int max_steps = 100;
   bool with_covariance = true;
 };
@@ -50,6 +53,8 @@ struct BundleResult {
   /// if not asked for, or if the parameters can't be told apart.
   Eigen::MatrixXd covariance;
   std::vector<Vec3> marker_shift_mm;  ///< by marker number; zero where none is seen
+  Eigen::VectorXd mode_shares;        ///< by column of the modes
+  Eigen::MatrixXd mode_covariance;    ///< of these; empty as `covariance`
   double cost = 0;                    ///< half the sum of the squared (and dulled) residuals over sigmas
   double tolerance_cost = 0;          ///< the part of it that says how far the cameras are off the model
   int steps = 0;

@@ -7,9 +7,13 @@
 
 #include "sensing/camera/camera_fit.h"
 #include "sensing/camera/rest_check.h"
+#include "sensing/core/median.h"
 
 namespace taclink {
 namespace {
+
+constexpr double kSigmaPerMedian = 1.4826;  // of a normal distribution's absolute values
+constexpr double kMisplacedSigmas = 4.5;
 
 constexpr int kLeastMarkers = 8;
 
@@ -31,8 +35,9 @@ CameraFitOptions FitOptions(const LinkModel& model, CameraId id, const Calibrati
   return {options.tolerance, options.lens.value_or(model.nominal_rig[id].lens.kind), options.domes};
 }
 
-Result<CameraFit> FitOne(const LinkModel& model, CameraId id, std::span<const MarkerObservation> rest,
+Result<CameraFit> FitOne(const RestShape& shape, CameraId id, std::span<const MarkerObservation> rest,
                          const CalibrationOptions& options) {
+  const LinkModel& model = shape.model();
   const std::string camera = std::string("the ") + Name(id) + " camera";
   const int usable = CountUsable(rest);
   if (usable < std::max<double>(kLeastMarkers, options.min_seen * model.markers.count())) {
@@ -40,7 +45,7 @@ Result<CameraFit> FitOne(const LinkModel& model, CameraId id, std::span<const Ma
                    std::to_string(model.markers.count()) +
                    " markers well: check light, focus and that the model is this link's");
   }
-  auto fit = FitCamera(model, id, rest, FitOptions(model, id, options));
+  auto fit = FitCamera(shape, id, rest, FitOptions(model, id, options));
   if (!fit) {
     return Refusal("no lens and place of " + camera +
                    " explain its picture: check that the model is this link's, and its nominal cameras");
@@ -49,7 +54,7 @@ Result<CameraFit> FitOne(const LinkModel& model, CameraId id, std::span<const Ma
 }
 
 // Residuals against the model's places of the markers.
-CameraCalibration Judge(const LinkModel& model, const CameraModel& camera, const CameraFit& fit,
+CameraCalibration Judge(const RestShape& shape, const CameraModel& camera, const CameraFit& fit,
                         std::span<const MarkerObservation> rest, const CalibrationOptions& options) {
   CameraCalibration result;
   result.camera = camera;
@@ -66,7 +71,7 @@ CameraCalibration Judge(const LinkModel& model, const CameraModel& camera, const
   for (size_t i = 0; i < rest.size(); ++i) {
     MarkerResidual& residual = result.residuals[i];
     const auto pixel =
-        projector.Project(SeenPoint(model, static_cast<int>(i), projector.center_in_link(), options.domes));
+        projector.Project(SeenPoint(shape, static_cast<int>(i), projector.center_in_link(), options.domes));
     if (residual.kind == MarkerResidual::Kind::kUnseen || !pixel) continue;
     residual.seen_px = rest[i].center_px;
     residual.residual_px = rest[i].center_px - *pixel;
@@ -165,9 +170,10 @@ CameraStep SigmasOf(const Eigen::MatrixXd& covariance, size_t camera) {
 }
 
 // Both together; the covariances grow by the misfit that each camera showed alone.
-Result<BundleResult> AdjustBoth(const LinkModel& model, const std::array<CameraFit, kCameraCount>& fits,
+Result<BundleResult> AdjustBoth(const RestShape& shape, const std::array<CameraFit, kCameraCount>& fits,
                                 const CalibrationOptions& options) {
-  BundleOptions bundle{.tolerance = options.tolerance};
+  const LinkModel& model = shape.model();
+  BundleOptions bundle{.tolerance = options.tolerance, .modes_mm = shape.errors_mm()};
   bundle.tolerance.marker_mm *= std::max(fits[0].misfit, fits[1].misfit);
   std::vector<BundleCamera> cameras;
   for (const CameraId id : kBothCameras) {
@@ -181,10 +187,10 @@ Result<BundleResult> AdjustBoth(const LinkModel& model, const std::array<CameraF
 }
 
 // Weighted least squares from the model's place, where one step does nearly all.
-std::optional<Vec3> Triangulate(const LinkModel& model, int marker, const CalibrationOptions& options,
+std::optional<Vec3> Triangulate(const RestShape& shape, int marker, const CalibrationOptions& options,
                                 const std::array<Projector, kCameraCount>& projectors,
                                 const LabelledMarkers& rest) {
-  const Vec3 start = model.RestMarker(marker);
+  const Vec3 start = shape.Marker(marker);
   Vec3 at = start;
   for (int step = 0; step < 4; ++step) {
     Mat3 normal = Mat3::Zero();
@@ -193,7 +199,7 @@ std::optional<Vec3> Triangulate(const LinkModel& model, int marker, const Calibr
       const Projector& projector = projectors[Index(id)];
       const MarkerObservation& one = rest.cameras[Index(id)][static_cast<size_t>(marker)];
       // A dome's look moves with it.
-      const Vec3 look = SeenPoint(model, marker, projector.center_in_link(), options.domes) - start;
+      const Vec3 look = SeenPoint(shape, marker, projector.center_in_link(), options.domes) - start;
       const auto seen = projector.ProjectWithJacobian(at + look);
       if (!seen) return std::nullopt;
       const Mat2 weight = (one.covariance_px2 + 0.01 * Mat2::Identity()).inverse();
@@ -207,24 +213,53 @@ std::optional<Vec3> Triangulate(const LinkModel& model, int marker, const Calibr
   return at;
 }
 
-void MeasureShifts(const LinkModel& model, const LabelledMarkers& rest, const CalibrationOptions& options,
-                   CalibrationSummary& summary) {
+void TriangulateShifts(const RestShape& shape, const LabelledMarkers& rest, const CalibrationOptions& options,
+                       CalibrationSummary& summary) {
   const std::array projectors = {Projector(summary.rig[CameraId::kTop]),
                                  Projector(summary.rig[CameraId::kBottom])};
-  const auto count = static_cast<size_t>(model.markers.count());
+  const auto count = static_cast<size_t>(shape.model().markers.count());
   summary.shifts_mm.assign(count, std::nullopt);
-  double r = 0, phi = 0, z = 0, all = 0;
   for (size_t i = 0; i < count; ++i) {
     const auto used = [&](CameraId id) {
       return summary.cameras[Index(id)].residuals[i].kind == MarkerResidual::Kind::kUsed;
     };
     if (!used(CameraId::kTop) || !used(CameraId::kBottom)) continue;
-    const auto at = Triangulate(model, static_cast<int>(i), options, projectors, rest);
-    if (!at) continue;
-    const Vec3 truth = model.RestMarker(static_cast<int>(i)), off = *at - truth;
-    summary.shifts_mm[i] = off;
+    const int marker = static_cast<int>(i);
+    if (const auto at = Triangulate(shape, marker, options, projectors, rest))
+      summary.shifts_mm[i] = *at - shape.Marker(marker);
+  }
+}
+
+// A marker that is half hidden, or whose spot touches its neighbor's, fits each camera alone within a pixel,
+// but the lines of sight meet elsewhere. The camera that sees it further off is not believed.
+void LeaveOutMisplaced(const CalibrationOptions& options, CalibrationSummary& summary) {
+  std::vector<double> sizes_mm;
+  for (const auto& shift : summary.shifts_mm)
+    if (shift) sizes_mm.push_back(shift->norm());
+  if (sizes_mm.empty()) return;
+  const double sigma_mm = std::max(options.tolerance.marker_mm, kSigmaPerMedian * Median(sizes_mm));
+  for (size_t i = 0; i < summary.shifts_mm.size(); ++i) {
+    if (!summary.shifts_mm[i] || summary.shifts_mm[i]->norm() <= kMisplacedSigmas * sigma_mm) continue;
+    summary.shifts_mm[i].reset();
+    auto& [top, bottom] = summary.cameras;
+    CameraCalibration& wrong =
+        top.residuals[i].residual_px.norm() > bottom.residuals[i].residual_px.norm() ? top : bottom;
+    wrong.residuals[i].kind = MarkerResidual::Kind::kOutlier;
+    --wrong.markers_used;
+    ++wrong.outliers;
+  }
+}
+
+void MeasureShifts(const RestShape& shape, const LabelledMarkers& rest, const CalibrationOptions& options,
+                   CalibrationSummary& summary) {
+  TriangulateShifts(shape, rest, options, summary);
+  LeaveOutMisplaced(options, summary);
+  double r = 0, phi = 0, z = 0, all = 0;
+  for (size_t i = 0; i < summary.shifts_mm.size(); ++i) {
+    if (!summary.shifts_mm[i]) continue;
+    const Vec3 truth = shape.Marker(static_cast<int>(i)), off = *summary.shifts_mm[i], at = truth + off;
     const double radius = truth.head<2>().norm();
-    r += std::pow(at->head<2>().norm() - radius, 2);
+    r += std::pow(at.head<2>().norm() - radius, 2);
     phi += std::pow((truth.x() * off.y() - truth.y() * off.x()) / radius, 2);
     z += off.z() * off.z();
     all += off.squaredNorm();
@@ -239,45 +274,48 @@ void MeasureShifts(const LinkModel& model, const LabelledMarkers& rest, const Ca
 
 }  // namespace
 
-Result<CameraCalibration> CalibrateCamera(const LinkModel& model, CameraId id,
+Result<CameraCalibration> CalibrateCamera(const RestShape& shape, CameraId id,
                                           std::span<const MarkerObservation> rest,
                                           const CalibrationOptions& options) {
-  auto fit = FitOne(model, id, rest, options);
+  auto fit = FitOne(shape, id, rest, options);
   if (!fit) return fit.error();
-  CameraCalibration result = Judge(model, fit->camera, *fit, rest, options);
+  CameraCalibration result = Judge(shape, fit->camera, *fit, rest, options);
   result.sigmas = SigmasOf(fit->bundle.covariance, 0);
-  if (auto good = CheckCamera(model, id, result, options); !good) return good.error();
+  if (auto good = CheckCamera(shape.model(), id, result, options); !good) return good.error();
   return result;
 }
 
-Result<CalibrationSummary> CalibrateFromRest(const LinkModel& model, const LabelledMarkers& rest,
+Result<CalibrationSummary> CalibrateFromRest(const RestShape& shape, const LabelledMarkers& rest,
                                              const CalibrationOptions& options) {
+  const LinkModel& model = shape.model();
   std::array<CameraFit, kCameraCount> fits;
   for (const CameraId id : kBothCameras) {
     Tell(options, 0.25 * static_cast<double>(Index(id)), std::string("fit the ") + Name(id) + " camera");
-    auto fit = FitOne(model, id, rest.cameras[Index(id)], options);
+    auto fit = FitOne(shape, id, rest.cameras[Index(id)], options);
     if (!fit) return fit.error();
     fits[Index(id)] = *std::move(fit);
   }
   Tell(options, 0.5, "adjust both cameras together");
-  auto bundle = AdjustBoth(model, fits, options);
+  auto bundle = AdjustBoth(shape, fits, options);
   if (!bundle) return bundle.error();
   Tell(options, 0.9, "check the result");
   CalibrationSummary summary;
   summary.covariance = bundle->covariance;
   summary.departure_cost = bundle->tolerance_cost;
+  summary.error_shares = bundle->mode_shares;
+  summary.error_covariance = bundle->mode_covariance;
   double squares = 0, used = 0;
   for (const CameraId id : kBothCameras) {
     CameraCalibration& one = summary.cameras[Index(id)];
-    one = Judge(model, bundle->cameras[Index(id)], fits[Index(id)], rest.cameras[Index(id)], options);
+    one = Judge(shape, bundle->cameras[Index(id)], fits[Index(id)], rest.cameras[Index(id)], options);
     one.sigmas = SigmasOf(bundle->covariance, Index(id));
     summary.rig[id] = one.camera;
     squares += one.rms_px * one.rms_px * one.markers_used;
     used += one.markers_used;
   }
   summary.rms_px = std::sqrt(squares / used);
-  MeasureShifts(model, rest, options, summary);
-  if (const auto dent = FindDent(model, summary, options.max_dent_mm)) return Refusal(Describe(model, *dent));
+  MeasureShifts(shape, rest, options, summary);
+  if (const auto dent = FindDent(shape, summary, options.max_dent_mm)) return Refusal(Describe(model, *dent));
   for (const CameraId id : kBothCameras) {
     if (auto good = CheckCamera(model, id, summary.cameras[Index(id)], options); !good) return good.error();
   }

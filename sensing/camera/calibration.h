@@ -10,6 +10,7 @@
 
 #include "sensing/camera/bundle.h"
 #include "sensing/camera/projection.h"
+#include "sensing/camera/rest_shape.h"
 #include "sensing/core/camera_model.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
@@ -69,6 +70,9 @@ struct CalibrationSummary {
   std::array<CameraCalibration, kCameraCount> cameras = {};
   /// 26 x 26, of the top camera's CameraStep and then the bottom one's; empty: can't be told.
   Eigen::MatrixXd covariance;
+  /// Shares of the rest shape's errors that the images show, and their covariance.
+  Eigen::VectorXd error_shares;
+  Eigen::MatrixXd error_covariance;
   /// Triangulated less the model's, by marker; none: not used by both cameras.
   std::vector<std::optional<Vec3>> shifts_mm;
   int pairs = 1;  ///< of rest pictures, averaged
@@ -80,13 +84,13 @@ struct CalibrationSummary {
 /// closed form of the thesis (see FindStarts); then a robust adjustment of all parameters. Picture size is
 /// the nominal one's. Errors: kInvalidArgument (too few markers, residual too large, far off the model) with
 /// the reason.
-Result<CameraCalibration> CalibrateCamera(const LinkModel& model, CameraId id,
+Result<CameraCalibration> CalibrateCamera(const RestShape& shape, CameraId id,
                                           std::span<const MarkerObservation> rest,
                                           const CalibrationOptions& options = {});
 
 /// Both cameras, from the labelled markers of a rest pair: each alone first, then both and the markers'
 /// places within the mould's tolerance in one bundle adjustment. Errors as above, and a skin that is touched.
-Result<CalibrationSummary> CalibrateFromRest(const LinkModel& model, const LabelledMarkers& rest,
+Result<CalibrationSummary> CalibrateFromRest(const RestShape& shape, const LabelledMarkers& rest,
                                              const CalibrationOptions& options = {});
 
 /// Calibration files (YAML, `taclink_calibration: 2`; 1 is read too), for links of that model only. Errors:

@@ -25,15 +25,15 @@ bool Usable(const MarkerObservation& one) {
   return one.seen && one.sigma_px() <= kMaxSigmaPx && one.center_px.allFinite();
 }
 
-std::vector<BundleSample> Collect(const LinkModel& model, const Vec3& camera_mm, bool domes,
-                                  std::span<const MarkerObservation> rest) {
+std::vector<BundleSample> Collect(const RestShape& rest, const Vec3& camera_mm, bool domes,
+                                  std::span<const MarkerObservation> seen) {
   std::vector<BundleSample> samples;
-  for (size_t i = 0; i < rest.size(); ++i) {
-    if (!Usable(rest[i])) continue;
+  for (size_t i = 0; i < seen.size(); ++i) {
+    if (!Usable(seen[i])) continue;
     const int marker = static_cast<int>(i);
     const Mat2 floor = kSigmaFloorPx * kSigmaFloorPx * Mat2::Identity();
-    samples.push_back({marker, SeenPoint(model, marker, camera_mm, domes), rest[i].center_px,
-                       rest[i].covariance_px2 + floor});
+    samples.push_back({marker, SeenPoint(rest, marker, camera_mm, domes), seen[i].center_px,
+                       seen[i].covariance_px2 + floor});
   }
   return samples;
 }
@@ -107,24 +107,24 @@ std::optional<CameraFit> FollowStart(const CameraModel& start, const CameraModel
 
 }  // namespace
 
-Vec3 SeenPoint(const LinkModel& model, int marker, const Vec3& camera_mm, bool domes) {
-  Vec3 center = model.RestMarker(marker);
+Vec3 SeenPoint(const RestShape& rest, int marker, const Vec3& camera_mm, bool domes) {
+  const LinkModel& model = rest.model();
+  const Vec3 center = rest.Marker(marker);
   const double rise = model.markers.center_depth_mm - model.thickness_mm;
   if (!domes || rise <= 0) return center;
-  const double z = model.markers.rings_z_mm[static_cast<size_t>(model.RingOf(marker))];
-  const Vec3 inward = -model.OutwardNormal(model.PathAngle(model.PathOf(marker)), z);
-  return SeenOfDome(center, inward, rise, camera_mm);
+  return SeenOfDome(center, rest.Inward(marker), rise, camera_mm);
 }
 
 int CountUsable(std::span<const MarkerObservation> rest) {
   return static_cast<int>(std::count_if(rest.begin(), rest.end(), Usable));
 }
 
-std::optional<CameraFit> FitCamera(const LinkModel& model, CameraId id,
-                                   std::span<const MarkerObservation> rest, const CameraFitOptions& options) {
+std::optional<CameraFit> FitCamera(const RestShape& rest, CameraId id,
+                                   std::span<const MarkerObservation> seen, const CameraFitOptions& options) {
+  const LinkModel& model = rest.model();
   const CameraModel& nominal = model.nominal_rig[id];
   Vec3 camera_mm = nominal.camera_from_link.Inverse().translation;
-  std::vector<BundleSample> samples = Collect(model, camera_mm, options.domes, rest);
+  std::vector<BundleSample> samples = Collect(rest, camera_mm, options.domes, seen);
   const auto [closed_form, as_designed] = FindStarts(model, id, samples, kStartPlaceMm);
   std::optional<CameraFit> best;
   for (const CameraModel& start : {closed_form, as_designed}) {
@@ -139,7 +139,7 @@ std::optional<CameraFit> FitCamera(const LinkModel& model, CameraId id,
   if (!best || !options.domes) return best;
   // Once more: what is seen of a dome depends on where the camera is.
   camera_mm = best->camera.camera_from_link.Inverse().translation;
-  samples = Collect(model, camera_mm, true, rest);
+  samples = Collect(rest, camera_mm, true, seen);
   return FollowStart(best->camera, nominal, samples, options);
 }
 

@@ -20,11 +20,12 @@ constexpr double kNoMouldMm = 1.2;
 
 // How far each marker lies further in than the model has it, if it moved along the radius only: least squares
 // over the pictures that show it. None: unseen.
-std::vector<std::optional<double>> InwardShifts(const LinkModel& model, const CalibrationSummary& summary) {
+std::vector<std::optional<double>> InwardShifts(const RestShape& shape, const CalibrationSummary& summary) {
+  const LinkModel& model = shape.model();
   std::vector<std::optional<double>> inward(static_cast<size_t>(model.markers.count()));
   const Projector top(summary.rig[CameraId::kTop]), bottom(summary.rig[CameraId::kBottom]);
   for (size_t i = 0; i < inward.size(); ++i) {
-    const Vec3 p = model.RestMarker(static_cast<int>(i));
+    const Vec3 p = shape.Marker(static_cast<int>(i));
     const Vec3 in(-p.x() / p.head<2>().norm(), -p.y() / p.head<2>().norm(), 0);
     double along = 0, squares = 0;
     for (const CameraId id : kBothCameras) {
@@ -76,8 +77,9 @@ std::optional<double> Patch(const LinkModel& model, const std::vector<std::optio
 
 }  // namespace
 
-std::optional<Dent> FindDent(const LinkModel& model, const CalibrationSummary& summary, double limit_mm) {
-  std::vector<std::optional<double>> inward = InwardShifts(model, summary);
+std::optional<Dent> FindDent(const RestShape& shape, const CalibrationSummary& summary, double limit_mm) {
+  const LinkModel& model = shape.model();
+  std::vector<std::optional<double>> inward = InwardShifts(shape, summary);
   SubtractRings(model, inward);
   std::vector<double> sizes;
   std::vector<std::pair<int, double>> patches;
@@ -99,8 +101,7 @@ std::optional<Dent> FindDent(const LinkModel& model, const CalibrationSummary& s
   return Dent{worst->first, static_cast<int>(moved), worst->second};
 }
 
-CalibrationSummary ResidualsOf(const LinkModel& model, const StereoRig& rig, const LabelledMarkers& rest,
-                               const Eigen::VectorXd& inflation_mm) {
+CalibrationSummary ResidualsOf(const RestShape& shape, const StereoRig& rig, const LabelledMarkers& rest) {
   CalibrationSummary summary;
   summary.rig = rig;
   double squares = 0;
@@ -108,10 +109,9 @@ CalibrationSummary ResidualsOf(const LinkModel& model, const StereoRig& rig, con
   for (const CameraId id : kBothCameras) {
     const Projector projector(rig[id]);
     auto& residuals = summary.cameras[Index(id)].residuals;
-    for (int m = 0; m < model.markers.count(); ++m) {
+    for (int m = 0; m < shape.model().markers.count(); ++m) {
       const MarkerObservation& seen = rest.cameras[Index(id)][static_cast<size_t>(m)];
-      const auto expected = projector.Project(SeenPoint(model, m, projector.center_in_link(), true) +
-                                              inflation_mm.segment<3>(3 * m));
+      const auto expected = projector.Project(SeenPoint(shape, m, projector.center_in_link(), true));
       residuals.emplace_back();
       if (!seen.seen || !expected) continue;
       residuals.back() = {MarkerResidual::Kind::kUsed, seen.center_px, seen.center_px - *expected};

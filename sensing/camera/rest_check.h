@@ -18,12 +18,10 @@ struct Dent {
 /// Looks for a patch whose markers lie further in (or out) than `limit_mm`, and stand out from the rest of
 /// the skin. Noise and a mould's errors differ from marker to marker; a touch moves neighbours alike. Markers
 /// left out of the fit count as well, by their residuals.
-std::optional<Dent> FindDent(const LinkModel& model, const CalibrationSummary& summary, double limit_mm);
+std::optional<Dent> FindDent(const RestShape& shape, const CalibrationSummary& summary, double limit_mm);
 
-/// Residuals and their RMS where the cameras were known before these pictures, of a skin that pressure moves
-/// by `inflation_mm` (stacked markers); no more of the summary is set.
-CalibrationSummary ResidualsOf(const LinkModel& model, const StereoRig& rig, const LabelledMarkers& rest,
-                               const Eigen::VectorXd& inflation_mm);
+/// Residuals and their RMS where the cameras were known before these images; no more of the summary is set.
+CalibrationSummary ResidualsOf(const RestShape& shape, const StereoRig& rig, const LabelledMarkers& rest);
 
 /// What a person should know and do.
 std::string Describe(const LinkModel& model, const Dent& dent);

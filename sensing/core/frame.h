@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sensing/core/camera_model.h"
+#include "sensing/core/geometry.h"
 
 namespace taclink {
 
@@ -66,6 +67,12 @@ inline double ExactInPascals(double mpa) {
   return std::ldexp(std::round(std::ldexp(mpa, 40)), -40);
 }
 
+/// Gravity less the link's acceleration, link frame, as it is known at a moment.
+struct SpecificForceReading {
+  Vec3 mps2 = Vec3::Zero();
+  Mat3 covariance = Mat3::Zero();  ///< (m/s^2)^2; zero: it counts as exact
+};
+
 struct LinkState;
 
 /// What a link's cameras saw at one moment.
@@ -75,6 +82,8 @@ struct StereoFrame {
   RawPictures images;
   std::optional<double> pressure_mpa;  ///< gauge pressure inside the skin at that time; none: not measured
   PressureReport pressure;
+  /// None: the link never moves, so that its weight is the same in all frames.
+  std::optional<SpecificForceReading> specific_force;
   /// From a log: what was found then, in place of pictures; null: from cameras.
   std::shared_ptr<const LinkState> recorded = nullptr;
 };

@@ -10,6 +10,8 @@ namespace taclink {
 using Vec4 = Eigen::Vector4d;
 using Mat4 = Eigen::Matrix4d;
 
+inline constexpr double kStandardGravity = 9.80665;  ///< m/s^2
+
 /// What acts on a whole skin and is measured by other means than its shape: the gauge pressure inside, and
 /// the specific force, which is gravity less the link's acceleration (link frame; at rest it points to where
 /// things fall).
@@ -33,6 +35,12 @@ struct MeasuredLoads {
   Mat3 specific_force_covariance = Mat3::Zero();  ///< (m/s^2)^2; zero: it is taken as exact
 
   KnownLoads Loads() const { return {pressure_mpa, specific_force_mps2}; }
+  /// Of a link that rests in any attitude: gravity of any direction, so that each component has a third of
+  /// its square.
+  void ForgetAttitude() {
+    specific_force_mps2.setZero();
+    specific_force_covariance = kStandardGravity * kStandardGravity / 3 * Mat3::Identity();
+  }
 };
 
 }  // namespace taclink

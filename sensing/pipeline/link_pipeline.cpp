@@ -71,6 +71,7 @@ struct LinkPipeline::Stages {
   std::string last_refusal;                            // of these pairs, while more are taken
   bool calibrates = false;                             // the cameras are told from them
   BaselineOrigin rest_origin = BaselineOrigin::kNone;  // of what is being taken
+  size_t refusals = 0;                                 // of these pairs
   int64_t refused_ns = 0, wait_ns = 0;  // exposure of the pair last refused; until the next is tried
   // Made when the rest pose is known.
   std::optional<CalibrationSummary> calibration;
@@ -134,6 +135,7 @@ struct LinkPipeline::Stages {
     rest_progress = {.taken = 0, .wanted = pairs, .refusal = {}};
     last_refusal.clear();
     calibrates = !rig;
+    refusals = 0;
     wait_ns = 0;
   }
 
@@ -168,14 +170,8 @@ struct LinkPipeline::Stages {
   }
 
   // A pair before the baseline is known.
-  void TakeRest(const FrameTimes& times, const MeasuredLoads& loads, LinkState& state) {
+  void TakeRest(const StereoFrame& frame, const MeasuredLoads& loads, LinkState& state) {
     Forget(state);
-    const auto untouched = estimator->UntouchedAt(loads.Loads());
-    if (!untouched)
-      return SetStatus(
-          state, LinkStatus::kCalibrating,
-          "no skin of this model is stable under the pressure that is told; check the pressure and "
-          "the model's material");
     if (const auto& trouble = camera_pictures.trouble())
       return SetStatus(state, LinkStatus::kCalibrating, trouble->text);
     rest_loads.Add(loads);
@@ -185,16 +181,19 @@ struct LinkPipeline::Stages {
       rest_progress.taken = 0;
       return SetStatus(state, LinkStatus::kCalibrating, trouble);
     }
-    const auto complete = rest->Add(detections, pictures, *untouched);
+    const auto complete =
+        rest->Add(detections, pictures, RestAlternatives(rest_loads.mean(), NeverMoves(frame)),
+                  [this](const MeasuredLoads& at) { return estimator->RestShapeUnder(at); });
     rest_progress.taken = rest->taken();
     rest_progress.refusal = complete ? std::nullopt : std::optional(complete.error());
     if (!complete) {
       if (calibrates) rest_progress.refusal->message += CalibrationAdvice(loads);
       last_refusal = rest_progress.refusal->message;
       rest_loads.Clear();
+      ++refusals;
       const bool begins_again = rest->taken() > 0;
       if (begins_again) rest_loads.Add(loads);
-      refused_ns = times.exposure_monotonic_ns;
+      refused_ns = frame.times.exposure_monotonic_ns;
       wait_ns = begins_again ? 0 : std::clamp(2 * wait_ns, kFirstWaitNs, kLongestWaitNs);
       return SetStatus(state, LinkStatus::kCalibrating, last_refusal);
     }
@@ -202,19 +201,54 @@ struct LinkPipeline::Stages {
     if (!last_refusal.empty()) taking = "taking the rest shape again. Before: " + last_refusal;
     SetStatus(state, LinkStatus::kCalibrating, std::move(taking));
     if (!*complete) return;
-    calibration = rest->calibration();
+    BeginMeasurement(*rest->result(), frame);
+    rest.reset();
+  }
+
+  // Of a link that never moves nobody need tell the attitude: where its images are not explained without
+  // weight, they tell it. Of an unknown one, each refusal has another guess tried: all of them would keep
+  // the link busy for 10 s.
+  std::vector<MeasuredLoads> RestAlternatives(const MeasuredLoads& measured, bool never_moves) const {
+    MeasuredLoads any = measured;
+    if (never_moves) any.ForgetAttitude();
+    const std::vector<MeasuredLoads> guesses = RestGuesses(any);
+    const MeasuredLoads& next = guesses[refusals % guesses.size()];
+    if (refusals == 0 && !never_moves) return {measured};
+    return {measured, next};
+  }
+
+  void BeginMeasurement(const RestResult& found, const StereoFrame& frame) {
+    calibration = found.calibration;
     acquirer.emplace(model, calibration->rig);
     tracker.emplace(model, calibration->rig, options.tracking);
-    motion.emplace(model, calibration->rig, rest->noise_px());
+    motion.emplace(model, calibration->rig, found.noise_px);
     CameraEvidenceOptions cameras;
-    cameras.camera_sigma_px = std::max(cameras.camera_sigma_px, rest->noise_px());
-    cameras.rest_sigma_px = rest->noise_px() / std::sqrt(std::max(1, rest_progress.wanted));
-    skin.emplace(model, *calibration, cameras, rest->noise_px());
-    const MeasuredLoads mean = rest_loads.mean();
-    skin->SetBaseline(rest->markers(), mean, estimator->UntouchedAt(mean.Loads()).value_or(*untouched));
-    keeper.Take(rest_origin, mean.pressure_mpa, times, clock);
+    cameras.camera_sigma_px = std::max(cameras.camera_sigma_px, found.noise_px);
+    cameras.rest_sigma_px = found.noise_px / std::sqrt(std::max(1, rest_progress.wanted));
+    skin.emplace(model, *calibration, cameras, found.noise_px);
+    MeasuredLoads loads = found.loads;
+    // Whatever it is, it stays, and is no difference to any frame.
+    if (NeverMoves(frame)) loads.specific_force_covariance.setZero();
+    skin->SetBaseline(found.markers, loads, *estimator->UntouchedAt(loads.Loads()));
+    keeper.Take(rest_origin, loads.pressure_mpa, frame.times, clock);
     predicted_mm.clear();
-    rest.reset();
+  }
+
+  // Nobody tells the specific force: the link keeps the attitude in which its rest images were taken.
+  static bool NeverMoves(const StereoFrame& frame) { return !frame.specific_force; }
+
+  MeasuredLoads MeasuredAt(const StereoFrame& frame) const {
+    MeasuredLoads measured{
+        .pressure_mpa = frame.pressure.stale ? frame.pressure.mpa
+                                             : frame.pressure_mpa.value_or(options.pressure_mpa.value_or(0)),
+        .pressure_sigma_mpa = options.pressure_sigma_mpa.value_or(PressureSigma(frame.pressure.origin))};
+    if (frame.specific_force) {
+      measured.specific_force_mps2 = frame.specific_force->mps2;
+      measured.specific_force_covariance = frame.specific_force->covariance;
+    } else if (skin && !rest) {
+      measured.specific_force_mps2 = skin->baseline_loads().specific_force_mps2;
+    }
+    return measured;
   }
 
   // Labels that contradict the shape are no labels.
@@ -328,10 +362,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.pressure = frame.pressure;
   state.stage_ms = {};
   const bool stale = frame.pressure.stale;
-  MeasuredLoads told{
-      .pressure_mpa =
-          stale ? frame.pressure.mpa : frame.pressure_mpa.value_or(s.options.pressure_mpa.value_or(0)),
-      .pressure_sigma_mpa = s.options.pressure_sigma_mpa.value_or(PressureSigma(frame.pressure.origin))};
+  MeasuredLoads told = s.MeasuredAt(frame);
   // A sensor that fell silent, or none at all: the shape tells the pressure.
   const bool is_told = !stale && (frame.pressure_mpa || s.options.pressure_mpa ||
                                   frame.pressure.origin != PressureOrigin::kNone);
@@ -349,7 +380,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });
   if (s.rest) {
     if (stale) return s.WaitForPressure(state);
-    s.TakeRest(frame.times, told, state);
+    s.TakeRest(frame, told, state);
     return;
   }
   timed(state.stage_ms.register_, [&] { s.Label(state); });

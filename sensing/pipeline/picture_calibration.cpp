@@ -8,21 +8,19 @@
 #include "sensing/markers/detect/detector.h"
 #include "sensing/markers/label/rest_labels.h"
 #include "sensing/pipeline/rest_match.h"
+#include "sensing/pipeline/rest_pose.h"
 
 namespace taclink {
 namespace {
 
-using PairDetections = std::array<Detections, kCameraCount>;
-
-constexpr double kScatteredPx = 1,
-                 kScatteredFraction = 0.03;  // more markers that scatter more: the skin moved
+constexpr const char* kRefused = "calibration refused: ";
 // Swapped pictures that fit are refused if they put the cameras nearer to the nominal ones by this much
 // (difference of half the squared distance in tolerances).
 constexpr double kSwapMargin = 6;
 constexpr double kSwapDoubt = 12;  // stands for a pair that does not fit as given
 
 Error Refusal(const std::string& what) {
-  return {ErrorCode::kInvalidArgument, "calibration refused: " + what};
+  return {ErrorCode::kInvalidArgument, kRefused + what};
 }
 
 Result<void> CheckSize(const LinkModel& model, CameraId id, const cv::Mat& picture) {
@@ -47,99 +45,41 @@ Result<SettledCamera> Settle(const LinkModel& model, CameraId id, Detections det
   return *std::move(settled);
 }
 
-// The mean of every marker that more than half of the pairs show.
-class RestMean {
- public:
-  explicit RestMean(const LinkModel& model) {
-    for (auto& camera : sums_) camera.resize(static_cast<size_t>(model.markers.count()));
+Result<RestResult> Calibrate(const LinkModel& model, const std::vector<DetectionPair>& pairs,
+                             const RestPictures& first_pair, const RestConditions& rest,
+                             const CalibrationOptions& options) {
+  RestPose pose(model, {}, static_cast<int>(pairs.size()), options);
+  const std::vector<MeasuredLoads> guesses = RestGuesses(rest.loads);
+  Result<bool> complete = false;
+  for (const DetectionPair& pair : pairs) {
+    complete = pose.Add(pair, first_pair, guesses, rest.shape_at);
+    if (complete) continue;
+    const std::string& message = complete.error().message;
+    return message.starts_with(kRefused) ? complete.error() : Refusal(message);
   }
-
-  void Add(CameraId id, const std::vector<MarkerObservation>& markers) {
-    for (size_t i = 0; i < markers.size(); ++i) {
-      if (!markers[i].seen) continue;
-      Sum& sum = sums_[Index(id)][i];
-      ++sum.count;
-      sum.center += markers[i].center_px;
-      sum.squares += markers[i].center_px.squaredNorm();
-      sum.covariance += markers[i].covariance_px2;
-    }
-  }
-
-  LabelledMarkers Mean(int pairs) const {
-    LabelledMarkers mean;
-    for (size_t c = 0; c < kCameraCount; ++c) {
-      for (const Sum& sum : sums_[c]) {
-        const double n = std::max(1, sum.count);
-        mean.cameras[c].push_back({2 * sum.count > pairs, sum.center / n, sum.covariance / (n * n)});
-      }
-    }
-    return mean;
-  }
-
-  /// Whether more markers moved than noise explains.
-  bool Moved() const {
-    int repeated = 0, moved = 0;
-    for (const auto& camera : sums_) {
-      for (const Sum& sum : camera) {
-        if (sum.count < 2) continue;
-        const double n = sum.count;
-        ++repeated;
-        moved += (sum.squares - sum.center.squaredNorm() / n) / (2 * (n - 1)) > kScatteredPx * kScatteredPx
-                     ? 1
-                     : 0;
-      }
-    }
-    return moved > kScatteredFraction * repeated;
-  }
-
- private:
-  struct Sum {
-    int count = 0;
-    Vec2 center = Vec2::Zero();
-    double squares = 0;
-    Mat2 covariance = Mat2::Zero();
-  };
-  std::array<std::vector<Sum>, kCameraCount> sums_;
-};
-
-Result<CalibrationSummary> Calibrate(const LinkModel& model, const std::vector<PairDetections>& pairs,
-                                     const RestPictures& first_pair, const CalibrationOptions& options) {
-  std::array<RestMatch, kCameraCount> first;
-  RestMean mean(model);
-  for (const CameraId id : kBothCameras) {
-    auto settled = Settle(model, id, pairs.front()[Index(id)], first_pair[Index(id)], options);
-    if (!settled) return settled.error();
-    mean.Add(id, settled->match.markers);
-    for (size_t i = 1; i < pairs.size(); ++i)
-      mean.Add(id, MatchRestPicture(model, settled->camera, pairs[i][Index(id)], options.domes).markers);
-    first[Index(id)] = std::move(settled->match);
-  }
-  if (const std::string trouble = GridTrouble(model, first); !trouble.empty())
-    return Refusal(trouble + ": it is not this link's model, or something touches the skin");
-  if (mean.Moved()) return Refusal("the skin moved between the pairs of pictures; do not touch it");
-  auto summary = CalibrateFromRest(model, mean.Mean(static_cast<int>(pairs.size())), options);
-  if (summary) summary->pairs = static_cast<int>(pairs.size());
-  return summary;
+  return *pose.result();
 }
 
 // True if the pictures explain the model better the other way round.
-bool LookSwapped(const LinkModel& model, std::vector<PairDetections> pairs, RestPictures first_pair,
-                 const Result<CalibrationSummary>& as_given, CalibrationOptions options) {
+bool LookSwapped(const LinkModel& model, std::vector<DetectionPair> pairs, RestPictures first_pair,
+                 const Result<RestResult>& as_given, RestConditions rest, CalibrationOptions options) {
   for (auto& pair : pairs) std::swap(pair[0], pair[1]);
   std::swap(first_pair[0], first_pair[1]);
   options.progress = nullptr;
-  const auto swapped = Calibrate(model, pairs, first_pair, options);
+  if (as_given) rest.loads = as_given->loads;
+  const auto swapped = Calibrate(model, pairs, first_pair, rest, options);
   if (!swapped) return false;
-  return swapped->departure_cost + kSwapMargin < (as_given ? as_given->departure_cost : kSwapDoubt);
+  return swapped->calibration.departure_cost + kSwapMargin <
+         (as_given ? as_given->calibration.departure_cost : kSwapDoubt);
 }
 
 }  // namespace
 
-Result<CalibrationSummary> CalibrateFromPictures(const LinkModel& model, std::span<const RestPictures> pairs,
-                                                 const CalibrationOptions& options) {
+Result<RestResult> CalibrateFromPictures(const LinkModel& model, std::span<const RestPictures> pairs,
+                                         const RestConditions& rest, const CalibrationOptions& options) {
   if (pairs.empty()) return Refusal("no rest pictures given");
   MarkerDetector detector;
-  std::vector<PairDetections> detections(pairs.size());
+  std::vector<DetectionPair> detections(pairs.size());
   for (size_t i = 0; i < pairs.size(); ++i) {
     if (options.progress) {
       options.progress(
@@ -158,9 +98,9 @@ Result<CalibrationSummary> CalibrateFromPictures(const LinkModel& model, std::sp
       options.progress({0.3 + 0.6 * one.done, one.step});
     };
   }
-  auto result = Calibrate(model, detections, pairs.front(), rest_of_way);
+  auto result = Calibrate(model, detections, pairs.front(), rest, rest_of_way);
   if (options.progress) options.progress({0.9, "try the pictures the other way round"});
-  if (LookSwapped(model, detections, pairs.front(), result, options)) {
+  if (LookSwapped(model, detections, pairs.front(), result, rest, options)) {
     return Refusal(
         "the pictures look swapped: they fit the model with top as bottom and bottom as top; give them the "
         "other "
@@ -168,6 +108,15 @@ Result<CalibrationSummary> CalibrateFromPictures(const LinkModel& model, std::sp
   }
   if (options.progress) options.progress({1, "done"});
   return result;
+}
+
+Result<CalibrationSummary> CalibrateFromPictures(const LinkModel& model, std::span<const RestPictures> pairs,
+                                                 const CalibrationOptions& options) {
+  const RestConditions weightless{.loads = {},
+                                  .shape_at = [&](const MeasuredLoads&) { return RestShape(model); }};
+  auto result = CalibrateFromPictures(model, pairs, weightless, options);
+  if (!result) return result.error();
+  return std::move(result->calibration);
 }
 
 Result<CameraCalibration> CalibrateFromPicture(const LinkModel& model, CameraId id, const cv::Mat& picture,

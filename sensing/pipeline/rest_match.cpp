@@ -100,18 +100,18 @@ bool SameLabels(const std::vector<MarkerObservation>& a, const std::vector<Marke
   });
 }
 
-// `score`: how many markers the picture shows, less for a camera far off the nominal one.
-std::optional<SettledCamera> SettleFrom(const LinkModel& model, CameraId id,
+std::optional<SettledCamera> SettleFrom(const RestShape& shape, CameraId id,
                                         std::vector<MarkerObservation> labels, const Detections& detections,
-                                        bool domes, double& score) {
+                                        bool domes) {
+  const LinkModel& model = shape.model();
   const CameraFitOptions options{{}, model.nominal_rig[id].lens.kind, domes};
   std::optional<SettledCamera> settled;
   for (int turn = 0; turn < kMaxTurns; ++turn) {
     if (CountUsable(labels) < model.markers.count() / 4) return std::nullopt;
-    const auto fit = FitCamera(model, id, labels, options);
+    const auto fit = FitCamera(shape, id, labels, options);
     if (!fit) return settled;
-    settled = {fit->camera, MatchRestPicture(model, fit->camera, detections, domes)};
-    score = CountUsable(settled->match.markers) - kMarkersPerDeparture * fit->bundle.tolerance_cost;
+    settled = {fit->camera, MatchRestPicture(shape, fit->camera, detections, domes)};
+    settled->score = CountUsable(settled->match.markers) - kMarkersPerDeparture * fit->bundle.tolerance_cost;
     if (SameLabels(labels, settled->match.markers)) break;
     labels = settled->match.markers;
   }
@@ -120,14 +120,15 @@ std::optional<SettledCamera> SettleFrom(const LinkModel& model, CameraId id,
 
 }  // namespace
 
-RestMatch MatchRestPicture(const LinkModel& model, const CameraModel& camera, const Detections& detections,
+RestMatch MatchRestPicture(const RestShape& shape, const CameraModel& camera, const Detections& detections,
                            bool domes) {
+  const LinkModel& model = shape.model();
   RestMatch match;
   match.markers.resize(static_cast<size_t>(model.markers.count()));
   const Projector projector(camera);
   std::vector<std::optional<Vec2>> expected, spots;
   for (int m = 0; m < model.markers.count(); ++m)
-    expected.push_back(projector.Project(SeenPoint(model, m, projector.center_in_link(), domes)));
+    expected.push_back(projector.Project(SeenPoint(shape, m, projector.center_in_link(), domes)));
   for (const Detection& d : detections) spots.emplace_back(d.center_px);
   std::vector<bool> taken(detections.size(), false);
   for (size_t k = 0; k < detections.size(); ++k) {
@@ -151,17 +152,13 @@ RestMatch MatchRestPicture(const LinkModel& model, const CameraModel& camera, co
   return match;
 }
 
-std::optional<SettledCamera> SettleCamera(const LinkModel& model, CameraId id,
+std::optional<SettledCamera> SettleCamera(const RestShape& shape, CameraId id,
                                           std::span<const MarkerObservation> labels,
                                           const Detections& detections, bool domes) {
   std::optional<SettledCamera> best;
-  double best_score = 0;
   for (const int rings : {0, -1, 1}) {
-    double score = 0;
-    auto settled = SettleFrom(model, id, Shifted(model, labels, rings), detections, domes, score);
-    if (!settled || (best && score <= best_score)) continue;
-    best = std::move(settled);
-    best_score = score;
+    auto settled = SettleFrom(shape, id, Shifted(shape.model(), labels, rings), detections, domes);
+    if (settled && (!best || settled->score > best->score)) best = std::move(settled);
   }
   return best;
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "sensing/camera/rest_shape.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/markers.h"
 
@@ -20,7 +21,7 @@ struct RestMatch {
 
 /// A spot is a marker's if each is the other's nearest and the spot is closer than a third of the way to the
 /// marker's nearest neighbour in the picture. What is left is matched alike, up to that neighbour.
-RestMatch MatchRestPicture(const LinkModel& model, const CameraModel& camera, const Detections& detections,
+RestMatch MatchRestPicture(const RestShape& shape, const CameraModel& camera, const Detections& detections,
                            bool domes);
 
 /// The camera that a rest picture shows, and the labels by it. Fits the camera to labels and the labels to
@@ -29,8 +30,9 @@ RestMatch MatchRestPicture(const LinkModel& model, const CameraModel& camera, co
 struct SettledCamera {
   CameraModel camera;
   RestMatch match;
+  double score = 0;  ///< how many markers the image shows, less for a camera far off the nominal one
 };
-std::optional<SettledCamera> SettleCamera(const LinkModel& model, CameraId id,
+std::optional<SettledCamera> SettleCamera(const RestShape& shape, CameraId id,
                                           std::span<const MarkerObservation> labels,
                                           const Detections& detections, bool domes);
 

@@ -6,6 +6,7 @@
 
 #include "sensing/contact/contact_writer.h"
 #include "sensing/core/median.h"
+#include "sensing/pipeline/rest_loads.h"
 
 namespace taclink {
 namespace {
@@ -14,6 +15,7 @@ namespace {
 constexpr double kUnknownMm = 5, kSpringsMm = 1;  // ... and where springs pull the skin to what is seen
 constexpr double kWeakInformation = 1e-9;
 // Of a pressure that the shape tells: what the model's inflation is wrong by, and the rest.
+constexpr double kMovingGravitySigma = 1;  // m/s^2: of a link that may accelerate, standard gravity's
 constexpr double kFromShapeShare = 0.05, kFromShapeMpa = 1e-4;
 
 MeasuredLoads FromShape(double pressure_mpa, MeasuredLoads loads) {
@@ -54,6 +56,15 @@ std::optional<Eigen::VectorXd> StateEstimator::UntouchedAt(const KnownLoads& loa
   const UntouchedSkin* skin = skin_.mechanics().Untouched(loads);
   if (skin == nullptr) return std::nullopt;
   return skin->markers_mm;
+}
+
+std::optional<RestShape> StateEstimator::RestShapeUnder(const MeasuredLoads& loads) {
+  const UntouchedSkin* skin = skin_.mechanics().Untouched(loads.Loads());
+  if (skin == nullptr) return std::nullopt;
+  Eigen::MatrixXd errors_mm;
+  if (!loads.specific_force_covariance.isZero(0))
+    errors_mm = skin->markers_by_loads.rightCols<3>() * SpecificForceErrors(loads);
+  return RestShape(model_, skin->markers_mm, std::move(errors_mm));
 }
 
 MeasuredLoads StateEstimator::PressureFromShape(const MarkerObservations& observed, const LoadsPair& loads) {
@@ -194,7 +205,11 @@ void StateEstimator::WriteKnownLoads(LinkState& state) const {
   const Mat4& covariance = estimate_.loads.known_covariance;
   state.pressure_estimate = {loads.pressure_mpa, std::sqrt(covariance(0, 0))};
   const Mat3 of_force = covariance.bottomRightCorner<3, 3>();
-  if (!of_force.isZero(0)) state.specific_force_estimate = {loads.specific_force_mps2, of_force};
+  if (of_force.isZero(0)) return;
+  MeasuredLoads estimated{.specific_force_mps2 = loads.specific_force_mps2,
+                          .specific_force_covariance = of_force};
+  if (IsAttitudeUnknown(observation_.loads)) MeasureGravity(estimated, kMovingGravitySigma);
+  state.specific_force_estimate = {estimated.specific_force_mps2, estimated.specific_force_covariance};
 }
 
 void StateEstimator::FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "sensing/camera/rest_shape.h"
 #include "sensing/contact/contact_finder.h"
 #include "sensing/core/contact.h"
 #include "sensing/core/link_state.h"
@@ -55,6 +56,8 @@ class StateEstimator {
   SkinEstimator& skin() { return skin_; }
   /// What known loads alone do to the markers, from the slack skin; none: there is no such skin.
   std::optional<Eigen::VectorXd> UntouchedAt(const KnownLoads& loads);
+  /// Likewise, of rest images; with the errors of the specific force, where it is not exact.
+  std::optional<RestShape> RestShapeUnder(const MeasuredLoads& loads);
   /// The pressure that explains most markers, where nobody tells it: of each marker the one that its
   /// displacement along the inflation asks for, the median of them. Displacements from the baseline.
   MeasuredLoads PressureFromShape(const MarkerObservations& observed, const LoadsPair& loads);

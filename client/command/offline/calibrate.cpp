@@ -10,9 +10,12 @@
 #include "client/command/live/calibrate_link.h"
 #include "client/command/offline/calibrate_material.h"
 #include "client/command/offline/calibrate_picture.h"
+#include "client/command/offline/gravity.h"
+#include "client/cpp/taclink/values.h"
 #include "sensing/capture/image_io.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/picture_calibration.h"
+#include "sensing/pipeline/state_estimator.h"
 
 namespace taclink::command {
 namespace {
@@ -24,6 +27,9 @@ struct CalibrateOptions {
   std::string out;
   std::string residuals;
   double mould_tolerance_mm = BuildTolerance{}.marker_mm;
+  double pressure_kpa = 0;
+  std::string gravity;
+  double gravity_sigma_mps2 = 0.2;
   bool json = false;
   LinkCalibration live;  // instead, if it names a link
 };
@@ -68,7 +74,8 @@ std::string Cell(const Row& row) {
   return text;
 }
 
-void PrintText(const LinkModel& model, const CalibrationSummary& summary) {
+void PrintText(const LinkModel& model, const RestResult& rest) {
+  const CalibrationSummary& summary = rest.calibration;
   const auto& [top, bottom] = summary.cameras;
   std::printf("%s, %d rest pair%s, lens model %s\n\n", model.name.c_str(), summary.pairs,
               summary.pairs == 1 ? "" : "s", Name(top.camera.lens.kind));
@@ -80,6 +87,11 @@ void PrintText(const LinkModel& model, const CalibrationSummary& summary) {
   std::printf("Rest markers, triangulated, against the model: RMSE\n");
   std::printf("  R %.3f mm    phi*R %.3f mm    Z %.3f mm    3-D %.3f mm\n\n", summary.rmse_r_mm,
               summary.rmse_phi_r_mm, summary.rmse_z_mm, summary.rmse_3d_mm);
+  if (!rest.loads.specific_force_covariance.isZero(0)) {
+    const Vec3 &value = rest.loads.specific_force_mps2, sigma = Sigmas(rest.loads.specific_force_covariance);
+    std::printf("Specific force      (%.2f, %.2f, %.2f) \u00b1 (%.2f, %.2f, %.2f) m/s2\n\n", value.x(),
+                value.y(), value.z(), sigma.x(), sigma.y(), sigma.z());
+  }
   std::printf("Parameter, \u00b1 standard deviation; tilt and roll against the model's nominal camera\n");
   std::printf("%-18s %24s   %24s\n", "", "top          ", "bottom        ");
   std::array<std::vector<Row>, kCameraCount> rows;
@@ -137,7 +149,14 @@ Json MarkersJson(const LinkModel& model, const CalibrationSummary& summary) {
   return markers;
 }
 
-void PrintJson(const LinkModel& model, const CalibrationSummary& summary) {
+Json SpecificForceJson(const MeasuredLoads& loads) {
+  if (loads.specific_force_covariance.isZero(0)) return nullptr;
+  return {{"value", ToJson(loads.specific_force_mps2)},
+          {"sigma", ToJson(Sigmas(loads.specific_force_covariance))}};
+}
+
+void PrintJson(const LinkModel& model, const RestResult& rest) {
+  const CalibrationSummary& summary = rest.calibration;
   const Json out = {{"model", model.name},
                     {"pairs", summary.pairs},
                     {"markers_used", summary.markers_used},
@@ -147,6 +166,7 @@ void PrintJson(const LinkModel& model, const CalibrationSummary& summary) {
                       {"phi_r", summary.rmse_phi_r_mm},
                       {"z", summary.rmse_z_mm},
                       {"3d", summary.rmse_3d_mm}}},
+                    {"specific_force_estimate_mps2", SpecificForceJson(rest.loads)},
                     {"cameras",
                      {{"top", CameraJson(summary.cameras[Index(CameraId::kTop)])},
                       {"bottom", CameraJson(summary.cameras[Index(CameraId::kBottom)])}}},
@@ -162,6 +182,22 @@ Result<std::vector<RestPictures>> ReadPairs(const std::vector<std::string>& path
     pairs[i / kCameraCount][i % kCameraCount] = *std::move(picture);
   }
   return pairs;
+}
+
+Result<RestResult> CalibrateUnder(const CalibrateOptions& options, const LinkModel& model,
+                                  const std::vector<RestPictures>& pairs, const CalibrationOptions& how) {
+  RestConditions rest{.loads = {}, .shape_at = [&](const MeasuredLoads&) { return RestShape(model); }};
+  if (options.gravity.empty() && options.pressure_kpa == 0)
+    return CalibrateFromPictures(model, pairs, rest, how);
+  if (auto good = CheckWeight(model, options.gravity); !good) return good.error();
+  rest.loads.pressure_mpa = 1e-3 * options.pressure_kpa;
+  if (!options.gravity.empty()) {
+    if (auto good = TakeGravity(options.gravity, options.gravity_sigma_mps2, rest.loads); !good)
+      return good.error();
+  }
+  const auto estimator = MakeStateEstimator(model, {});
+  rest.shape_at = [&](const MeasuredLoads& loads) { return estimator->RestShapeUnder(loads); };
+  return CalibrateFromPictures(model, pairs, rest, how);
 }
 
 Result<void> Calibrate(const CalibrateOptions& options) {
@@ -182,8 +218,9 @@ Result<void> Calibrate(const CalibrateOptions& options) {
   for (const LensKind kind : {LensKind::kDivision, LensKind::kKannalaBrandt}) {
     if (options.lens == Name(kind)) how.lens = kind;
   }
-  const auto summary = CalibrateFromPictures(*model, *pairs, how);
-  if (!summary) return summary.error();
+  const auto found = CalibrateUnder(options, *model, *pairs, how);
+  if (!found) return found.error();
+  const CalibrationSummary* const summary = &found->calibration;
   const std::string residuals =
       options.residuals.empty()
           ? std::filesystem::path(options.out).replace_extension(".residuals.png").string()
@@ -192,9 +229,9 @@ Result<void> Calibrate(const CalibrateOptions& options) {
     return written.error();
   if (auto saved = SaveCalibration(options.out, model->name, *summary); !saved) return saved.error();
   if (options.json) {
-    PrintJson(*model, *summary);
+    PrintJson(*model, *found);
   } else {
-    PrintText(*model, *summary);
+    PrintText(*model, *found);
     std::printf("\nwritten: %s, residuals drawn in %s\n", options.out.c_str(), residuals.c_str());
   }
   return {};
@@ -210,11 +247,22 @@ void AddCalibrate(const Arguments& app, Selected& selected) {
                                            "the skin's");
   command.AddOption("--model", options->model, "Link model: a shipped name or a YAML file");
   command
-      .AddOption(
-          "--rest", options->rest,
-          "TOP and BOTTOM picture of the untouched, unpressurised skin; again for more pairs, which are "
-          "averaged")
+      .AddOption("--rest", options->rest,
+                 "TOP and BOTTOM picture of the untouched skin; again for more pairs, which are averaged")
       .Expected(2, 2 * 1000);
+  command
+      .AddOption("--pressure-kpa", options->pressure_kpa,
+                 "Gauge pressure inside the skin in the rest pictures")
+      .Must(Within(-20, 20));
+  command.AddOption(
+      "--gravity", options->gravity,
+      "Specific force in the rest pictures, X,Y,Z in m/s2 in the link's frame: where things fall; "
+      "'unknown': found from the pictures; without, the skin counts as weightless");
+  command
+      .AddOption("--gravity-sigma", options->gravity_sigma_mps2,
+                 "Standard deviation of each component of a specific force that is given, m/s2")
+      .Must(Within(1e-6, 100))
+      .ShowDefault();
   command.AddOption("--lens", options->lens, "Lens model to fit; without, the link model's")
       .Must(OneOf({"division", "kannala_brandt"}));
   command.AddOption("-o,--out", options->out, "Calibration file to write (YAML)");

@@ -4,11 +4,16 @@
 #include "sensing/capture/image_io.h"
 
 namespace taclink::command {
+namespace {
 
-Result<std::unique_ptr<PictureSolver>> PictureSolver::Make(const LinkModel& model, PipelineOptions options,
-                                                           const std::string& calibration,
-                                                           const std::vector<std::string>& rest,
-                                                           double rest_pressure_mpa) {
+constexpr size_t kMostRestGuesses = 17;  // as many as RestGuesses gives
+
+}  // namespace
+
+Result<std::unique_ptr<PictureSolver>> PictureSolver::Make(
+    const LinkModel& model, PipelineOptions options, const std::string& calibration,
+    const std::vector<std::string>& rest, const std::optional<SpecificForceReading>& rest_force,
+    double rest_pressure_mpa) {
   options.rest_frames = 1;
   options.pictures_may_repeat = true;
   if (!calibration.empty()) {
@@ -17,20 +22,26 @@ Result<std::unique_ptr<PictureSolver>> PictureSolver::Make(const LinkModel& mode
     options.rig = *rig;
   }
   std::unique_ptr<PictureSolver> solver(new PictureSolver(model, options));
-  const auto state = solver->Solve(rest, rest_pressure_mpa);
-  if (!state) return state.error();
-  if (!solver->pipeline_.calibration()) {
-    return Error{ErrorCode::kInvalidArgument, "the rest pictures can't be used: " + state->status_reason};
+  // With each refusal the pipeline tries another attitude, where that is unknown.
+  std::string refusal;
+  for (size_t i = 0; i < kMostRestGuesses && !solver->pipeline_.calibration(); ++i) {
+    const auto state = solver->Solve(rest, rest_pressure_mpa, rest_force);
+    if (!state) return state.error();
+    if (refusal.empty()) refusal = state->status_reason;
   }
+  if (!solver->pipeline_.calibration())
+    return Error{ErrorCode::kInvalidArgument, "the rest pictures can't be used: " + refusal};
   return solver;
 }
 
 Result<LinkState> PictureSolver::Solve(const std::vector<std::string>& pair,
-                                       std::optional<double> pressure_mpa) {
+                                       std::optional<double> pressure_mpa,
+                                       const std::optional<SpecificForceReading>& specific_force) {
   for (size_t i = 0; i < kCameraCount; ++i) {
     if (auto read = ReadRawImage(pair[i], frame_.images[i]); !read) return read.error();
   }
   frame_.pressure_mpa = pressure_mpa;
+  frame_.specific_force = specific_force;
   pipeline_.Process(frame_, state_);
   ++frame_.sequence;
   return state_;

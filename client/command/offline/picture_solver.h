@@ -15,15 +15,16 @@ namespace taclink::command {
 class PictureSolver {
  public:
   /// `calibration`: file; empty: the rest pair calibrates. `rest`, as all pairs: top, bottom; taken under
-  /// `rest_pressure_mpa`.
+  /// `rest_pressure_mpa` and `rest_force`, without which the skin counts as weightless.
   /// Errors: kNotFound, kInvalidArgument (unreadable, of no use; why).
-  static Result<std::unique_ptr<PictureSolver>> Make(const LinkModel& model, PipelineOptions options,
-                                                     const std::string& calibration,
-                                                     const std::vector<std::string>& rest,
-                                                     double rest_pressure_mpa = 0);
+  static Result<std::unique_ptr<PictureSolver>> Make(
+      const LinkModel& model, PipelineOptions options, const std::string& calibration,
+      const std::vector<std::string>& rest, const std::optional<SpecificForceReading>& rest_force = {},
+      double rest_pressure_mpa = 0);
 
   /// Whether it was measured is in the state. `pressure_mpa`: none: nobody tells it.
-  Result<LinkState> Solve(const std::vector<std::string>& pair, std::optional<double> pressure_mpa);
+  Result<LinkState> Solve(const std::vector<std::string>& pair, std::optional<double> pressure_mpa,
+                          const std::optional<SpecificForceReading>& specific_force = {});
 
  private:
   PictureSolver(const LinkModel& model, const PipelineOptions& options) : pipeline_(model, options) {}

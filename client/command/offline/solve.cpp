@@ -5,6 +5,7 @@
 
 #include "client/command/cli/commands.h"
 #include "client/command/cli/json.h"
+#include "client/command/offline/gravity.h"
 #include "client/command/offline/marker_csv.h"
 #include "client/command/offline/picture_solver.h"
 #include "client/cpp/taclink/values.h"
@@ -159,31 +160,6 @@ double SigmaMpa(const SolveOptions& options) {
   return 1e-6 * options.pressure_sigma_pa.value_or(1e6 * PressureSigma(PressureOrigin::kFile));
 }
 
-// A specific force "X,Y,Z" in m/s^2, "unknown", or nothing: as if the skin had no weight.
-struct GravityOption {
-  Vec3 mps2 = Vec3::Zero();
-  Mat3 covariance = Mat3::Zero();
-};
-constexpr double kStandardGravity = 9.80665;  // m/s^2
-
-Result<GravityOption> ParseGravity(const std::string& text, double sigma_mps2) {
-  GravityOption gravity;
-  if (text.empty()) return gravity;
-  // Any direction: each component has a third of the square.
-  if (text == "unknown") {
-    gravity.covariance = kStandardGravity * kStandardGravity / 3 * Mat3::Identity();
-    return gravity;
-  }
-  int used = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &gravity.mps2.x(), &gravity.mps2.y(), &gravity.mps2.z(),
-                  &used) != 3 ||
-      static_cast<size_t>(used) != text.size() || !(gravity.mps2.norm() <= 100))
-    return Error{ErrorCode::kInvalidArgument,
-                 "'" + text + "' is not a specific force: give X,Y,Z in m/s^2, at most 100, or 'unknown'"};
-  gravity.covariance = sigma_mps2 * sigma_mps2 * Mat3::Identity();
-  return gravity;
-}
-
 Result<LoadsPair> ParseLoads(const SolveOptions& options, const LinkModel& model) {
   const double baseline_kpa = options.baseline_pressure_kpa;
   LoadsPair loads;
@@ -192,17 +168,12 @@ Result<LoadsPair> ParseLoads(const SolveOptions& options, const LinkModel& model
   if (options.gravity.empty() != options.baseline_gravity.empty())
     return Error{ErrorCode::kInvalidArgument,
                  "--gravity and --baseline-gravity go together: give both, either may be 'unknown'"};
-  if (!options.gravity.empty() && model.density_kg_m3 == 0)
-    return Error{ErrorCode::kFailedPrecondition,
-                 "model '" + model.name + "' has no skin.density_kg_m3, without which weight is not known"};
-  const auto now = ParseGravity(options.gravity, options.gravity_sigma_mps2);
-  if (!now) return now.error();
-  const auto baseline = ParseGravity(options.baseline_gravity, options.gravity_sigma_mps2);
-  if (!baseline) return baseline.error();
-  loads.now.specific_force_mps2 = now->mps2;
-  loads.now.specific_force_covariance = now->covariance;
-  loads.baseline.specific_force_mps2 = baseline->mps2;
-  loads.baseline.specific_force_covariance = baseline->covariance;
+  if (auto good = CheckWeight(model, options.gravity); !good) return good.error();
+  if (options.gravity.empty()) return loads;
+  if (auto good = TakeGravity(options.gravity, options.gravity_sigma_mps2, loads.now); !good)
+    return good.error();
+  if (auto good = TakeGravity(options.baseline_gravity, options.gravity_sigma_mps2, loads.baseline); !good)
+    return good.error();
   return loads;
 }
 
@@ -225,12 +196,18 @@ Result<LinkState> SolvePictures(const SolveOptions& options, const LinkModel& mo
   pipeline_options.force.model = ForceModelNamed(options.force_model);
   pipeline_options.force.refinement = options.force_refinement;
   pipeline_options.pressure_sigma_mpa = SigmaMpa(options);
+  const auto loads = ParseLoads(options, model);
+  if (!loads) return loads.error();
+  const auto reading = [&](const MeasuredLoads& one) -> std::optional<SpecificForceReading> {
+    if (options.gravity.empty()) return std::nullopt;
+    return SpecificForceReading{one.specific_force_mps2, one.specific_force_covariance};
+  };
   const auto solver = PictureSolver::Make(model, pipeline_options, options.calibration, options.rest,
-                                          1e-3 * options.baseline_pressure_kpa);
+                                          reading(loads->baseline), loads->baseline.pressure_mpa);
   if (!solver) return solver.error();
   std::optional<double> pressure_mpa;
   if (options.pressure_kpa) pressure_mpa = 1e-3 * *options.pressure_kpa;
-  return (*solver)->Solve(options.images, pressure_mpa);
+  return (*solver)->Solve(options.images, pressure_mpa, reading(loads->now));
 }
 
 Result<void> Solve(const SolveOptions& options) {

@@ -187,7 +187,7 @@ TEST_F(RefusalTest, InflatedSkinIsRefused) {
 
 TEST_F(RefusalTest, UselessPicturesAreRefusedWithTheReason) {
   const cv::Mat black(480, 640, CV_8UC1, cv::Scalar(10)), small(240, 320, CV_8UC1, cv::Scalar(10));
-  EXPECT_THAT(Message(Calibrate(model_, {black, rest_[1]})), HasSubstr("the top camera's picture"));
+  EXPECT_THAT(Message(Calibrate(model_, {black, rest_[1]})), HasSubstr("top camera: only 0 of 240 markers"));
   EXPECT_THAT(Message(Calibrate(model_, {rest_[0], small})), HasSubstr("the bottom picture is 320 x 240 px"));
   cv::Mat half = rest_[0].clone();
   half.colRange(0, 330).setTo(10);

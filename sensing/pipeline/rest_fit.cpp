@@ -1,0 +1,216 @@
+#include "sensing/pipeline/rest_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "sensing/camera/rest_check.h"
+#include "sensing/core/similar_skin.h"
+#include "sensing/pipeline/displaced_labels.h"
+
+namespace taclink {
+namespace {
+
+constexpr double kLeastSeenFraction = 0.5;  // in each image
+constexpr double kStillPx = 1.5;            // a spot is the same one within
+constexpr int kMostSteps = 5;
+constexpr double kSettledMm = 0.03;  // the last step of the specific force moves no marker more, in units
+
+// The mean places of the spots that most pairs show.
+DetectionPair Steady(const std::vector<DetectionPair>& pairs) {
+  struct Spot {
+    Detection first;
+    Vec2 sum_px;
+    int count;
+    Vec2 mean_px() const { return sum_px / count; }
+  };
+  DetectionPair steady;
+  for (size_t c = 0; c < kCameraCount; ++c) {
+    std::vector<Spot> spots;
+    for (const DetectionPair& pair : pairs) {
+      for (const Detection& seen : pair[c]) {
+        const auto known = std::find_if(spots.begin(), spots.end(), [&](const Spot& spot) {
+          return (spot.mean_px() - seen.center_px).squaredNorm() < kStillPx * kStillPx;
+        });
+        if (known == spots.end()) {
+          spots.push_back({seen, seen.center_px, 1});
+        } else {
+          known->sum_px += seen.center_px;
+          ++known->count;
+        }
+      }
+    }
+    for (const Spot& spot : spots) {
+      if (2 * spot.count <= static_cast<int>(pairs.size())) continue;
+      steady[c].push_back(spot.first);
+      steady[c].back().center_px = spot.mean_px();
+    }
+  }
+  return steady;
+}
+
+double NoiseOf(const MarkerMean& mean, double rms_px) {
+  return mean.variances_px2().empty() ? rms_px : mean.noise_px();
+}
+
+}  // namespace
+
+Error SkinMoved() {
+  return {ErrorCode::kFailedPrecondition, "the skin moved while its rest shape was taken; do not touch it"};
+}
+
+Result<void> CheckMarkerCount(const LinkModel& model, const std::array<int, kCameraCount>& seen) {
+  for (const CameraId id : kBothCameras) {
+    if (seen[Index(id)] < kLeastSeenFraction * model.markers.count()) {
+      return Error{
+          ErrorCode::kInvalidArgument,
+          std::string(Name(id)) + " camera: only " + std::to_string(seen[Index(id)]) + " of " +
+              std::to_string(model.markers.count()) +
+              " markers recognised; check model, light and focus, and that nothing touches the skin"};
+    }
+  }
+  return {};
+}
+
+RestFit::RestFit(const LinkModel& model, const std::optional<StereoRig>& rig,
+                 const CalibrationOptions& options, const RestPairs& pairs, RestShapeAt shape_at)
+    : model_(model),
+      rig_(rig),
+      options_(options),
+      pairs_(pairs),
+      shape_at_(std::move(shape_at)),
+      steady_(Steady(pairs.detections)) {}
+
+Result<RestResult> RestFit::Explain(const MeasuredLoads& loads) const {
+  auto result = rig_ ? ExplainByRig(*rig_, loads) : Calibrate(loads);
+  if (!result) return result;
+  if (const auto shape = ShapeAt(result->loads); !shape) return shape.error();
+  return result;
+}
+
+Result<RestResult> RestFit::Calibrate(const MeasuredLoads& loads) const {
+  const auto shape = ShapeAt(loads);
+  if (!shape) return shape.error();
+  if (!IsRestUncertain(*shape)) return CalibrateAt(*shape, loads, options_);
+  return Refine(loads);
+}
+
+Result<RestShape> RestFit::ShapeAt(const MeasuredLoads& loads) const {
+  auto shape = shape_at_(loads);
+  if (!shape)
+    return Error{
+        ErrorCode::kFailedPrecondition,
+        "no skin of this model is stable under the known loads; check pressure, gravity and material"};
+  return *std::move(shape);
+}
+
+// The cameras, from what stands still in the pairs.
+Result<RestFit::FoundCameras> RestFit::FindCameras(const RestShape& shape) const {
+  DetectionPair detections = steady_;
+  FoundCameras found;
+  for (const CameraId id : kBothCameras) {
+    const auto labels = LabelDisplacedRest(shape, id, detections[Index(id)], pairs_.first[Index(id)]);
+    if (!labels) return labels.error();
+    auto settled = SettleCamera(shape, id, *labels, detections[Index(id)], options_.domes);
+    if (!settled) {
+      return Error{ErrorCode::kInvalidArgument, std::string("no camera explains the ") + Name(id) +
+                                                    " camera's rest picture; check the link model and that "
+                                                    "nothing touches the skin"};
+    }
+    found.rig[id] = settled->camera;
+    found.score += settled->score;
+    found.matches[Index(id)] = std::move(settled->match);
+  }
+  if (const std::string trouble = GridTrouble(model_, found.matches); !trouble.empty())
+    return Error{ErrorCode::kInvalidArgument,
+                 trouble + ": it is not this link's model, or something touches the skin"};
+  return found;
+}
+
+// `first`: labels of the first pair, which of a single pair are better than the tracker's, for spots that
+// were found by looking again are among them; null: the tracker's.
+Result<MarkerMean> RestFit::Mean(const StereoRig& rig,
+                                 const std::array<RestMatch, kCameraCount>* first) const {
+  PathTracker tracker(model_, rig);
+  MarkerMean mean(model_.markers.count());
+  LabelledMarkers labels;
+  for (const CameraId id : kBothCameras)
+    if (first != nullptr) labels.cameras[Index(id)] = (*first)[Index(id)].markers;
+  for (const DetectionPair& pair : pairs_.detections) {
+    if (first == nullptr || pairs_.detections.size() > 1) tracker.Label(pair, labels);
+    std::array<int, kCameraCount> seen{};
+    for (size_t c = 0; c < kCameraCount; ++c)
+      seen[c] = static_cast<int>(std::count_if(labels.cameras[c].begin(), labels.cameras[c].end(),
+                                               [](const MarkerObservation& one) { return one.seen; }));
+    if (const auto enough = CheckMarkerCount(model_, seen); !enough) return enough.error();
+    mean.Add(labels);
+  }
+  mean.Finish();
+  if (mean.moved()) return SkinMoved();
+  return mean;
+}
+
+Result<RestResult> RestFit::ExplainByRig(const StereoRig& rig, const MeasuredLoads& loads) const {
+  const auto mean = Mean(rig, nullptr);
+  if (!mean) return mean.error();
+  auto shape = ShapeAt(loads);
+  if (!shape) return shape.error();
+  RestResult result{.calibration = {}, .markers = mean->markers(), .loads = loads};
+  if (IsRestUncertain(*shape)) {
+    if (const auto fitted = FitRestLoads(loads, shape_at_, rig, mean->markers())) result.loads = *fitted;
+    shape = ShapeAt(result.loads);
+    if (!shape) return shape.error();
+  }
+  const CalibrationSummary seen = ResidualsOf(*shape, rig, mean->markers());
+  if (const auto dent = FindDent(*shape, seen, options_.max_dent_mm * LengthUnit(model_)))
+    return Error{ErrorCode::kFailedPrecondition,
+                 Describe(model_, *dent) + "; if nothing is there, a camera has moved: calibrate again"};
+  result.calibration.rig = rig;
+  result.noise_px = NoiseOf(*mean, seen.rms_px);
+  return result;
+}
+
+Result<RestResult> RestFit::CalibrateAt(const RestShape& shape, const MeasuredLoads& loads,
+                                        const CalibrationOptions& options) const {
+  const auto found = FindCameras(shape);
+  if (!found) return found.error();
+  const auto mean = Mean(found->rig, &found->matches);
+  if (!mean) return mean.error();
+  auto calibrated = CalibrateFromRest(shape, mean->markers(), options);
+  if (!calibrated) return calibrated.error();
+  calibrated->pairs = static_cast<int>(pairs_.detections.size());
+  RestResult result{.calibration = *std::move(calibrated), .markers = mean->markers(), .loads = loads};
+  result.noise_px = NoiseOf(*mean, result.calibration.rms_px);
+  const CalibrationSummary& summary = result.calibration;
+  if (summary.error_shares.size() != 3 || summary.error_covariance.size() != 9) return result;
+  const Mat3 errors = SpecificForceErrors(loads);
+  result.loads.specific_force_mps2 += errors * summary.error_shares;
+  result.loads.specific_force_covariance = errors * summary.error_covariance * errors.transpose();
+  if (IsAttitudeUnknown(loads)) MeasureGravity(result.loads);
+  return result;
+}
+
+// The specific force that the bundle adjustment finds near `loads`, from step to step until it stays, and
+// what the images show there.
+Result<RestResult> RestFit::Refine(MeasuredLoads loads) const {
+  CalibrationOptions lenient = options_;
+  lenient.max_departure = lenient.max_rms_px = lenient.max_dent_mm = 1e9;
+  lenient.max_outliers = 1;
+  lenient.progress = nullptr;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const auto shape = ShapeAt(loads);
+    if (!shape) return shape.error();
+    const auto rough = CalibrateAt(*shape, loads, lenient);
+    if (!rough) return rough.error();
+    const Eigen::VectorXd& shares = rough->calibration.error_shares;
+    if (shares.size() != 3) break;
+    loads.specific_force_mps2 += SpecificForceErrors(loads) * shares;
+    if ((shape->errors_mm() * shares).cwiseAbs().maxCoeff() < kSettledMm * LengthUnit(model_)) break;
+  }
+  const auto shape = ShapeAt(loads);
+  if (!shape) return shape.error();
+  return CalibrateAt(*shape, loads, options_);
+}
+
+}  // namespace taclink
