@@ -68,10 +68,12 @@ folder(server/config sensing/core sensing/yaml sensing/pipeline sensing/simulati
 folder(server/process sensing/core server/config)
 folder(server/hub sensing/core wire)
 folder(server/pressure sensing/core server/config server/process)
-folder(server/link sensing/core sensing/capture server/config server/process server/hub server/pressure)
+folder(server/attitude sensing/core)
+folder(server/link sensing/core sensing/capture server/config server/process server/hub server/pressure server/attitude)
 folder(server/events sensing/core server/config server/process server/hub)
 folder(server/security sensing/core server/config server/process)
-folder(server/arm sensing/core sensing/capture server/config server/hub server/pressure server/link server/events)
+folder(server/arm sensing/core sensing/capture server/config server/hub server/pressure server/attitude server/link
+       server/events)
 folder(server/messages wire server/events server/arm)
 folder(server/recording sensing/core mcap wire/log server/config server/process server/hub server/arm server/messages)
 folder(server/replay sensing/core sensing/capture mcap wire wire/log server/process server/link server/arm)
@@ -84,8 +86,8 @@ folder(server/rpc sensing/core server/process server/security server/arm server/
 folder(server/publish sensing/core wire server/config server/process server/security server/arm server/messages)
 folder(server/gateway sensing/core server/config server/process server/link server/security server/arm server/rpc server/publish)
 folder(server/assembly sensing/core sensing/yaml sensing/model sensing/camera sensing/capture sensing/pipeline sensing/simulation mcap
-       wire/log server/config server/process server/hub server/pressure server/link server/security server/arm server/recording
-       server/replay)
+       wire/log server/config server/process server/hub server/pressure server/attitude server/link server/security server/arm
+       server/recording server/replay)
 folder(server sensing/core server/config server/process server/security server/recording server/rpc server/publish
        server/gateway server/assembly)
 folder(client/cpp/taclink sensing/core)

@@ -228,6 +228,29 @@ void ReadCamera(const v1::CameraCounts& camera, CameraCounts& counts, CameraTrac
               .dropped = static_cast<int>(camera.dropped())};
 }
 
+// Both are numbered alike.
+static_assert(static_cast<int>(AttitudeOrigin::kNone) + 1 == v1::ATTITUDE_ORIGIN_NONE &&
+              static_cast<int>(AttitudeOrigin::kJointStates) + 1 == v1::ATTITUDE_ORIGIN_JOINT_STATES &&
+              static_cast<int>(AttitudeOrigin::kClient) + 1 == v1::ATTITUDE_ORIGIN_CLIENT);
+
+void FillSpecificForce(const SpecificForceReading& reading, v1::SpecificForceReport& out) {
+  Fill(reading.mps2, 1, *out.mutable_specific_force_mps2());
+  if (!reading.covariance.isZero(0)) FillCovariance(reading.covariance, 1, *out.mutable_covariance_m2_s4());
+  out.set_origin(static_cast<v1::AttitudeOrigin>(static_cast<int>(reading.origin) + 1));
+  out.set_trouble(reading.trouble);
+}
+
+SpecificForceReading SpecificForceFrom(const v1::SpecificForceReport& message) {
+  SpecificForceReading reading{
+      .mps2 = FromWire(message.specific_force_mps2(), 1),
+      .covariance = CovarianceFrom(message.covariance_m2_s4(), 1).value_or(Mat3::Zero()),
+      .origin = AttitudeOrigin::kNone,
+      .trouble = message.trouble()};
+  if (v1::AttitudeOrigin_IsValid(message.origin()) && message.origin() != v1::ATTITUDE_ORIGIN_UNSPECIFIED)
+    reading.origin = static_cast<AttitudeOrigin>(message.origin() - 1);
+  return reading;
+}
+
 }  // namespace
 
 void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFrame& out) {
@@ -259,6 +282,7 @@ void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFra
     out.mutable_pressure_estimate()->set_pressure_pa(state.pressure_estimate->mpa * kPascalsPerMpa);
     out.mutable_pressure_estimate()->set_sigma_pa(state.pressure_estimate->sigma_mpa * kPascalsPerMpa);
   }
+  if (state.specific_force) FillSpecificForce(*state.specific_force, *out.mutable_specific_force());
   if (const auto& estimate = state.specific_force_estimate) {
     Fill(estimate->mps2, 1, *out.mutable_specific_force_estimate()->mutable_specific_force_mps2());
     FillCovariance(estimate->covariance, 1,
@@ -329,6 +353,7 @@ Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
   if (frame.has_pressure_estimate())
     state.pressure_estimate = {frame.pressure_estimate().pressure_pa() / kPascalsPerMpa,
                                frame.pressure_estimate().sigma_pa() / kPascalsPerMpa};
+  if (frame.has_specific_force()) state.specific_force = SpecificForceFrom(frame.specific_force());
   if (frame.has_specific_force_estimate()) {
     const v1::SpecificForceEstimate& estimate = frame.specific_force_estimate();
     state.specific_force_estimate = {FromWire(estimate.specific_force_mps2(), 1),

@@ -67,10 +67,21 @@ inline double ExactInPascals(double mpa) {
   return std::ldexp(std::round(std::ldexp(mpa, 40)), -40);
 }
 
+/// Who says what the specific force in a link's frame is.
+enum class AttitudeOrigin : uint8_t {
+  kNone,         ///< nobody: the skin tells it
+  kConstant,     ///< the configuration, or a command's options
+  kSimulated,    ///< the simulation that makes the pictures
+  kJointStates,  ///< the arm's URDF and joint states
+  kClient,       ///< a client of the server
+};
+
 /// Gravity less the link's acceleration, link frame, as it is known at a moment.
 struct SpecificForceReading {
   Vec3 mps2 = Vec3::Zero();
   Mat3 covariance = Mat3::Zero();  ///< (m/s^2)^2; zero: it counts as exact
+  AttitudeOrigin origin = AttitudeOrigin::kConstant;
+  std::string trouble = {};  ///< what is wrong with its source and what to do; empty: nothing
 };
 
 struct LinkState;

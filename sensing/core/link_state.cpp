@@ -48,6 +48,10 @@ const char* Name(ReasonId id) {
       return "drift";
     case ReasonId::kForcedBaseline:
       return "forced_baseline";
+    case ReasonId::kAttitudeUnknown:
+      return "attitude_unknown";
+    case ReasonId::kAttitudeMismatch:
+      return "attitude_mismatch";
     case ReasonId::kNoFrames:
       return "no_frames";
     case ReasonId::kWorker:
@@ -62,6 +66,7 @@ ReasonUnit UnitOf(ReasonId id) {
       return ReasonUnit::kSeconds;
     case ReasonId::kPressureMismatch:
       return ReasonUnit::kMegapascals;
+    case ReasonId::kAttitudeUnknown:
     case ReasonId::kTooDeep:
     case ReasonId::kSparseMarkers:
     case ReasonId::kUnsettled:

@@ -47,8 +47,10 @@ enum class ReasonId : uint8_t {
   kNoFrames,          ///< none come from the source, or from the log that is replayed
   kWorker,            ///< what reads or computes the frames is late, has failed or is being started again
   kForcedBaseline,    ///< beside another reason: a baseline that was taken by force may explain it
+  kAttitudeUnknown,   ///< the specific force is not known well enough for accurate forces
+  kAttitudeMismatch,  ///< the measured specific force does not fit the skin's shape
 };
-inline constexpr int kReasonCount = static_cast<int>(ReasonId::kForcedBaseline) + 1;
+inline constexpr int kReasonCount = static_cast<int>(ReasonId::kAttitudeMismatch) + 1;
 const char* Name(ReasonId id);
 /// None: another version's.
 std::optional<ReasonId> ReasonNamed(std::string_view name);
@@ -100,8 +102,9 @@ struct LinkState {
   std::vector<Reason> reasons;         ///< all that make it worse, the gravest first; of measured frames
   std::optional<double> pressure_mpa;  ///< measured; none: assumed, or the sensor's is stale
   PressureReport pressure;
-  std::optional<PressureEstimate> pressure_estimate;  ///< what the skin's shape and the sensor say together
-  /// Likewise, of the skin's shape and the measured attitude; none: the attitude counts as exact.
+  std::optional<PressureEstimate> pressure_estimate;   ///< what the skin's shape and the sensor say together
+  std::optional<SpecificForceReading> specific_force;  ///< measured; none: the link never moves
+  /// What the skin's shape and that say together; none: it counts as exact.
   std::optional<SpecificForceEstimate> specific_force_estimate;
 
   std::array<CameraCounts, kCameraCount> cameras;

@@ -79,15 +79,22 @@ auto Fields(S& pressure) {
                     Field{"age_ns", age_ns}, Field{"trouble", trouble});
 }
 
+template <Is<SpecificForceReading> S>
+auto Fields(S& reading) {
+  auto& [mps2, covariance, origin, trouble] = reading;
+  return std::tuple(Field{"mps2", mps2}, Field{"covariance", covariance}, Field{"origin", origin},
+                    Field{"trouble", trouble});
+}
+
 template <Is<LinkState> S>
 auto Fields(S& state) {
   auto& [sequence, times, status, status_reason, reasons, pressure_mpa, pressure, pressure_estimate,
-         specific_force_estimate, cameras, tracking, shape, forces, contacts, total_force_n, baseline_age_s,
-         baseline, stage_ms, replayed] = state;
+         specific_force, specific_force_estimate, cameras, tracking, shape, forces, contacts, total_force_n,
+         baseline_age_s, baseline, stage_ms, replayed] = state;
   return std::tuple(Field{"sequence", sequence}, Field{"times", times}, Field{"status", status},
                     Field{"status_reason", status_reason}, Field{"reasons", reasons},
                     Field{"pressure_mpa", pressure_mpa}, Field{"pressure", pressure},
-                    Measured("pressure_estimate", pressure_estimate),
+                    Measured("pressure_estimate", pressure_estimate), Field{"specific_force", specific_force},
                     Measured("specific_force_estimate", specific_force_estimate), Field{"cameras", cameras},
                     Field{"tracking", tracking}, Measured("shape", shape), Measured("forces", forces),
                     Measured("contacts", contacts), Measured("total_force_n", total_force_n),
@@ -108,6 +115,10 @@ template <typename T>
 inline constexpr bool kIsVector = false;
 template <typename T>
 inline constexpr bool kIsVector<std::vector<T>> = true;
+template <typename T>
+inline constexpr bool kIsOptional = false;
+template <typename T>
+inline constexpr bool kIsOptional<std::optional<T>> = true;
 
 /// `field` becomes `initial`, whose vectors and strings are empty; those of `field` keep their buffers.
 template <typename T>

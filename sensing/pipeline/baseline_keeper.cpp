@@ -8,8 +8,8 @@
 namespace taclink {
 namespace {
 
-// Further from the baseline's own pressure, the error of what pressure does would be taken for drift.
-constexpr double kSamePressureMpa = 1e-4;
+// Further from the baseline's own known loads, the error of what they do would be taken for drift.
+constexpr double kSamePressureMpa = 1e-4, kSameSpecificForceMps2 = 0.5;
 // So long a tare waits where no loads explain the markers: by time, for such frames may take a second each.
 constexpr int64_t kMostWaitedNs = 3'000'000'000;
 
@@ -31,12 +31,12 @@ BaselineKeeper::BaselineKeeper(const LinkModel& model, const std::optional<Drift
   off_mm_.reserve(static_cast<size_t>(model.markers.count()));
 }
 
-void BaselineKeeper::Take(BaselineOrigin origin, double pressure_mpa, const FrameTimes& times,
+void BaselineKeeper::Take(BaselineOrigin origin, const KnownLoads& loads, const FrameTimes& times,
                           const Clock& clock) {
   baseline_ = {.origin = origin,
                .taken_utc_ns = times.exposure_utc_ns != 0 ? times.exposure_utc_ns : clock.UtcNs()};
   taken_ns_ = MonotonicNs(times, clock);
-  pressure_mpa_ = pressure_mpa;
+  loads_ = loads;
   follower_.Reset();
 }
 
@@ -103,7 +103,9 @@ void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state
   // Degraded by nothing but the drift itself.
   const bool good = state.status == LinkStatus::kOk || (state.measured() && state.reasons.size() == 1 &&
                                                         state.reasons[0].id == ReasonId::kDrift);
-  const bool sure = good && std::abs(PressureChange(frame_loads_.pressure_mpa)) <= kSamePressureMpa;
+  const bool sure =
+      good && std::abs(frame_loads_.pressure_mpa - loads_.pressure_mpa) <= kSamePressureMpa &&
+      (frame_loads_.specific_force_mps2 - loads_.specific_force_mps2).norm() <= kSameSpecificForceMps2;
   follower_.Update(MonotonicNs(times, clock), sure ? std::optional(StrongestLoad(state)) : std::nullopt,
                    off_mm_);
 }
@@ -124,8 +126,8 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
     const MeasuredLoads loads = tare_->loads();
     const auto untouched = estimator.UntouchedAt(loads.Loads());
     skin.Tare(tare_->markers(), loads, untouched.value_or(estimator.estimate().baseline_mm));
-    Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare,
-         loads.pressure_mpa, times, clock);
+    Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, loads.Loads(),
+         times, clock);
   }
   tare_.reset();
 }

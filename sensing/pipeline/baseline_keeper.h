@@ -27,8 +27,7 @@ class BaselineKeeper {
 
   /// A baseline was taken, under this gauge pressure, the newest of its frames at `times`. Times are those of
   /// frames, so that pictures solved again later tell the same; the clock's for frames without.
-  void Take(BaselineOrigin origin, double pressure_mpa, const FrameTimes& times, const Clock& clock);
-  double PressureChange(double pressure_mpa) const { return pressure_mpa - pressure_mpa_; }
+  void Take(BaselineOrigin origin, const KnownLoads& loads, const FrameTimes& times, const Clock& clock);
   /// How far the untouched skin has gone since, by marker; empty: that is not followed.
   std::span<const Vec3> DriftMm() const { return drift_ ? follower_.drift_mm() : std::span<const Vec3>(); }
 
@@ -66,7 +65,7 @@ class BaselineKeeper {
   const std::optional<DriftOptions> drift_;
   Baseline baseline_;
   int64_t taken_ns_ = 0;  // monotonic
-  double pressure_mpa_ = 0;
+  KnownLoads loads_;
   DriftFollower follower_;
 
   MeasuredLoads frame_loads_;  // of the frame in work

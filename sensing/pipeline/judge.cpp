@@ -1,5 +1,6 @@
 #include "sensing/pipeline/judge.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdarg>
@@ -19,6 +20,8 @@ constexpr double kWidestGap = 3.5;
 // A tangent's forces are wrong by a fifth a millimeter (force-accuracy.md); likewise.
 constexpr double kFirstOrderMm = 0.6;
 constexpr double kPressureDeviations = 3;
+// Markers that are uncertain by more for the specific force alone, contacts of 0.02 N may hide among.
+constexpr double kMostAttitudeErrorMm = 0.2;
 // chi^2 per number of a region of 3 x 3 markers: right answers stay below 3, wrong ones are above, those of a
 // half covered camera from 3.2 on (bench whole: none of 7 105 sound frames lies between 3 and 5).
 constexpr double kMostRegionResidual = 3;
@@ -41,7 +44,7 @@ constexpr double kWaveDeg = 75, kBeltMm = 24;
 constexpr double kHugLimits = 4;
 
 std::string Text(const char* format, ...) {
-  char text[240];
+  char text[400];
   va_list arguments;
   va_start(arguments, format);
   std::vsnprintf(text, sizeof text, format, arguments);
@@ -215,6 +218,51 @@ void AddPressureReasons(const Evidence& evidence, LinkState& state) {
               "baseline's pressure",
               1e3 * now_mpa, 1e3 * told.pressure_mpa),
          off_mpa, most_off_mpa});
+}
+
+// Of measured loads and of the estimate's errors of them: the change since the baseline, for what both have
+// in common is no difference.
+double AttitudeDeviations(const Evidence& evidence) {
+  const Mat3 covariance =
+      evidence.told.specific_force_covariance + evidence.baseline.specific_force_covariance;
+  if (covariance.isZero(0)) return 0;
+  const LoadEstimate& loads = evidence.estimate.loads;
+  const Vec3 off = (loads.known_error - loads.baseline_error).tail<3>();
+  return std::sqrt(std::max(0.0, off.dot(covariance.ldlt().solve(off))));
+}
+
+void AddAttitudeReasons(const Evidence& evidence, LinkState& state) {
+  constexpr const char* kRemedy =
+      "check where the link is mounted (pose), the URDF, the joints' zeros and the sensor's frame";
+  if (const auto& off = evidence.attitude) {
+    state.reasons.push_back(
+        {ReasonId::kAttitudeMismatch,
+         Text("since the baseline the skin shows another change of attitude than is measured, %.0f deg off: "
+              "(%.1f, %.1f, %.1f) instead of (%.1f, %.1f, %.1f) m/s2; the measured one is not used; %s",
+              off->angle_deg, off->skin_mps2.x(), off->skin_mps2.y(), off->skin_mps2.z(),
+              off->measured_mps2.x(), off->measured_mps2.y(), off->measured_mps2.z(), kRemedy),
+         off->deviations, AttitudeCheck::kLimit});
+    return;
+  }
+  if (const double deviations = AttitudeDeviations(evidence); deviations > AttitudeCheck::kLimit) {
+    state.reasons.push_back(
+        {ReasonId::kAttitudeMismatch,
+         Text("the skin contradicts the measured attitude by %.1f standard deviations; %s", deviations,
+              kRemedy),
+         deviations, AttitudeCheck::kLimit});
+    return;
+  }
+  const double limit_mm = kMostAttitudeErrorMm * LengthUnit(evidence.model);
+  if (evidence.attitude_error_mm <= limit_mm) return;
+  const std::string trouble = state.specific_force ? state.specific_force->trouble : "";
+  state.reasons.push_back(
+      {ReasonId::kAttitudeUnknown,
+       Text("the attitude is not known, and the skin tells it only to %.1f mm of its sag: weak contacts may "
+            "be "
+            "missed or off; %s",
+            evidence.attitude_error_mm,
+            trouble.empty() ? "send joint states, or the attitude (UpdateAttitude)" : trouble.c_str()),
+       evidence.attitude_error_mm, limit_mm});
 }
 
 Reason ApartReason(const CameraAgreement& agreement, double most_apart) {
@@ -421,6 +469,7 @@ void Judge(const Evidence& evidence, LinkState& state) {
   if (auto failure = FailureReason(evidence.estimate.failure); failure && !lost)
     state.reasons.push_back(*std::move(failure));
   if (!lost) AddPressureReasons(evidence, state);
+  if (!lost && state.forces.converged) AddAttitudeReasons(evidence, state);
   if (!lost && evidence.drift) state.reasons.push_back(*evidence.drift);
   if (!lost && state.forces.converged) {
     AddShapeReasons(evidence, state);

@@ -6,6 +6,7 @@
 #include "sensing/core/link_model.h"
 #include "sensing/core/link_state.h"
 #include "sensing/estimation/camera_evidence.h"
+#include "sensing/pipeline/attitude_check.h"
 #include "sensing/pipeline/camera_motion.h"
 #include "sensing/pipeline/state_estimator.h"
 
@@ -30,13 +31,15 @@ struct Evidence {
   const LinkModel& model;
   std::optional<Reason> camera_trouble;  ///< none: both cameras' pictures are there
   CameraAgreement agreement;
-  std::optional<MotionDisagreement> motion;  ///< see CameraMotion
-  std::optional<CameraId> sees_alone;        ///< see RestComparison
-  std::optional<Reason> drift;               ///< none: the baseline has not drifted far
-  bool is_baseline_forced = false;           ///< taken although something touched or moved
-  MeasuredLoads told;                        ///< the pressure that was taken as told
-  bool is_told = true;                       ///< false: by nobody, or by a sensor that fell silent
-  MeasuredLoads baseline;                    ///< and that of the baseline
+  std::optional<MotionDisagreement> motion;           ///< see CameraMotion
+  std::optional<CameraId> sees_alone;                 ///< see RestComparison
+  std::optional<AttitudeDisagreement> attitude = {};  ///< none: measured attitude and skin agree
+  double attitude_error_mm = 0;     ///< of a marker, by what is not known of the specific force
+  std::optional<Reason> drift;      ///< none: the baseline has not drifted far
+  bool is_baseline_forced = false;  ///< taken although something touched or moved
+  MeasuredLoads told;               ///< the pressure that was taken as told
+  bool is_told = true;              ///< false: by nobody, or by a sensor that fell silent
+  MeasuredLoads baseline;           ///< and that of the baseline
   const SkinEstimate& estimate;
 };
 

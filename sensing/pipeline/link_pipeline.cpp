@@ -10,6 +10,7 @@
 #include "sensing/markers/detect/detector.h"
 #include "sensing/markers/label/path_tracker.h"
 #include "sensing/markers/track/marker_tracker.h"
+#include "sensing/pipeline/attitude_check.h"
 #include "sensing/pipeline/baseline_keeper.h"
 #include "sensing/pipeline/camera_motion.h"
 #include "sensing/pipeline/judge.h"
@@ -43,6 +44,15 @@ std::string CalibrationAdvice(const MeasuredLoads& loads) {
       "; the skin is under %.3f kPa: cameras are calibrated without pressure, or have a saved calibration",
       1e3 * loads.pressure_mpa);
   return text;
+}
+
+// A baseline that is taken in this frame has the specific force that was estimated in it.
+MeasuredLoads WithEstimate(MeasuredLoads loads, const LinkState& state) {
+  if (const auto& estimate = state.specific_force_estimate) {
+    loads.specific_force_mps2 = estimate->mps2;
+    loads.specific_force_covariance = estimate->covariance;
+  }
+  return loads;
 }
 
 }  // namespace
@@ -88,6 +98,7 @@ struct LinkPipeline::Stages {
   std::shared_ptr<StateEstimator> estimator;
   ContactFinder finder;
   BaselineKeeper keeper;
+  AttitudeCheck attitude;
 
   double MsSince(int64_t start_ns) const {
     return static_cast<double>(clock.MonotonicNs() - start_ns) * 1e-6;
@@ -205,16 +216,16 @@ struct LinkPipeline::Stages {
     rest.reset();
   }
 
-  // Of a link that never moves nobody need tell the attitude: where its images are not explained without
-  // weight, they tell it. Of an unknown one, each refusal has another guess tried: all of them would keep
-  // the link busy for 10 s.
+  // Images that the measured loads do not explain may show another attitude: of a link that never moves
+  // nobody need tell it, and a wrong one is found here (attitude_mismatch). With each refusal another guess
+  // is tried, for all of them would keep the link busy for 10 s.
   std::vector<MeasuredLoads> RestAlternatives(const MeasuredLoads& measured, bool never_moves) const {
     MeasuredLoads any = measured;
-    if (never_moves) any.ForgetAttitude();
+    any.ForgetAttitude();
     const std::vector<MeasuredLoads> guesses = RestGuesses(any);
-    const MeasuredLoads& next = guesses[refusals % guesses.size()];
     if (refusals == 0 && !never_moves) return {measured};
-    return {measured, next};
+    if (!calibrates) return {measured, any};  // labels of known cameras need no guess
+    return {measured, guesses[refusals % guesses.size()]};
   }
 
   void BeginMeasurement(const RestResult& found, const StereoFrame& frame) {
@@ -230,7 +241,8 @@ struct LinkPipeline::Stages {
     // Whatever it is, it stays, and is no difference to any frame.
     if (NeverMoves(frame)) loads.specific_force_covariance.setZero();
     skin->SetBaseline(found.markers, loads, *estimator->UntouchedAt(loads.Loads()));
-    keeper.Take(rest_origin, loads.pressure_mpa, frame.times, clock);
+    keeper.Take(rest_origin, loads.Loads(), frame.times, clock);
+    attitude.Restart();
     predicted_mm.clear();
   }
 
@@ -360,13 +372,13 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.times = frame.times;
   state.pressure_mpa = frame.pressure_mpa;
   state.pressure = frame.pressure;
+  state.specific_force = frame.specific_force;
   state.stage_ms = {};
   const bool stale = frame.pressure.stale;
   MeasuredLoads told = s.MeasuredAt(frame);
   // A sensor that fell silent, or none at all: the shape tells the pressure.
   const bool is_told = !stale && (frame.pressure_mpa || s.options.pressure_mpa ||
                                   frame.pressure.origin != PressureOrigin::kNone);
-  const std::optional<MeasuredLoads> known = is_told ? std::optional(told) : std::nullopt;
 
   const auto timed = [&s](double& stage_ms, auto&& stage) {
     const int64_t start = s.clock.MonotonicNs();
@@ -383,6 +395,9 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
     s.TakeRest(frame, told, state);
     return;
   }
+  const MeasuredLoads measured = told;
+  told = s.attitude.LoadsOf(measured, frame.times.exposure_monotonic_ns);
+  const std::optional<MeasuredLoads> known = is_told ? std::optional(told) : std::nullopt;
   timed(state.stage_ms.register_, [&] { s.Label(state); });
   s.motion->Observe(frame.times, s.labels);
   state.times.tracked_ns = s.clock.MonotonicNs();
@@ -391,8 +406,10 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   s.TakeBackRejected(state);
   s.predicted_mm = state.shape.positions_mm;
   const SkinEstimate& estimate = s.estimator->estimate();
-  if (estimate.failure == EstimateFailure::kNone) s.keeper.Apply(told, estimate, state.shape);
+  s.attitude.Observe(measured, s.skin->baseline_loads(), estimate);
   s.estimator->WriteKnownLoads(state);
+  if (estimate.failure == EstimateFailure::kNone)
+    s.keeper.Apply(WithEstimate(told, state), estimate, state.shape);
   state.total_force_n.setZero();
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   Judge({.model = s.model,
@@ -400,6 +417,8 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
          .agreement = s.skin->agreement(),
          .motion = s.motion->disagreement(),
          .sees_alone = s.skin->sees_alone(),
+         .attitude = s.attitude.disagreement(),
+         .attitude_error_mm = s.estimator->AttitudeErrorMm(),
          .drift = s.keeper.DriftReason(),
          .is_baseline_forced = s.keeper.is_forced(),
          .told = told,

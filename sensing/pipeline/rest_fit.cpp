@@ -15,7 +15,10 @@ namespace {
 constexpr double kLeastSeenFraction = 0.5;  // in each image
 constexpr double kStillPx = 1.5;            // a spot is the same one within
 constexpr int kMostSteps = 5;
-constexpr double kSettledMm = 0.03;  // the last step of the specific force moves no marker more, in units
+// Of the depth of a dent that is called touched: a fit of the attitude takes up most of what a touch does.
+constexpr double kFittedDentShare = 0.3;
+constexpr double kExplainedShare = 0.1;  // of the residuals without the fit, that may be left with it
+constexpr double kSettledMm = 0.03;      // the last step of the specific force moves no marker more, in units
 
 // The mean places of the spots that most pairs show.
 DetectionPair Steady(const std::vector<DetectionPair>& pairs) {
@@ -154,18 +157,28 @@ Result<MarkerMean> RestFit::Mean(const StereoRig& rig,
 Result<RestResult> RestFit::ExplainByRig(const StereoRig& rig, const MeasuredLoads& loads) const {
   const auto mean = Mean(rig, nullptr);
   if (!mean) return mean.error();
+  const double most_dent_mm = options_.max_dent_mm * LengthUnit(model_);
+  const auto touched = [&](const Dent& dent) {
+    return Error{ErrorCode::kFailedPrecondition,
+                 Describe(model_, dent) + "; if nothing is there, a camera has moved: calibrate again"};
+  };
   auto shape = ShapeAt(loads);
   if (!shape) return shape.error();
   RestResult result{.calibration = {}, .markers = mean->markers(), .loads = loads};
+  CalibrationSummary seen = ResidualsOf(*shape, rig, mean->markers());
+  const auto dent = FindDent(*shape, seen, most_dent_mm);
   if (IsRestUncertain(*shape)) {
     if (const auto fitted = FitRestLoads(loads, shape_at_, rig, mean->markers())) result.loads = *fitted;
     shape = ShapeAt(result.loads);
     if (!shape) return shape.error();
+    const double before_px = seen.rms_px;
+    seen = ResidualsOf(*shape, rig, mean->markers());
+    // Weight explains all of a sag, but only the larger part of what a touch does.
+    if (dent && seen.rms_px > kExplainedShare * before_px) return touched(*dent);
+    if (const auto left = FindDent(*shape, seen, most_dent_mm)) return touched(*left);
+  } else if (dent) {
+    return touched(*dent);
   }
-  const CalibrationSummary seen = ResidualsOf(*shape, rig, mean->markers());
-  if (const auto dent = FindDent(*shape, seen, options_.max_dent_mm * LengthUnit(model_)))
-    return Error{ErrorCode::kFailedPrecondition,
-                 Describe(model_, *dent) + "; if nothing is there, a camera has moved: calibrate again"};
   result.calibration.rig = rig;
   result.noise_px = NoiseOf(*mean, seen.rms_px);
   return result;
@@ -210,7 +223,9 @@ Result<RestResult> RestFit::Refine(MeasuredLoads loads) const {
   }
   const auto shape = ShapeAt(loads);
   if (!shape) return shape.error();
-  return CalibrateAt(*shape, loads, options_);
+  CalibrationOptions strict = options_;
+  strict.max_dent_mm *= kFittedDentShare;
+  return CalibrateAt(*shape, loads, strict);
 }
 
 }  // namespace taclink

@@ -212,6 +212,19 @@ void StateEstimator::WriteKnownLoads(LinkState& state) const {
   state.specific_force_estimate = {estimated.specific_force_mps2, estimated.specific_force_covariance};
 }
 
+double StateEstimator::AttitudeErrorMm() {
+  if (estimate_.failure != EstimateFailure::kNone || !IsAttitudeUnknown(observation_.loads)) return 0;
+  const UntouchedSkin* skin = skin_.mechanics().Untouched(estimate_.known_loads);
+  if (skin == nullptr) return 0;
+  const Mat3 covariance = estimate_.loads.known_covariance.bottomRightCorner<3, 3>();
+  double largest_mm2 = 0;
+  for (Eigen::Index row = 0; row + 2 < skin->markers_by_loads.rows(); row += 3) {
+    const Mat3 by = skin->markers_by_loads.block<3, 3>(row, 1);
+    largest_mm2 = std::max(largest_mm2, (by * covariance * by.transpose()).trace());
+  }
+  return std::sqrt(largest_mm2);
+}
+
 void StateEstimator::FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,
                                   std::vector<Contact>& contacts) {
   if (!forces.converged)

@@ -48,6 +48,9 @@ class StateEstimator {
                     std::vector<Contact>& contacts);
   /// Writes what was estimated of the known loads last; nothing where there is no answer.
   void WriteKnownLoads(LinkState& state) const;
+  /// How far what is not known of the specific force may put a marker off, one standard deviation, of the
+  /// marker that it puts off most, mm; of the last estimate. 0: it is known, or there is no answer.
+  double AttitudeErrorMm();
   /// Forgets the frames before.
   void Restart() { skin_.Restart(); }
 

@@ -26,9 +26,11 @@ Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, C
     links_.push_back(std::move(parts.description));
     watched.push_back({links_.back().name, links_.back().rules, links_.back().model.markers});
     pressures_.push_back(parts.pressure ? std::move(parts.pressure) : MakeAssumedPressure(std::nullopt));
+    attitudes_.push_back(parts.attitude ? std::move(parts.attitude) : MakeSourceAttitude());
     LinkWorkerOptions worker = options.worker;
     worker.realtime = parts.realtime;
     worker.pressure = pressures_.back();
+    worker.attitude = attitudes_.back();
     workers_.push_back(std::make_unique<LinkSupervisor>(
         link, links_.back().name, std::move(parts.source), std::move(parts.processor),
         std::move(parts.factories), hub_, clock, worker, options.watchdog));

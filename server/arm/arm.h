@@ -9,6 +9,7 @@
 #include "sensing/core/link_model.h"
 #include "server/arm/arm_contacts.h"
 #include "server/arm/arm_poses.h"
+#include "server/attitude/attitude_source.h"
 #include "server/events/event_engine.h"
 #include "server/hub/hub.h"
 #include "server/link/link_supervisor.h"
@@ -36,7 +37,8 @@ struct LinkParts {
   std::unique_ptr<FrameSource> source;
   std::unique_ptr<LinkProcessor> processor;
   std::shared_ptr<PressureSource> pressure =
-      nullptr;                   ///< null: not known where the source does not measure it
+      nullptr;  ///< null: not known where the source does not measure it
+  std::shared_ptr<AttitudeSource> attitude = nullptr;  ///< null: as the source has it
   LinkFactories factories = {};  ///< of the next source and processor; none: a link that dies stays so
   RealtimeOptions realtime = {};
 };
@@ -67,6 +69,7 @@ class Arm {
   const LinkSupervisor& worker(size_t link) const { return *workers_[link]; }
   Watchdog& watchdog() { return watchdog_; }
   PressureSource& pressure(size_t link) { return *pressures_[link]; }
+  AttitudeSource& attitude(size_t link) { return *attitudes_[link]; }
   /// The index of a link. Errors: kNotFound, with the links there are.
   Result<size_t> FindLink(const std::string& name) const;
   Hub& hub() { return hub_; }
@@ -88,6 +91,7 @@ class Arm {
   Hub hub_;
   std::unique_ptr<EventEngine> events_;
   std::vector<std::shared_ptr<PressureSource>> pressures_;  // by link
+  std::vector<std::shared_ptr<AttitudeSource>> attitudes_;  // by link
   std::vector<std::unique_ptr<LinkSupervisor>> workers_;    // by link
   Watchdog watchdog_;
 };

@@ -11,6 +11,7 @@
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/state_estimator.h"
 #include "sensing/simulation/scene.h"
+#include "server/assembly/attitude_factory.h"
 #include "server/assembly/pressure_factory.h"
 #include "server/assembly/processor_factory.h"
 #include "server/assembly/source_factory.h"
@@ -144,6 +145,7 @@ Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock) {
   for (auto& parts : BuildLinks(config, clock)) {
     if (!parts) return parts.error();
     names.push_back(parts->description.name);
+    parts->attitude = MakeAttitude(config, links.size(), poses->get(), parts->description.model.length_mm);
     links.push_back(std::move(*parts));
   }
   return std::make_unique<Arm>(config.arm_name, std::move(links), MakeEncoder(names), clock,

@@ -43,6 +43,10 @@ void DescribeLinks(FieldVisitor& visit, Config& config) {
         [&config](FieldVisitor& fields, const LinkConfig& link) {
           fields.Check(link.frame.empty() || config.kinematics.urdf, "pose",
                        "has a 'frame', so the arm must have a 'urdf' that holds it");
+          fields.Check(!link.gravity || !std::holds_alternative<JointGravityConfig>(link.gravity->source) ||
+                           (config.kinematics.urdf && !link.frame.empty()),
+                       "gravity", "by joint states needs the arm's 'urdf' and the link's pose.frame",
+                       {"pose"});
         });
   visit.Check(!config.links.empty(), "links", "must name at least one link");
 }

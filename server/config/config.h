@@ -21,7 +21,8 @@ namespace taclink::server {
 /// What a serial line may be set to.
 inline constexpr std::array kBaudRates = {1200,  2400,  4800,   9600,   19200,
                                           38400, 57600, 115200, 230400, 921600};
-inline constexpr Range kPressureKpa{-100, 100}, kFrameRates{0.01, 1000}, kNoLimits{};
+inline constexpr Range kPressureKpa{-100, 100}, kSpecificForce{-100, 100}, kFrameRates{0.01, 1000},
+    kNoLimits{};
 
 struct ConstantPressureConfig {  ///< configured, not measured
   double kpa = 0;                ///< gauge
@@ -63,6 +64,37 @@ struct PressureConfig {
       if (kind >= 2) fields("stale_after_s", stale_after_s, {0.01, 3600}, "An older reading is not used.");
     });
     visit("sigma_pa", sigma_pa, {0.1, 1e5}, "Standard deviation; not set: as is usual for the source.");
+  }
+};
+
+struct FixedGravityConfig {};  ///< the link never moves
+struct ConstantGravityConfig {
+  std::array<double, 3> mps2{};
+  void Describe(FieldVisitor& visit) {
+    visit(Required("mps2"), mps2, kSpecificForce, "Where things fall, in the link's frame, with 9.81.");
+  }
+};
+struct JointGravityConfig {};  ///< by the arm's URDF and joint states
+struct ClientGravityConfig {   ///< clients send it by UpdateAttitude
+  std::chrono::milliseconds stale_after{200};
+  void Describe(FieldVisitor& visit) {
+    visit("stale_after_s", stale_after, {0.01, 3600}, "A reading farther from an exposure is not used.");
+  }
+};
+struct UnknownGravityConfig {};  ///< the skin tells it
+
+/// Where the specific force in a link's frame comes from, under which its skin sags.
+struct GravityConfig {
+  std::variant<FixedGravityConfig, ConstantGravityConfig, JointGravityConfig, ClientGravityConfig,
+               UnknownGravityConfig>
+      source;
+  double sigma_mps2 = 0.2;
+  void Describe(FieldVisitor& visit) {
+    const Names names = {"fixed", "constant", "joint_states", "grpc", "unknown"};
+    visit.Variant(Required("source"), source, names, "Origin.", [this](FieldVisitor& fields, size_t kind) {
+      if (kind >= 1 && kind <= 3)
+        fields("sigma_mps2", sigma_mps2, {0.001, 100}, "Standard deviation of each component.");
+    });
   }
 };
 
@@ -121,6 +153,7 @@ struct LinkConfig {
   SourceConfig source;
   std::optional<std::string> calibration;
   std::optional<PressureConfig> pressure;  ///< none: the source's, or unknown
+  std::optional<GravityConfig> gravity;    ///< none: the source's; of a jointed arm joint states, else fixed
   std::optional<ForceModel> force_model;   ///< none: the cheapest that is accurate enough, frame by frame
   bool force_model_anyway = false;
   int force_refinement = 0;

@@ -83,6 +83,7 @@ void LinkConfig::Describe(FieldVisitor& visit) {
   visit.Variant(Required("source"), source, {"v4l2", "files", "simulated"}, "Where the images come from.");
   visit.Path("calibration", calibration, "Calibration of the cameras; not set: from the first images.");
   DescribePressure(visit, *this);
+  visit("gravity", gravity, "Source of the link's attitude; not set: by joint states, or it never moves.");
   Names models = {"auto"};
   for (const ForceModel one : kForceModels) models.emplace_back(Name(one));
   visit.Choice("force_model", force_model, models, kForceModels, "`auto`: the cheapest that is accurate.");

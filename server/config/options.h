@@ -165,11 +165,13 @@ struct JointStateOptions {
 struct KinematicsConfig {
   std::optional<std::string> urdf;
   std::string base;
+  std::array<double, 3> gravity_mps2{0, 0, -9.80665};  ///< base frame
   JointStateOptions joint_states;
   void Describe(FieldVisitor& visit) {
     visit.Path("urdf", urdf, "Description of the arm's joints; not set: the links stand still.");
     visit("base", base, "Link of the URDF that the arm's frame is; empty: its root.");
     visit.Check(base.empty() || urdf, "base", "is a link of a URDF; give 'urdf' too", {"urdf"});
+    visit("gravity_mps2", gravity_mps2, {-100, 100}, "Where things fall, in the base's frame.");
     if (!visit.Wants("joint_states", urdf.has_value())) return;
     visit("joint_states", joint_states, "How joint states become positions at an image's exposure.");
     visit.Check(urdf.has_value(), "joint_states", "are of a URDF's joints; give 'urdf' too", {"urdf"});

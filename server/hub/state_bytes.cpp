@@ -15,6 +15,8 @@ size_t BufferBytes(const T& value) {
     bytes = value.capacity() * sizeof(typename T::value_type);
     if constexpr (!std::is_trivially_destructible_v<typename T::value_type>)
       for (const auto& element : value) bytes += BufferBytes(element);
+  } else if constexpr (kIsOptional<T>) {
+    if (value) bytes = BufferBytes(*value);
   } else if constexpr (std::same_as<T, std::string>) {
     bytes = value.capacity();
   } else {

@@ -116,6 +116,7 @@ void LinkWorker::Capture(const std::stop_token& stop) {
     if (supervisor_.WaitsForReader() && !mailbox_.WaitUntilTaken(options_.poll)) continue;
     if (!supervisor_.Next(frame, options_.poll)) continue;
     if (options_.pressure) options_.pressure->Apply(frame);
+    if (options_.attitude) options_.attitude->Apply(frame);
     frame.pressure.mpa = ExactInPascals(frame.pressure.mpa);
     if (frame.pressure_mpa) frame.pressure_mpa = ExactInPascals(*frame.pressure_mpa);
     mailbox_.Put(frame);

@@ -14,6 +14,7 @@
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
 #include "sensing/core/link_state.h"
+#include "server/attitude/attitude_source.h"
 #include "server/hub/hub.h"
 #include "server/link/camera_memory.h"
 #include "server/link/command_queue.h"
@@ -46,6 +47,7 @@ struct LinkWorkerOptions {
   int failures = 30;
   RealtimeOptions realtime = {};
   std::shared_ptr<PressureSource> pressure = nullptr;  ///< null: as the frames have it
+  std::shared_ptr<AttitudeSource> attitude = nullptr;  ///< likewise
   SupervisorOptions supervisor = {};
 };
 

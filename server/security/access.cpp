@@ -13,6 +13,7 @@ constexpr AccessRule kTable[] = {
     {"/taclink.v1.TactileService/SetThresholds", Role::kOperator},
     {"/taclink.v1.TactileService/UpdateJointStates", Role::kOperator},
     {"/taclink.v1.TactileService/UpdatePressure", Role::kOperator},
+    {"/taclink.v1.TactileService/UpdateAttitude", Role::kOperator},
     {"/taclink.v1.TactileService/Calibrate", Role::kOperator},
     {"/taclink.v1.TactileService/Tare", Role::kOperator},
     {"/taclink.v1.TactileService/StreamPreview", Role::kViewer},

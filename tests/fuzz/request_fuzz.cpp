@@ -38,7 +38,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       &Parse<v1::SetForceModelRequest>,     &Parse<v1::RestartLinkRequest>,
       &Parse<v1::StartRecordingRequest>,    &Parse<v1::DownloadLogRequest>,
       &Parse<v1::ControlReplayRequest>,     &Parse<v1::GetReplayPicturesRequest>,
-      &Parse<v1::UpdateJointStatesRequest>, &Parse<v1::UpdatePressureRequest>};
+      &Parse<v1::UpdateJointStatesRequest>, &Parse<v1::UpdatePressureRequest>,
+      &Parse<v1::UpdateAttitudeRequest>};
   constexpr size_t kCount = std::size(kParsers);
   const size_t call = data[0] % (kCount + 2);
   if (call < kCount) {

@@ -26,9 +26,13 @@ using ::testing::HasSubstr;
 
 // Where a negative or a huge number is a right one, and why.
 const std::set<std::string> kMayBeNegative = {
-    "UpdateJointStatesRequest.positions", "UpdateJointStatesRequest.velocities",
+    "UpdateJointStatesRequest.positions",
+    "UpdateJointStatesRequest.velocities",
     "UpdatePressureRequest.pressure_pa",  // below the surroundings
-    "SetCameraRequest.gain",              // in units of the camera, which knows its range
+    "Vector3.x",
+    "Vector3.y",
+    "Vector3.z",
+    "SetCameraRequest.gain",  // in units of the camera, which knows its range
 };
 const std::set<std::string> kMayBeHuge = {
     "SetCameraRequest.gain",
@@ -42,6 +46,8 @@ const std::set<std::string> kMayBeHuge = {
     "UpdateJointStatesRequest.monotonic_ns",  // far from the server's clock
     "UpdatePressureRequest.utc_ns",
     "UpdatePressureRequest.monotonic_ns",
+    "UpdateAttitudeRequest.utc_ns",
+    "UpdateAttitudeRequest.monotonic_ns",
 };
 
 struct BadValue {

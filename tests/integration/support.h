@@ -11,6 +11,7 @@
 #include "client/cpp/taclink/client.h"
 #include "sensing/model/model_file.h"
 #include "server/arm/arm.h"
+#include "server/attitude/client_attitude.h"
 #include "server/hub/encoder.h"
 #include "server/rpc/rpc_server.h"
 #include "tests/server/support.h"
@@ -43,6 +44,8 @@ class TestServer {
     for (size_t link = 0; link < 2; ++link) {
       links_.push_back(MakeLink(link));
       if (pressure) links_.back().pressure = pressure(link, clock_);
+      if (link == 0)  // as clients tell it
+        links_.back().attitude = std::make_shared<ClientAttitude>(0.2, std::chrono::milliseconds(200));
     }
     arm_ =
         std::make_unique<Arm>("test", std::move(links_), CountingEncoder(), clock_,
@@ -116,6 +119,7 @@ class TestServer {
           FillTestState(link, frame.sequence, state);
           state.times = frame.times;
           state.pressure = frame.pressure;
+          state.specific_force = frame.specific_force;
           if (frame.pressure.origin != PressureOrigin::kNone) state.pressure_mpa = frame.pressure_mpa;
         })};
   }

@@ -54,6 +54,12 @@ struct Setter {
     (*this)(path, value.mps2);
     (*this)(path, value.covariance);
   }
+  void operator()(const std::string& path, SpecificForceReading& value) const {
+    (*this)(path, value.mps2);
+    (*this)(path, value.covariance);
+    value.origin = AttitudeOrigin::kClient;
+    (*this)(path, value.trouble);
+  }
   void operator()(const std::string&, MeasuredDisplacement& value) const { value.displacement_mm.setOnes(); }
   void operator()(const std::string&, RejectedMarker& value) const { value.marker = 1; }
   void operator()(const std::string&, std::array<CameraCounts, kCameraCount>& cameras) const {
@@ -134,6 +140,9 @@ struct Printer {
   }
   static std::string Text(const SpecificForceEstimate& value) {
     return Text(value.mps2) + " " + Text(value.covariance);
+  }
+  static std::string Text(const SpecificForceReading& value) {
+    return Text(value.mps2) + " " + Text(value.covariance) + " " + Text(value.origin) + " " + value.trouble;
   }
   static std::string Text(const std::array<CameraCounts, kCameraCount>& cameras) {
     std::string text;

@@ -50,15 +50,29 @@ Json EstimateJson(const v1::LinkFrame& frame) {
   return Json::array({estimate.pressure_pa() * kKpaPerPascal, estimate.sigma_pa() * kKpaPerPascal});
 }
 
+// Of the upper triangle of a covariance, the diagonal's roots.
+Json SigmasJson(const google::protobuf::RepeatedField<double>& covariance) {
+  Json sigmas = Json::array();
+  for (const int entry : {0, 3, 5}) {
+    if (entry < covariance.size()) sigmas.push_back(std::sqrt(std::max(covariance[entry], 0.0)));
+  }
+  return sigmas;
+}
+
 Json SpecificForceJson(const v1::LinkFrame& frame) {
   if (!frame.has_specific_force_estimate()) return nullptr;
   const v1::SpecificForceEstimate& estimate = frame.specific_force_estimate();
-  Json sigmas = Json::array();
-  for (const int entry : {0, 3, 5}) {  // of the upper triangle, the diagonal
-    if (entry < estimate.covariance_m2_s4_size())
-      sigmas.push_back(std::sqrt(std::max(estimate.covariance_m2_s4(entry), 0.0)));
-  }
-  return {{"value", ToJson(estimate.specific_force_mps2())}, {"sigma", std::move(sigmas)}};
+  return {{"value", ToJson(estimate.specific_force_mps2())},
+          {"sigma", SigmasJson(estimate.covariance_m2_s4())}};
+}
+
+Json ReportJson(const v1::LinkFrame& frame) {
+  if (!frame.has_specific_force()) return nullptr;
+  const v1::SpecificForceReport& report = frame.specific_force();
+  return {{"value", ToJson(report.specific_force_mps2())},
+          {"sigma", SigmasJson(report.covariance_m2_s4())},
+          {"origin", client::Name(report.origin())},
+          {"trouble", report.trouble()}};
 }
 
 Json ReasonsJson(const v1::LinkFrame& frame) {
@@ -106,6 +120,7 @@ std::string FrameJson(const v1::LinkFrame& frame) {
       {"pressure_kpa", NumberOrNull(frame.has_pressure_pa(), frame.pressure_pa() * kKpaPerPascal)},
       {"pressure", PressureJson(frame.pressure())},
       {"pressure_estimate_kpa", EstimateJson(frame)},
+      {"specific_force_mps2", ReportJson(frame)},
       {"specific_force_estimate_mps2", SpecificForceJson(frame)},
       {"force_model", client::Name(frame.force_model())},
       {"markers", {{"seen", frame.markers_seen()}, {"inferred", frame.markers_inferred()}}},

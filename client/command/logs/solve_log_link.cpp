@@ -119,7 +119,7 @@ Result<std::string> LogLinkSolver::Solve(const std::string& recorded_bytes,
   if (recorded_.times.exposure_monotonic_ns == 0) return recorded_bytes;  // a report
   NoteFrame();
   const bool solvable = report_.from_pictures ? HasPicture(pictures) : recorded_.measured();
-  if (!report_.from_pictures) FollowPressure();
+  if (!report_.from_pictures) FollowLoads();
   if (!solvable) return recorded_bytes;
   Begin();
   v1::LinkFrame solved = recorded;
@@ -149,6 +149,7 @@ Result<void> LogLinkSolver::SolvePictures(const RecordedPictures& pictures, v1::
                   .received_ns = recorded_.times.received_ns};
   frame_.pressure_mpa = recorded_.pressure_mpa;
   frame_.pressure = recorded_.pressure;
+  frame_.specific_force = recorded_.specific_force;
   for (const CameraId camera : kBothCameras) {
     auto image = Image(camera, pictures[Index(camera)]);
     if (!image) return image.error();
@@ -191,19 +192,35 @@ double LogLinkSolver::FramePressure() const {
   return recorded_.pressure_mpa.value_or(settings_.options.pressure_mpa.value_or(0));
 }
 
+// The known loads as the frame was solved with; what a frame's estimate found is what a baseline taken in it
+// has.
+MeasuredLoads LogLinkSolver::FrameLoads() const {
+  MeasuredLoads loads{.pressure_mpa = FramePressure(),
+                      .pressure_sigma_mpa = settings_.options.pressure_sigma_mpa.value_or(
+                          PressureSigma(recorded_.pressure.origin))};
+  if (!recorded_.specific_force) return loads;
+  loads.specific_force_mps2 = recorded_.specific_force->mps2;
+  loads.specific_force_covariance = recorded_.specific_force->covariance;
+  return loads;
+}
+
 // A baseline is taken with the frame before the first that is measured against it.
-void LogLinkSolver::FollowPressure() {
-  const double now_mpa = FramePressure();
+void LogLinkSolver::FollowLoads() {
+  MeasuredLoads now = FrameLoads();
   if (recorded_.measured() && recorded_.baseline.taken_utc_ns != baseline_utc_ns_) {
     baseline_utc_ns_ = recorded_.baseline.taken_utc_ns;
-    baseline_mpa_ = before_mpa_.value_or(now_mpa);
-    if (!before_mpa_ && recorded_.pressure_mpa) {
+    baseline_loads_ = before_.value_or(now);
+    if (!before_ && (recorded_.pressure_mpa || recorded_.specific_force)) {
       report_.warnings.emplace_back(
-          "the pressure under which the baseline was taken is not in the log: that of the first frame stands "
-          "in");
+          "the pressure and attitude in which the baseline was taken are not in the log: those of the first "
+          "frame stand in");
     }
   }
-  before_mpa_ = now_mpa;
+  if (const auto& estimate = recorded_.specific_force_estimate; estimate && recorded_.specific_force) {
+    now.specific_force_mps2 = estimate->mps2;
+    now.specific_force_covariance = estimate->covariance;
+  }
+  before_ = now;
 }
 
 Result<void> LogLinkSolver::SolveMarkers(v1::LinkFrame& solved) {
@@ -223,21 +240,19 @@ Result<void> LogLinkSolver::SolveMarkers(v1::LinkFrame& solved) {
                      settings_.model.name + "' has " + std::to_string(markers) +
                      ": another number of markers takes pictures"};
   }
-  const double sigma_mpa =
-      settings_.options.pressure_sigma_mpa.value_or(PressureSigma(recorded_.pressure.origin));
-  const LoadsPair pressure{.now = {FramePressure(), sigma_mpa}, .baseline = {baseline_mpa_, sigma_mpa}};
+  const LoadsPair loads{.now = FrameLoads(), .baseline = baseline_loads_};
   state_ = std::move(recorded_);
   MeasureAgain(state_.shape);
-  SolveForces(pressure);
+  SolveForces(loads);
   v1::LinkFrame forces;
   wire::Fill({solved.link(), solved.link_index()}, state_, Detail::kFull, forces);
   TakeForces(forces, solved);
   return {};
 }
 
-void LogLinkSolver::SolveForces(const LoadsPair& pressure) {
+void LogLinkSolver::SolveForces(const LoadsPair& loads) {
   const auto start = std::chrono::steady_clock::now();
-  estimator_->Estimate(pressure, state_.shape, state_.forces);
+  estimator_->Estimate(loads, state_.shape, state_.forces);
   estimator_->FindContacts(*finder_, state_.shape, state_.forces, state_.contacts);
   const double seconds = SecondsSince(start);
   state_.stage_ms.force = seconds * 1e3;
@@ -261,10 +276,12 @@ void LogLinkSolver::SolveForces(const LoadsPair& pressure) {
          .agreement = {},
          .motion = {},
          .sees_alone = {},
+         .attitude = {},
+         .attitude_error_mm = estimator_->AttitudeErrorMm(),
          .drift = {},
-         .told = pressure.now,
+         .told = loads.now,
          .is_told = IsPressureTold(),
-         .baseline = pressure.baseline,
+         .baseline = loads.baseline,
          .estimate = estimate},
         state_);
 }

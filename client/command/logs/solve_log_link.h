@@ -46,8 +46,9 @@ class LogLinkSolver {
   Result<void> SolvePictures(const RecordedPictures& pictures, v1::LinkFrame& solved);
   Result<RawImage> Image(CameraId camera, const std::optional<RecordedPicture>& picture) const;
   Result<void> SolveMarkers(v1::LinkFrame& solved);
-  void FollowPressure();
-  void SolveForces(const LoadsPair& pressure);
+  MeasuredLoads FrameLoads() const;
+  void FollowLoads();
+  void SolveForces(const LoadsPair& loads);
   bool IsPressureTold() const;
   double FramePressure() const;
 
@@ -66,8 +67,8 @@ class LogLinkSolver {
   int64_t first_utc_ns_ = 0;
   // While forces of recorded markers are solved.
   int64_t baseline_utc_ns_ = 0;
-  double baseline_mpa_ = 0;
-  std::optional<double> before_mpa_;  // of the frame before
+  MeasuredLoads baseline_loads_;
+  std::optional<MeasuredLoads> before_;  // of the frame before
   LinkReport report_;
 };
 

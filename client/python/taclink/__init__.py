@@ -52,11 +52,13 @@ from taclink.messages.frame import (
     PressureEstimate,
     PressureReport,
     SpecificForceEstimate,
+    SpecificForceReport,
     StageTimes,
     StatusReason,
     StreamCounts,
 )
 from taclink.messages.others import (
+    AttitudeSummary,
     Caller,
     JointStateSummary,
     Picture,
@@ -76,6 +78,7 @@ from taclink.messages.recording import (
 )
 from taclink.names import (
     AcquireReason,
+    AttitudeOrigin,
     BaselineOrigin,
     Detail,
     DriftState,
@@ -97,6 +100,7 @@ from taclink.names import (
     TrackingMode,
 )
 from taclink.streams import (
+    AttitudeWriter,
     ContactStream,
     EventStream,
     FrameStream,
@@ -113,6 +117,9 @@ __all__ = [
     "Arm",
     "ArmContact",
     "ArmContacts",
+    "AttitudeOrigin",
+    "AttitudeSummary",
+    "AttitudeWriter",
     "Baseline",
     "BaselineOrigin",
     "CalibrationResult",
@@ -192,6 +199,7 @@ __all__ = [
     "Source",
     "SourceKind",
     "SpecificForceEstimate",
+    "SpecificForceReport",
     "StageTimes",
     "StatusReason",
     "StreamCounts",

@@ -9,7 +9,7 @@ from taclink._calls import names
 from taclink.errors import InvalidArgument
 from taclink.messages.events import EventPlace
 from taclink.names import Detail, EventKind, number_of
-from taclink.v1 import events_pb2, joints_pb2, pressure_pb2, recording_pb2, tactile_pb2
+from taclink.v1 import attitude_pb2, events_pb2, geometry_pb2, joints_pb2, pressure_pb2, recording_pb2, tactile_pb2
 
 
 def frames(
@@ -99,4 +99,23 @@ def pressure(
 ) -> pressure_pb2.UpdatePressureRequest:
     return pressure_pb2.UpdatePressureRequest(
         pressure_pa=pressure_pa, link=link, utc_ns=utc_ns, monotonic_ns=monotonic_ns
+    )
+
+
+def attitude(
+    specific_force_mps2: Sequence[float],
+    sigma_mps2: float,
+    link: str,
+    utc_ns: int | None,
+    monotonic_ns: int | None,
+) -> attitude_pb2.UpdateAttitudeRequest:
+    if len(specific_force_mps2) != 3:
+        raise InvalidArgument(f"a specific force has 3 components, not {len(specific_force_mps2)}")
+    x, y, z = specific_force_mps2
+    return attitude_pb2.UpdateAttitudeRequest(
+        specific_force_mps2=geometry_pb2.Vector3(x=x, y=y, z=z),
+        sigma_mps2=sigma_mps2,
+        link=link,
+        utc_ns=utc_ns,
+        monotonic_ns=monotonic_ns,
     )

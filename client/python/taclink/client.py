@@ -21,6 +21,7 @@ from taclink.messages.force_level import ForceLevelState
 from taclink.messages.others import Caller
 from taclink.messages.recording import Log, LogDescription, RecorderStatus
 from taclink.streams import (
+    AttitudeWriter,
     ContactStream,
     EventStream,
     FrameStream,
@@ -262,6 +263,10 @@ class Client:
     def update_pressure(self) -> PressureWriter:
         """Begins to tell the server the pressure inside skins."""
         return PressureWriter(self._connection)
+
+    def update_attitude(self) -> AttitudeWriter:
+        """Begins to tell the server the specific force in links' frames, as an inertial measurement unit knows it."""
+        return AttitudeWriter(self._connection)
 
     # Recordings; they lie on the server.
 

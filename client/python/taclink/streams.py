@@ -11,10 +11,12 @@ from taclink.messages.contacts import ArmContacts
 from taclink.messages.events import Event
 from taclink.messages.frame import Frame
 from taclink.messages.others import (
+    AttitudeSummary,
     JointStateSummary,
     PressureSummary,
     Preview,
     ReplayPictures,
+    attitude_summary_from,
     joint_summary_from,
     pressure_summary_from,
 )
@@ -124,3 +126,28 @@ class PressureWriter(Writer[PressureSummary]):
         it arrives. Errors: NotFound (no such link), InvalidArgument, Refused (its pressure comes from elsewhere).
         """
         self._write(_requests.pressure(pressure_pa, link, utc_ns, monotonic_ns))
+
+
+class AttitudeWriter(Writer[AttitudeSummary]):
+    """Of Client.update_attitude()."""
+
+    def __init__(self, connection: Connection) -> None:
+        super().__init__(connection, "UpdateAttitude", attitude_summary_from)
+
+    def write(
+        self,
+        specific_force_mps2: Sequence[float],
+        *,
+        sigma_mps2: float = 0,
+        link: str = "",
+        utc_ns: int | None = None,
+        monotonic_ns: int | None = None,
+    ) -> None:
+        """Gravity less the link's acceleration, link frame, m/s^2; the negative of what an accelerometer reads.
+
+        sigma_mps2: of each component; 0: as configured. link, utc_ns, monotonic_ns and errors: as of
+        PressureWriter.write (Refused: its attitude comes from elsewhere).
+        """
+        self._write(
+            _requests.attitude(specific_force_mps2, sigma_mps2, link, utc_ns, monotonic_ns)
+        )

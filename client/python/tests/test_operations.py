@@ -143,6 +143,15 @@ def test_pressures_are_told_and_links_restarted(alone: servers.Server) -> None:
             client.restart_link("none")
 
 
+def test_attitudes_are_refused_with_the_reason(client: taclink.Client) -> None:
+    writer = client.update_attitude()
+    writer.write((0.0, 0.0, -9.81), link="idle")
+    with pytest.raises(taclink.Refused, match="gravity: {source: grpc}"):
+        writer.finish()
+    with pytest.raises(taclink.InvalidArgument, match="3 components, not 2"):
+        client.update_attitude().write((0.0, -9.81), link="idle")
+
+
 def test_pressures_are_refused_with_the_reason(client: taclink.Client) -> None:
     writer = client.update_pressure()
     writer.write(100.0, link="idle")

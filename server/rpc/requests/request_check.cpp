@@ -22,6 +22,7 @@ constexpr double kMostLengthM = 1e3;
 constexpr double kMostPairs = 300;  // 10 s at 30 Hz
 constexpr double kMostPosition = 1e6;
 constexpr double kMostVacuumPa = 2e5, kMostPressurePa = 1e7;
+constexpr double kMostSpecificForce = 100;  // m/s^2
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 struct Bounds {
@@ -57,6 +58,12 @@ constexpr std::array kBounds = {
     Bounds{"UpdatePressureRequest.pressure_pa", -kMostVacuumPa, kMostPressurePa, "Pa above the surroundings"},
     Bounds{"UpdatePressureRequest.utc_ns", 0, kNoLimit, "ns since 1970"},
     Bounds{"UpdatePressureRequest.monotonic_ns", 0, kNoLimit, "ns of the server's clock"},
+    Bounds{"Vector3.x", -kMostSpecificForce, kMostSpecificForce, "m/s^2"},
+    Bounds{"Vector3.y", -kMostSpecificForce, kMostSpecificForce, "m/s^2"},
+    Bounds{"Vector3.z", -kMostSpecificForce, kMostSpecificForce, "m/s^2"},
+    Bounds{"UpdateAttitudeRequest.sigma_mps2", 0, kMostSpecificForce, "m/s^2; 0: as configured"},
+    Bounds{"UpdateAttitudeRequest.utc_ns", 0, kNoLimit, "ns since 1970"},
+    Bounds{"UpdateAttitudeRequest.monotonic_ns", 0, kNoLimit, "ns of the server's clock"},
 };
 
 const Bounds* FindBounds(const FieldDescriptor& field) {

@@ -123,6 +123,11 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* TactileService::UpdatePressure(
   return TakePressure(arm_, updates_, PartyOf(*context, *security_), *response);
 }
 
+grpc::ServerReadReactor<grpc::ByteBuffer>* TactileService::UpdateAttitude(
+    grpc::CallbackServerContext* context, grpc::ByteBuffer* response) {
+  return TakeAttitude(arm_, updates_, PartyOf(*context, *security_), *response);
+}
+
 grpc::ServerUnaryReactor* TactileService::SetThresholds(grpc::CallbackServerContext* context,
                                                         const v1::SetThresholdsRequest* request,
                                                         v1::SetThresholdsResponse* response) {

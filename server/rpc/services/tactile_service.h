@@ -10,7 +10,7 @@
 #include "server/arm/arm.h"
 #include "server/rpc/requests/service_limits.h"
 #include "server/rpc/services/joint_state_call.h"
-#include "server/rpc/services/pressure_call.h"
+#include "server/rpc/services/link_update_calls.h"
 #include "server/rpc/services/tare_call.h"
 #include "server/rpc/streams/calibrate_stream.h"
 #include "server/rpc/streams/contact_stream.h"
@@ -32,12 +32,13 @@ class TactileService final
                   v1::TactileService::WithRawCallbackMethod_StreamContacts<
                       v1::TactileService::WithRawCallbackMethod_UpdateJointStates<
                           v1::TactileService::WithRawCallbackMethod_UpdatePressure<
-                              v1::TactileService::WithRawCallbackMethod_StreamEvents<
-                                  v1::TactileService::WithCallbackMethod_SetThresholds<
-                                      v1::TactileService::WithRawCallbackMethod_StreamPreview<
-                                          v1::TactileService::WithCallbackMethod_SetForceModel<
-                                              v1::TactileService::WithCallbackMethod_SetCamera<
-                                                  v1::TactileService::Service>>>>>>>>>>>> {
+                              v1::TactileService::WithRawCallbackMethod_UpdateAttitude<
+                                  v1::TactileService::WithRawCallbackMethod_StreamEvents<
+                                      v1::TactileService::WithCallbackMethod_SetThresholds<
+                                          v1::TactileService::WithRawCallbackMethod_StreamPreview<
+                                              v1::TactileService::WithCallbackMethod_SetForceModel<
+                                                  v1::TactileService::WithCallbackMethod_SetCamera<
+                                                      v1::TactileService::Service>>>>>>>>>>>>> {
  public:
   TactileService(Arm& arm, ServiceLimits limits, std::shared_ptr<boost::asio::thread_pool> senders,
                  std::shared_ptr<const Security> security);
@@ -67,6 +68,9 @@ class TactileService final
   grpc::ServerReadReactor<grpc::ByteBuffer>* UpdateJointStates(grpc::CallbackServerContext* context,
                                                                grpc::ByteBuffer* response) override;
   grpc::ServerReadReactor<grpc::ByteBuffer>* UpdatePressure(grpc::CallbackServerContext* context,
+                                                            grpc::ByteBuffer* response) override;
+
+  grpc::ServerReadReactor<grpc::ByteBuffer>* UpdateAttitude(grpc::CallbackServerContext* context,
                                                             grpc::ByteBuffer* response) override;
 
   grpc::ServerWriteReactor<grpc::ByteBuffer>* StreamEvents(grpc::CallbackServerContext* context,

@@ -35,6 +35,8 @@ class JudgeTest : public ::testing::Test {
            .agreement = agreement_,
            .motion = motion_,
            .sees_alone = sees_alone_,
+           .attitude = attitude_,
+           .attitude_error_mm = attitude_error_mm_,
            .drift = {},
            .is_baseline_forced = is_baseline_forced_,
            .told = told_,
@@ -58,6 +60,8 @@ class JudgeTest : public ::testing::Test {
   CameraAgreement agreement_;
   std::optional<MotionDisagreement> motion_;
   std::optional<CameraId> sees_alone_;
+  std::optional<AttitudeDisagreement> attitude_;
+  double attitude_error_mm_ = 0;
   bool is_told_ = true, is_baseline_forced_ = false;
   MeasuredLoads told_{.pressure_mpa = 1e-3, .pressure_sigma_mpa = 5e-5},
       baseline_{.pressure_mpa = 5e-4, .pressure_sigma_mpa = 5e-5};
@@ -204,6 +208,33 @@ TEST_F(JudgeTest, ABaselinesPressureThatDoesNotFitIsTold) {
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureMismatch));
   EXPECT_THAT(state_.status_reason,
               ::testing::HasSubstr("0.340 kPa when the baseline was taken; told were 1.000 and 0.500 kPa"));
+}
+
+TEST_F(JudgeTest, AnAttitudeThatDoesNotFitIsTold) {
+  told_.specific_force_covariance = baseline_.specific_force_covariance = 0.04 * Mat3::Identity();
+  // Of the change since the baseline: 3 sqrt(0.08) is 0.85.
+  estimate_.loads.known_error[1] = 0.4;
+  estimate_.loads.baseline_error[1] = -0.4;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  estimate_.loads.baseline_error[1] = -0.5;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kAttitudeMismatch));
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("by 3.2 standard deviations"));
+  estimate_.loads.baseline_error[1] = 0.4;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty()) << "it has not changed";
+  attitude_ = {.skin_mps2 = {0, -9.81, 0}, .measured_mps2 = {0, 0, -9.81}, .deviations = 7, .angle_deg = 31};
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kAttitudeMismatch));
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("31 deg off"));
+}
+
+TEST_F(JudgeTest, AnAttitudeThatIsHardlyKnownIsTold) {
+  attitude_error_mm_ = 0.19;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  attitude_error_mm_ = 0.21;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kAttitudeUnknown));
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("UpdateAttitude"));
+  state_.specific_force = SpecificForceReading{.trouble = "the joint states are stale: send them"};
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kAttitudeUnknown));
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("joint states are stale"));
 }
 
 TEST_F(JudgeTest, MarkersThatContradictAreTold) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
@@ -167,11 +169,68 @@ TEST_F(TurnedLinkTest, KnownCamerasNeedNoAttitude) {
   ExpectPress();
 }
 
+// The baseline is taken upright; then the link is turned, and the mounting is told wrong by an angle about x.
+class MountTest : public TurnedLinkTest {
+ protected:
+  static MeasuredLoads Told(const std::string& state, double wrong_deg) {
+    MeasuredLoads loads = Known(state);
+    const Eigen::AngleAxisd turn(RadFromDeg(wrong_deg), Vec3::UnitX());
+    loads.specific_force_mps2 = turn * loads.specific_force_mps2;
+    return loads;
+  }
+  StereoFrame FrameAfter(double seconds, const std::string& state, double wrong_deg) {
+    StereoFrame frame = FrameAt(state, Told(state, wrong_deg));
+    frame.times.exposure_monotonic_ns = 1'000'000'000 + std::llround(1e9 * seconds);
+    return frame;
+  }
+  bool HasMismatch() const {
+    return std::ranges::any_of(state_.reasons,
+                               [](const Reason& one) { return one.id == ReasonId::kAttitudeMismatch; });
+  }
+};
+
+class WrongMountTest : public MountTest, public ::testing::WithParamInterface<double> {};
+
+TEST_P(WrongMountTest, IsFoundOnceTheLinkHasTurned) {
+  const double wrong_deg = GetParam();
+  LinkPipeline pipeline(model_, Options());
+  double seconds = 0;
+  for (int pairs = 0; pairs < 20 && !pipeline.calibration(); ++pairs)
+    pipeline.Process(FrameAfter(++seconds, "up0", wrong_deg), state_);
+  ASSERT_TRUE(pipeline.calibration()) << state_.status_reason;
+  bool is_found = false;
+  for (const std::string state : {"up0", "side", "side", "tilt", "tilt"}) {
+    seconds += 2;
+    pipeline.Process(FrameAfter(seconds, state, wrong_deg), state_);
+    is_found = is_found || HasMismatch();
+  }
+  EXPECT_TRUE(is_found);
+  if (!HasMismatch()) return;
+  // What is contradicted is not used: forces are right.
+  EXPECT_TRUE(state_.contacts.empty());
+  pipeline.Process(FrameAfter(seconds + 0.03, "sidepress", wrong_deg), state_);
+  ASSERT_EQ(state_.contacts.size(), 1U);
+  EXPECT_NEAR(state_.contacts[0].normal_force_n, 0.0433, 0.006);
+}
+
+INSTANTIATE_TEST_SUITE_P(Degrees, WrongMountTest, ::testing::Values(20.0, -20.0, 90.0));
+
+TEST_F(MountTest, ARightOneIsNotDoubted) {
+  LinkPipeline pipeline(model_, Options());
+  double seconds = 0;
+  for (const std::string state : {"up0", "up0", "side", "tilt", "side", "up0"}) {
+    pipeline.Process(FrameAfter(seconds += 4, state, 0), state_);
+    EXPECT_FALSE(HasMismatch()) << state << ": " << state_.status_reason;
+  }
+}
+
 TEST_F(TurnedLinkTest, ATouchedSkinIsNoAttitude) {
   LinkPipeline pipeline(model_, Options());
-  pipeline.Process(FrameAt("sidepress", Known("side")), state_);
-  EXPECT_FALSE(pipeline.calibration());
-  EXPECT_THAT(state_.status_reason, HasSubstr("touched"));
+  for (int pairs = 0; pairs < 6; ++pairs) {
+    pipeline.Process(FrameAt("sidepress", Known("side")), state_);
+    ASSERT_FALSE(pipeline.calibration()) << pairs;
+    EXPECT_THAT(state_.status_reason, HasSubstr("touched"));
+  }
 }
 
 }  // namespace

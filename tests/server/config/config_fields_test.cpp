@@ -41,6 +41,7 @@ realtime: {priority: 1, cpus: [2]}
 arm:
   name: all
   urdf: /arm.urdf
+  gravity_mps2: [0, 9.8, 0]
   base: floor
   joint_states: {stale_after_s: 0.5, extrapolate_s: 0.25}
   links:
@@ -55,6 +56,7 @@ arm:
       exposure_100us: 50
       gain: 0
       calibration: /calibration.yaml
+      gravity: {source: constant, mps2: [0, -9.8, 0], sigma_mps2: 0.5}
       pressure: {source: serial, device: /dev/c, baud: 1200, kpa_per_unit: 2, offset_kpa: 3, stale_after_s: 4, sigma_pa: 5}
       force_model: linear
       force_model_anyway: true
@@ -67,6 +69,7 @@ arm:
       realtime: {priority: 3, cpus: [4, 5]}
     - {name: b, model: barrel, source: files, folder: /b, frame_rate_hz: 5, loop: false, start_after_s: 0.25, in_memory: true,
        yuyv: true, pressure: {source: file, path: /kpa, kpa_per_unit: 2},
+       gravity: {source: grpc, stale_after_s: 2},
        drift: {time_constant_s: 6, rate_limit_mm_s: 0.5, limit_mm: 7, stop_n: 0.5, go_n: 0.25, quiet_s: 8}}
     - {name: c, model: barrel, source: simulated, scene: press, pace: clock, pressure: {source: constant, kpa: 2}}
 )";

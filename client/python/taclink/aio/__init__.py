@@ -9,6 +9,7 @@ What it gives and raises is taclink's.
 
 from taclink.aio.client import Client
 from taclink.aio.streams import (
+    AttitudeWriter,
     ContactStream,
     EventStream,
     FrameStream,
@@ -19,6 +20,7 @@ from taclink.aio.streams import (
 )
 
 __all__ = [
+    "AttitudeWriter",
     "Client",
     "ContactStream",
     "EventStream",

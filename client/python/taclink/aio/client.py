@@ -18,6 +18,7 @@ from taclink._reconnect import OnReconnect, attempts
 from taclink.aio._descriptions import described_by
 from taclink.aio._waiting import Connection
 from taclink.aio.streams import (
+    AttitudeWriter,
     ContactStream,
     EventStream,
     FrameStream,
@@ -195,6 +196,9 @@ class Client:
 
     def update_pressure(self) -> PressureWriter:
         return PressureWriter(self._connection)
+
+    def update_attitude(self) -> AttitudeWriter:
+        return AttitudeWriter(self._connection)
 
     # Recordings; they lie on the server.
 

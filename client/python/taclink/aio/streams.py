@@ -13,10 +13,12 @@ from taclink.messages.contacts import ArmContacts
 from taclink.messages.events import Event
 from taclink.messages.frame import Frame
 from taclink.messages.others import (
+    AttitudeSummary,
     JointStateSummary,
     PressureSummary,
     Preview,
     ReplayPictures,
+    attitude_summary_from,
     joint_summary_from,
     pressure_summary_from,
 )
@@ -103,3 +105,24 @@ class PressureWriter(Writer[PressureSummary]):
         monotonic_ns: int | None = None,
     ) -> None:
         await self._write(_requests.pressure(pressure_pa, link, utc_ns, monotonic_ns))
+
+
+@described_by(taclink.streams.AttitudeWriter)
+class AttitudeWriter(Writer[AttitudeSummary]):
+    """Of Client.update_attitude()."""
+
+    def __init__(self, connection: Connection) -> None:
+        super().__init__(connection, "UpdateAttitude", attitude_summary_from)
+
+    async def write(
+        self,
+        specific_force_mps2: Sequence[float],
+        *,
+        sigma_mps2: float = 0,
+        link: str = "",
+        utc_ns: int | None = None,
+        monotonic_ns: int | None = None,
+    ) -> None:
+        await self._write(
+            _requests.attitude(specific_force_mps2, sigma_mps2, link, utc_ns, monotonic_ns)
+        )

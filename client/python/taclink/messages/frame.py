@@ -22,6 +22,7 @@ from taclink.messages.arrays import (
 from taclink.messages.baseline import Baseline, baseline_from
 from taclink.names import (
     AcquireReason,
+    AttitudeOrigin,
     Detail,
     ForceModel,
     LinkStatus,
@@ -133,6 +134,16 @@ class PressureReport:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, slots=True)
+class SpecificForceReport:
+    """How the specific force (gravity less the link's acceleration) is known; link frame."""
+
+    specific_force_mps2: FloatArray  # (3,)
+    covariance_m2_s4: FloatArray | None  # (3, 3); None: it counts as exact
+    origin: AttitudeOrigin
+    trouble: str  # empty: nothing
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, slots=True)
 class Frame:
     """Vectors are in the link frame; arrays by marker have no rows below their detail, or where nothing is measured."""
 
@@ -150,6 +161,7 @@ class Frame:
     pressure_pa: float | None  # gauge; None: not measured
     pressure: PressureReport | None  # None: a frame without a picture
     pressure_estimate: PressureEstimate | None  # None: nothing was estimated
+    specific_force: SpecificForceReport | None  # as it was measured; None: the link never moves
     specific_force_estimate: SpecificForceEstimate | None  # None: likewise, or the attitude counts as exact
     markers_seen: int
     markers_inferred: int
@@ -216,6 +228,15 @@ def _specific_force_from(message: frame_pb2.SpecificForceEstimate) -> SpecificFo
     )
 
 
+def _specific_force_report_from(message: frame_pb2.SpecificForceReport) -> SpecificForceReport:
+    return SpecificForceReport(
+        specific_force_mps2=vector(message.specific_force_mps2),
+        covariance_m2_s4=covariance(message.covariance_m2_s4),
+        origin=name_of(AttitudeOrigin, message.origin),
+        trouble=message.trouble,
+    )
+
+
 def _contact_from(message: frame_pb2.Contact) -> Contact:
     return alike(
         Contact,
@@ -269,6 +290,9 @@ def frame_from(message: frame_pb2.LinkFrame, client_utc_ns: int = 0, gap: int | 
         status_reasons=tuple(map(_reason_from, message.status_reasons)),
         pressure_estimate=alike(PressureEstimate, message.pressure_estimate)
         if message.HasField("pressure_estimate")
+        else None,
+        specific_force=_specific_force_report_from(message.specific_force)
+        if message.HasField("specific_force")
         else None,
         specific_force_estimate=_specific_force_from(message.specific_force_estimate)
         if message.HasField("specific_force_estimate")

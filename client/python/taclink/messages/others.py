@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from taclink.messages.arrays import FloatArray, IntArray, alike, numbers, rows, whole_numbers
 from taclink.names import LinkStatus, Role, name_of
-from taclink.v1 import joints_pb2, operations_pb2, pressure_pb2, preview_pb2, recording_pb2
+from taclink.v1 import attitude_pb2, joints_pb2, operations_pb2, pressure_pb2, preview_pb2, recording_pb2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, slots=True)
@@ -57,6 +57,12 @@ class PressureSummary:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class AttitudeSummary:
+    accepted: int
+    refused: int  # not newer than one that is known
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Caller:
     """Who the server takes this client for."""
 
@@ -94,6 +100,10 @@ def joint_summary_from(message: joints_pb2.UpdateJointStatesResponse) -> JointSt
 
 def pressure_summary_from(message: pressure_pb2.UpdatePressureResponse) -> PressureSummary:
     return alike(PressureSummary, message)
+
+
+def attitude_summary_from(message: attitude_pb2.UpdateAttitudeResponse) -> AttitudeSummary:
+    return alike(AttitudeSummary, message)
 
 
 def caller_from(message: operations_pb2.GetCallerResponse) -> Caller:
