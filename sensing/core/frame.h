@@ -67,9 +67,9 @@ inline double ExactInPascals(double mpa) {
   return std::ldexp(std::round(std::ldexp(mpa, 40)), -40);
 }
 
-/// Who says what the specific force in a link's frame is.
+/// The source of the specific force in a link's frame.
 enum class AttitudeOrigin : uint8_t {
-  kNone,         ///< nobody: the skin tells it
+  kNone,         ///< nobody: it is estimated from the shape of the skin
   kConstant,     ///< the configuration, or a command's options
   kSimulated,    ///< the simulation that makes the pictures
   kJointStates,  ///< the arm's URDF and joint states
@@ -84,6 +84,12 @@ struct SpecificForceReading {
   std::string trouble = {};  ///< what is wrong with its source and what to do; empty: nothing
 };
 
+/// Where the simulation of a link's frame has a joint of the arm.
+struct SimulatedJoint {
+  std::string name;
+  double position_rad = 0, velocity_radps = 0;
+};
+
 struct LinkState;
 
 /// What a link's cameras saw at one moment.
@@ -95,6 +101,7 @@ struct StereoFrame {
   PressureReport pressure;
   /// None: the link never moves, so that its weight is the same in all frames.
   std::optional<SpecificForceReading> specific_force;
+  std::optional<SimulatedJoint> joint = {};  ///< none: it is not simulated, or rests
   /// From a log: what was found then, in place of pictures; null: from cameras.
   std::shared_ptr<const LinkState> recorded = nullptr;
 };

@@ -56,6 +56,8 @@ DiscSkin::DiscSkin(const LinkModel& model, const std::vector<double>& disc_diame
       mesh_(MakeShellMesh(model, options.refinement)),
       shell_(SkinSurface(mesh_), model.material),
       pressure_(0),
+      corner_areas_mm2_(CornerAreas(shell_.surface())),
+      body_(corner_areas_mm2_, Vec3::Zero()),
       factor_(std::make_unique<Factor>(shell_.Pattern())) {
   const RigidContactOptions contact = {
       .spacing_mm = options.spacing_mm,
@@ -86,6 +88,10 @@ RigidBody DiscSkin::BodyOf(size_t disc, const SkinDisc& place, double depth_mm) 
 void DiscSkin::Apply(const SkinLoad& load, const SkinBalance& balance) {
   pressure_ = FollowerPressure(load.pressure_mpa);
   loads_ = {&pressure_};
+  if (!load.specific_force_mps2.isZero(0)) {
+    body_ = BodyForce(corner_areas_mm2_, model_.MassPerArea() * load.specific_force_mps2);
+    loads_.push_back(&body_);
+  }
   if (tube_) loads_.push_back(tube_.get());
   searched_.clear();
   for (size_t i = 0; i < discs_.size(); ++i) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sensing/core/link_model.h"
+#include "sensing/shell/body_force.h"
 #include "sensing/shell/pressed_skin.h"
 
 namespace taclink {
@@ -24,6 +25,7 @@ struct SkinDisc {
 struct SkinLoad {
   double pressure_mpa = 0;
   std::vector<SkinDisc> discs;
+  Vec3 specific_force_mps2 = Vec3::Zero();  ///< gravity less acceleration, link frame; zero: weightless
 };
 
 /// Depth of a disc that is not there.
@@ -105,6 +107,8 @@ class DiscSkin {
   ShellMesh mesh_;
   NonlinearShell shell_;
   FollowerPressure pressure_;
+  std::vector<Eigen::Vector4d> corner_areas_mm2_;  // body_ refers to them
+  BodyForce body_;
   std::unique_ptr<RigidContact> tube_;
   std::deque<RigidContact> discs_;
   std::vector<double> radii_mm_;

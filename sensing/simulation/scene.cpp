@@ -1,6 +1,7 @@
 #include "sensing/simulation/scene.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 
@@ -64,8 +65,8 @@ std::vector<PressureKey> ReadPressure(YamlMap& root) {
   return keys;
 }
 
-Vec3 ReadVector(YamlMap& map, const std::string& key, double most) {
-  if (!map.Has(key)) return Vec3::Zero();
+Vec3 ReadVector(YamlMap& map, const std::string& key, double most, const Vec3& otherwise = Vec3::Zero()) {
+  if (!map.Has(key)) return otherwise;
   const auto numbers = map.Numbers(key, 3, {.min = -most, .max = most});
   return numbers.size() == 3 ? Vec3(numbers[0], numbers[1], numbers[2]) : Vec3(Vec3::Zero());
 }
@@ -76,6 +77,43 @@ MountError ReadMountError(YamlMap map) {
   error.turn_rad = RadFromDeg(1) * ReadVector(map, "turn_deg", 45);
   map.Done();
   return error;
+}
+
+Swing ReadSwing(YamlMap map) {
+  Swing swing;
+  swing.joint = map.Text("joint", "");
+  swing.axis = ReadVector(map, "axis", 1e3, swing.axis);
+  if (swing.axis.norm() < 1e-9)
+    map.Fail("axis", "must not be zero");
+  else
+    swing.axis.normalize();
+  swing.pivot_mm = ReadVector(map, "pivot_mm", 1e4);
+  swing.mean_rad = RadFromDeg(map.Number("mean_deg", 0.0, {.min = -360, .max = 360}));
+  swing.amplitude_rad = RadFromDeg(map.Number("amplitude_deg", {.min = 0, .max = 360}));
+  swing.period_s = map.Number("period_s", {.min = 0.1, .max = 1e6});
+  map.Done();
+  return swing;
+}
+
+std::optional<SceneMotion> ReadMotion(YamlMap& root, const Scene& scene) {
+  if (!root.Has("motion")) return std::nullopt;
+  if (scene.skin == SkinKind::kLinear) root.Fail("motion", "needs 'skin: nonlinear'", {"skin"});
+  SceneMotion motion;
+  YamlMap map = root.Map("motion");
+  motion.gravity_mps2 = ReadVector(map, "gravity_mps2", 100, motion.gravity_mps2);
+  if (map.Has("swing")) motion.swing = ReadSwing(map.Map("swing"));
+  map.Done();
+  if (motion.swing && scene.loop && !root.Failed("duration_s")) {
+    const double periods = scene.duration_s / motion.swing->period_s;
+    if (std::abs(periods - std::round(periods)) > 1e-6)
+      root.Fail("duration_s", "must be a multiple of the swing's period_s, or 'loop: false'", {"loop"});
+  }
+  // Where a ramp of a given depth begins is known of a skin that rests only.
+  for (const SceneContact& contact : scene.contacts) {
+    if (contact.depth_mm)
+      root.Fail("contacts", "must have 'force_n' in a scene with 'motion' (" + contact.where + ")");
+  }
+  return motion;
 }
 
 CameraEffects ReadCameraEffects(YamlMap map) {
@@ -121,6 +159,7 @@ Result<Scene> ReadScene(YamlFile file) {
   for (YamlMap& map : root.Maps("contacts")) scene.contacts.push_back(ReadContact(map, last_s));
   if (scene.contacts.size() > kMaxSceneContacts)
     root.Fail("contacts", "must be at most " + std::to_string(kMaxSceneContacts));
+  scene.motion = ReadMotion(root, scene);
   scene.camera = ReadCameraEffects(root.Map("camera"));
   root.Done();
   if (auto good = file.Finish(); !good) return good.error();

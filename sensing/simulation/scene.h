@@ -9,6 +9,7 @@
 
 #include "sensing/core/camera_model.h"
 #include "sensing/core/result.h"
+#include "sensing/simulation/scene_motion.h"
 
 namespace taclink {
 
@@ -80,6 +81,8 @@ struct Scene {
   double duration_s = 0;
   bool loop = true;
   uint64_t seed = 1;
+  /// None: the skin is weightless, and nothing is known of the link's attitude.
+  std::optional<SceneMotion> motion;
   std::vector<PressureKey> pressure;  ///< at least one; straight lines between them, constant outside
   std::vector<SceneContact> contacts;
   CameraEffects camera;

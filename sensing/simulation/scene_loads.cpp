@@ -28,13 +28,19 @@ void SceneLoads::FindParts() {
     times.insert(times.end(),
                  {plan.begin_s, plan.begin_s + plan.ramp_s, plan.end_s - plan.ramp_s, plan.end_s});
   }
+  // A swing goes back through the states of its way there.
+  if (scene_.motion && scene_.motion->swing) {
+    const double half_s = scene_.motion->swing->period_s / 2;
+    for (double t = half_s; t < scene_.duration_s; t += half_s) times.push_back(t);
+  }
   std::sort(times.begin(), times.end());
   std::erase_if(times, [&](double t) { return t < 0 || t > scene_.duration_s; });
   for (size_t i = 0; i + 1 < times.size(); ++i) {
     ScenePart part{times[i], times[i + 1], {}, true};
     if (part.end_s - part.begin_s < kSameS) continue;
     const double middle = (part.begin_s + part.end_s) / 2;
-    part.still = scene_.PressureKpa(part.begin_s) == scene_.PressureKpa(part.end_s);
+    part.still = scene_.PressureKpa(part.begin_s) == scene_.PressureKpa(part.end_s) &&
+                 !(scene_.motion && scene_.motion->swing);
     for (const ContactPlan& plan : plans_) {
       part.pressing.push_back(plan.begin_s < middle && middle < plan.end_s);
       if (part.pressing.back() && (plan.moves || plan.Level(middle) < 1)) part.still = false;
@@ -101,6 +107,8 @@ double SceneLoads::TouchingDepth(size_t contact, const SkinSpot& spot, const She
 
 SkinLoad SceneLoads::At(const ScenePart& part, double time_s, double on_at_s) const {
   SkinLoad load{.pressure_mpa = PressureMpa(part, time_s), .discs = {}};
+  if (scene_.motion)
+    load.specific_force_mps2 = scene_.motion->SpecificForce(time_s, Vec3(0, 0, model_.length_mm / 2));
   for (size_t i = 0; i < plans_.size(); ++i) {
     SkinDisc& disc = load.discs.emplace_back();
     const ContactPlan& plan = plans_[i];

@@ -18,7 +18,7 @@ constexpr double kRecallMm = 3;        // from where a state is guessed
 constexpr double kWeakShare = 0.1;     // of its greatest, below which a force is judged as if it were that
 // How much may change from one key to the next on the way through a part.
 constexpr double kForceStride = 0.4;  // of what is asked
-constexpr double kDepthStrideMm = 4, kSpotStrideMm = 6;
+constexpr double kDepthStrideMm = 4, kSpotStrideMm = 6, kSpecificForceStrideMps2 = 3;
 
 std::vector<double> Diameters(const Scene& scene) {
   std::vector<double> diameters;
@@ -42,7 +42,8 @@ bool Same(const SkinDisc& a, const SkinDisc& b) {
 }
 
 bool Same(const SkinLoad& a, const SkinLoad& b) {
-  bool same = std::abs(a.pressure_mpa - b.pressure_mpa) < 1e-12;
+  bool same = std::abs(a.pressure_mpa - b.pressure_mpa) < 1e-12 &&
+              (a.specific_force_mps2 - b.specific_force_mps2).norm() < 1e-6;
   for (size_t i = 0; i < a.discs.size(); ++i) same = same && Same(a.discs[i], b.discs[i]);
   return same;
 }
@@ -51,6 +52,8 @@ bool Same(const SkinLoad& a, const SkinLoad& b) {
 SkinLoad Blend(const SkinLoad& from, const SkinLoad& to, const std::vector<double>& touching, double share) {
   SkinLoad load = to;
   load.pressure_mpa = from.pressure_mpa + share * (to.pressure_mpa - from.pressure_mpa);
+  load.specific_force_mps2 =
+      from.specific_force_mps2 + share * (to.specific_force_mps2 - from.specific_force_mps2);
   for (size_t i = 0; i < load.discs.size(); ++i) {
     SkinDisc& disc = load.discs[i];
     if (from.discs[i].on == to.discs[i].on) continue;
@@ -97,7 +100,7 @@ Result<SolvedScene> SceneSolver::Solve() {
 
 Result<void> SceneSolver::SolveFreeSkins() {
   SkinBalance balance = skin_.Rest();
-  SkinLoad last{0, std::vector<SkinDisc>(scene_.contacts.size())};
+  SkinLoad last{.pressure_mpa = 0, .discs = std::vector<SkinDisc>(scene_.contacts.size())};
   std::vector<ShellState> states;
   for (const double pressure : loads_.FreePressures()) {
     SkinLoad load = last;
@@ -114,7 +117,7 @@ Result<void> SceneSolver::SolveFreeSkins() {
 
 // The state at a part's beginning: that of the end before, or from it in as many steps as needed.
 Result<SkinKey> SceneSolver::Begin(const PlayedPart* before, const ScenePart& part) {
-  SkinLoad from{0, std::vector<SkinDisc>(scene_.contacts.size())};
+  SkinLoad from{.pressure_mpa = 0, .discs = std::vector<SkinDisc>(scene_.contacts.size())};
   SkinBalance balance = skin_.Rest();
   if (before) {
     from = loads_.At(before->part, before->part.end_s);
@@ -281,7 +284,8 @@ bool SceneSolver::IsFar(const ScenePart& part, const SkinKey& from, double time_
   const double radius = model_.PointAtDepth(0, model_.length_mm / 2, 0).x();
   const double pressure_stride = 2 * PressedSkinOptions{}.pressure_step * model_.material.youngs_modulus_mpa *
                                  model_.thickness_mm / radius;
-  bool far = std::abs(a.pressure_mpa - b.pressure_mpa) > pressure_stride;
+  bool far = std::abs(a.pressure_mpa - b.pressure_mpa) > pressure_stride ||
+             (a.specific_force_mps2 - b.specific_force_mps2).norm() > kSpecificForceStrideMps2;
   for (size_t i = 0; i < a.discs.size(); ++i) {
     const SkinDisc &x = a.discs[i], &y = b.discs[i];
     const auto& asked = scene_.contacts[i].force_n;

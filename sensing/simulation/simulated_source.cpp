@@ -10,6 +10,7 @@ namespace taclink {
 namespace {
 
 constexpr int kNominalExposure100us = 50, kNominalGain = 1;
+constexpr double kSpecificForceSigmaMps2 = 0.1;
 constexpr int kLongestExposure100us = 1000, kLargestGain = 16;
 
 /// Of all levels, against the nominal ones.
@@ -120,6 +121,20 @@ void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
   }
   frame.sequence = sequence_offset_ + frame_number;
   frame.pressure_mpa = truth_.pressure_mpa;
+  frame.specific_force.reset();
+  frame.joint.reset();
+  if (scene_.motion) {
+    frame.specific_force = {
+        .mps2 = truth_.specific_force_mps2,
+        .covariance = kSpecificForceSigmaMps2 * kSpecificForceSigmaMps2 * Mat3::Identity(),
+        .origin = AttitudeOrigin::kSimulated};
+  }
+  if (scene_.motion && scene_.motion->swing) {
+    const Swing& swing = *scene_.motion->swing;
+    frame.joint = {.name = swing.joint,
+                   .position_rad = swing.AngleRad(truth_.time_s),
+                   .velocity_radps = swing.RateRadps(truth_.time_s)};
+  }
   frame.times = {};
   frame.times.exposure_monotonic_ns = ExposureNs(frame_number);
   const int64_t now = clock_.MonotonicNs();

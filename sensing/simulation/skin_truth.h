@@ -33,9 +33,10 @@ struct SkinTruth {
   uint64_t frame = 0;  ///< time_s in frames of the scene
   double time_s = 0;   ///< since the scene's start, not wrapped
   double pressure_mpa = 0;
-  std::vector<Vec3> marker_mm;       ///< centres (see MarkerGrid::center_depth_mm), by marker index
-  std::vector<Vec3> marker_wall_mm;  ///< feet of the domes on the inner wall
-  std::vector<Vec3> marker_normal;   ///< of the skin there, unit, away from the axis
+  Vec3 specific_force_mps2 = Vec3::Zero();  ///< link frame; zero: a skin without weight
+  std::vector<Vec3> marker_mm;              ///< centres (see MarkerGrid::center_depth_mm), by marker index
+  std::vector<Vec3> marker_wall_mm;         ///< feet of the domes on the inner wall
+  std::vector<Vec3> marker_normal;          ///< of the skin there, unit, away from the axis
   RadiusGrid inner_wall;
   std::vector<TrueContact> contacts;  ///< those that push now
   Vec3 total_force_n = Vec3::Zero();  ///< their sum

@@ -55,6 +55,8 @@ void WriteTruthLine(const SkinTruth& truth, const std::vector<Vec3>& rest_marker
   Write(truth.time_s, out);
   out << ",\"pressure_kpa\":";
   Write(truth.pressure_mpa * 1e3, out);
+  out << ",\"specific_force_mps2\":";
+  Write(truth.specific_force_mps2, out);
   out << ",\"contacts\":";
   WriteList(truth.contacts, out, [&](size_t i) { Write(truth.contacts[i], out); });
   out << ",\"total_force_n\":";

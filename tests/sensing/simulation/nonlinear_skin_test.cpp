@@ -112,7 +112,11 @@ INSTANTIATE_TEST_SUITE_P(
                "  - {at: {angle_deg: 40, z_mm: 60}, move_to: {angle_deg: 60, z_mm: 80}, force_n: 0.15,\n"
                "     patch_diameter_mm: 8, begin_s: 0.5, end_s: 3.5, ramp_s: 0.5}\n"
                "  - {at: {angle_deg: 90, z_mm: 75}, depth_mm: 2, patch_diameter_mm: 12, begin_s: 1, end_s: 3,"
-               " ramp_s: 0.5}\n"}));
+               " ramp_s: 0.5}\n"},
+        Played{
+            "touched while it swings",
+            "pressure_kpa: 0.5\nmotion: {swing: {amplitude_deg: 60, period_s: 4}}\n"
+            "contacts:\n  - {at: {path: 2, ring: 5}, force_n: 0.2, begin_s: 0.7, end_s: 3, ramp_s: 0.5}\n"}));
 
 class NonlinearSkinTest : public ::testing::TestWithParam<std::string> {
  protected:
@@ -205,6 +209,19 @@ TEST_P(NonlinearSkinTest, ASlidingTouchKeepsItsForceAndMovesSmoothly) {
 }
 
 INSTANTIATE_TEST_SUITE_P(ShippedModels, NonlinearSkinTest, ::testing::Values("cylinder", "barrel"));
+
+// CalculiX's solid of the same skin sags by 3.6 mm.
+TEST(NonlinearSkin, SagsByItsWeight) {
+  const LinkModel model = Model("cylinder");
+  const auto markers = [&](const std::string& more) {
+    SkinTruth truth;
+    if (const auto skin = Skin(model, NonlinearScene(more))) skin->Evaluate(0, truth);
+    return truth.marker_mm;
+  };
+  const auto upright = markers("motion: {}\n"), lying = markers("motion: {gravity_mps2: [0, -9.81, 0]}\n");
+  EXPECT_NEAR(Apart(upright, lying), 3.6, 0.4);
+  EXPECT_LT(Apart(upright, model.RestMarkers()), 0.5);
+}
 
 TEST(NonlinearSkin, ASceneWithoutEquilibriumIsRefusedWithItsPlaceAndTime) {
   const auto near_end = SimulatedSkin::Make(

@@ -17,7 +17,8 @@ std::string Message(const std::string& more) {
 
 TEST(Scene, ShippedOnesBeginUntouchedAndFitBothEnds) {
   EXPECT_THAT(ShippedSceneNames(),
-              ::testing::UnorderedElementsAre("rest", "press", "two_touches", "stroke", "inflate"));
+              ::testing::UnorderedElementsAre("rest", "press", "two_touches", "stroke", "inflate",
+                                              "swing_lower", "swing_upper", "swing_tip"));
   for (const std::string& name : ShippedSceneNames()) {
     SCOPED_TRACE(name);
     const auto scene = LoadScene(name);
@@ -46,6 +47,55 @@ TEST(Scene, SaysHowTheSkinAnswers) {
   const auto bad = ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\nskin: stiff\n");
   ASSERT_FALSE(bad.ok());
   EXPECT_THAT(bad.error().message, ::testing::HasSubstr("s.yaml:4"));
+}
+
+TEST(Scene, ReadsMotion) {
+  const auto scene = ParseScene(
+      "s.yaml",
+      "taclink_scene: 1\nname: s\nduration_s: 8\nmotion:\n  gravity_mps2: [0, -9.81, 0]\n"
+      "  swing: {axis: [0, 0, 2], pivot_mm: [1, 2, 3], mean_deg: 45, amplitude_deg: 30, period_s: 4}\n");
+  ASSERT_TRUE(scene.ok()) << scene.error().message;
+  ASSERT_TRUE(scene->motion && scene->motion->swing);
+  EXPECT_EQ(scene->motion->gravity_mps2, Vec3(0, -9.81, 0));
+  const Swing& swing = *scene->motion->swing;
+  EXPECT_EQ(swing.axis, Vec3::UnitZ());
+  EXPECT_EQ(swing.pivot_mm, Vec3(1, 2, 3));
+  EXPECT_NEAR(swing.AngleRad(0), RadFromDeg(15), 1e-12);
+  EXPECT_NEAR(swing.AngleRad(2), RadFromDeg(75), 1e-12);
+  EXPECT_FALSE(ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\n")->motion);
+}
+
+TEST(Scene, RefusesMotionThatItCannotPlay) {
+  const std::string swing = "motion: {swing: {amplitude_deg: 30, period_s: 3}}\n";
+  EXPECT_THAT(Message(swing), AllOf(HasSubstr("duration_s"), HasSubstr("period_s")));
+  EXPECT_EQ(Message(swing + "loop: false\n"), "accepted");
+  EXPECT_THAT(Message("motion: {swing: {axis: [0, 0, 0], amplitude_deg: 3, period_s: 4}}\n"),
+              AllOf(HasSubstr("s.yaml:4"), HasSubstr("axis")));
+  EXPECT_THAT(Message("motion: {}\nskin: linear\n"), AllOf(HasSubstr("motion"), HasSubstr("nonlinear")));
+  EXPECT_THAT(
+      Message("motion: {}\ncontacts:\n  - {at: {path: 2, ring: 3}, depth_mm: 2, begin_s: 1, end_s: 3}\n"),
+      AllOf(HasSubstr("s.yaml:6"), HasSubstr("force_n")));
+}
+
+// By differences of where the point is in the room.
+TEST(SceneMotion, SpecificForceIsGravityLessAcceleration) {
+  const Swing swing{.axis = Vec3(1, 2, -1).normalized(),
+                    .pivot_mm = {30, -20, -200},
+                    .mean_rad = 0.4,
+                    .amplitude_rad = 1.2,
+                    .period_s = 3};
+  const SceneMotion motion{.gravity_mps2 = {1, 2, -9}, .swing = swing};
+  const Vec3 point_mm(5, 10, 95);
+  for (const double t : {0.0, 0.4, 1.1, 1.5, 2.9}) {
+    SCOPED_TRACE(t);
+    const auto rotation = [&](double s) { return Mat3(Eigen::AngleAxisd(swing.AngleRad(s), swing.axis)); };
+    const auto place_m = [&](double s) { return Vec3(1e-3 * (rotation(s) * (point_mm - swing.pivot_mm))); };
+    constexpr double kStepS = 1e-4;
+    const Vec3 acceleration =
+        (place_m(t + kStepS) - 2 * place_m(t) + place_m(t - kStepS)) / (kStepS * kStepS);
+    const Vec3 expected = rotation(t).transpose() * (motion.gravity_mps2 - acceleration);
+    EXPECT_LT((motion.SpecificForce(t, point_mm) - expected).norm(), 1e-5);
+  }
 }
 
 TEST(Scene, ReadsEveryField) {

@@ -57,6 +57,24 @@ TEST_F(SimulatedSourceTest, DeliversAtTheScenesRate) {
   }
 }
 
+TEST_F(SimulatedSourceTest, GivesTheSpecificForceOfAMovingLink) {
+  const std::string header = "taclink_scene: 1\nname: s\nduration_s: 4\nrefinement: 1\n";
+  for (const bool moves : {true, false}) {
+    const Scene scene =
+        ParseScene("s.yaml", header + (moves ? "motion: {gravity_mps2: [0, -9.81, 0]}\n" : "")).value();
+    auto source = SimulatedSource::Make(Model("cylinder"), scene, clock_);
+    ASSERT_TRUE(source.ok()) << source.error().message;
+    ASSERT_TRUE((*source)->Start().ok());
+    frame_.specific_force = SpecificForceReading{};  // of a frame before
+    ASSERT_TRUE((*source)->Next(frame_, milliseconds(20)).ok());
+    ASSERT_EQ(frame_.specific_force.has_value(), moves);
+    if (!moves) continue;
+    EXPECT_EQ(frame_.specific_force->mps2, Vec3(0, -9.81, 0));
+    EXPECT_EQ(frame_.specific_force->origin, AttitudeOrigin::kSimulated);
+    EXPECT_GT(frame_.specific_force->covariance.trace(), 0);
+  }
+}
+
 TEST_F(SimulatedSourceTest, SkipsToTheNewestWhenLate) {
   const auto source = Source("");
   ASSERT_TRUE(source->Start().ok());
