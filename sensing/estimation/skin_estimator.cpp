@@ -314,6 +314,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
     mechanics_.markers().Displacements(estimate.state, estimate.displacements_mm);
   estimate.displacements_mm += estimate.loads.beside_mm;
   estimate.known_loads = KnownLoads::FromStacked(problem.loads.Stacked() + estimate.loads.known_error);
+  AddWeightError(problem.untouched, estimate);
   estimate.failure = !IsPossible(estimate)      ? EstimateFailure::kImpossible
                      : estimate.loads.converged ? EstimateFailure::kNone
                                                 : EstimateFailure::kNotConverged;

@@ -39,8 +39,9 @@ struct SkinEstimate {
   /// than noise, between that and what is seen (posterior of the model's error). What cameras that have moved
   /// make of them (loads.by_cameras_mm) is taken off.
   Eigen::VectorXd displacements_mm;
-  Eigen::VectorXd baseline_mm;   ///< of the model's markers in the baseline, likewise
-  Eigen::VectorXd untouched_mm;  ///< of the model's markers under the known loads alone
+  Eigen::VectorXd baseline_mm;  ///< of the model's markers in the baseline, likewise
+  Eigen::VectorXd
+      untouched_mm;  ///< of the model's markers, under the pressure and the estimated specific force alone
   LoadEstimate loads;
   KnownLoads known_loads;  ///< with the estimated error taken off
   /// The longest way of a point of the skin from where the tangent of a first-order model that was asked for
@@ -104,6 +105,7 @@ class SkinEstimator {
                const KnownLoadsPrior& prior, SkinEstimate& estimate);
   bool ExplainByKnownLoads(const MarkerObservations& observed, const UntouchedSkin& untouched,
                            const KnownLoads& measured, const KnownLoadsPrior& prior, SkinEstimate& estimate);
+  static void AddWeightError(const UntouchedSkin& untouched, SkinEstimate& estimate);
   bool AddIfNoise(int marker, const Vec3& error, const Mat3& information);
   bool AreNeighborsStill() const;
   bool IsStanding(const SkinObservation& observation, const UntouchedSkin& untouched,

@@ -56,6 +56,7 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const UntouchedS
   estimate.loads.baseline_error.setZero();
   estimate.loads.known_covariance = tangent.loads.KnownCovariance();
   estimate.known_loads = KnownLoads::FromStacked(measured.Stacked() + estimate.loads.known_error);
+  AddWeightError(untouched, estimate);
   estimate.state = untouched.state;
   estimate.displacements_mm = untouched.markers_mm;
   estimate.displacements_mm.noalias() +=
@@ -67,6 +68,13 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const UntouchedS
 
 // Least squares for the errors of the known loads alone, in units of the prior: sets the errors, and chi^2
 // per number that they leave. False: a marker by itself is off by more than noise.
+// An attitude that is not measured is estimated far from where the skin was linearized.
+void SkinEstimator::AddWeightError(const UntouchedSkin& untouched, SkinEstimate& estimate) {
+  const Vec3 error_mps2 = estimate.loads.known_error.tail<3>();
+  if (error_mps2.isZero(0)) return;
+  estimate.untouched_mm.noalias() += untouched.markers_by_loads.rightCols<3>() * error_mps2;
+}
+
 bool SkinEstimator::ExplainByKnownLoads(const MarkerObservations& observed, const UntouchedSkin& untouched,
                                         const KnownLoads& measured, const KnownLoadsPrior& prior,
                                         SkinEstimate& estimate) {

@@ -20,22 +20,22 @@ double Angle(const Vec3& a, const Vec3& b) {
 
 MeasuredLoads AttitudeCheck::LoadsOf(const MeasuredLoads& measured, int64_t exposure_ns) {
   exposure_ns_ = exposure_ns;
-  asks_skin_ = !measured.specific_force_covariance.isZero(0) && !IsAttitudeUnknown(measured) &&
-               (disagreement_ || exposure_ns < asked_ns_ || exposure_ns - asked_ns_ >= kIntervalNs);
+  tests_ = !measured.specific_force_covariance.isZero(0) && !IsAttitudeUnknown(measured) &&
+           (disagreement_ || exposure_ns < tested_ns_ || exposure_ns - tested_ns_ >= kIntervalNs);
   MeasuredLoads loads = measured;
-  if (asks_skin_) loads.ForgetAttitude();
+  if (tests_) loads.ForgetAttitude();
   return loads;
 }
 
 void AttitudeCheck::Observe(const MeasuredLoads& measured, const MeasuredLoads& baseline,
                             const SkinEstimate& estimate) {
-  if (!asks_skin_) {
+  if (!tests_) {
     // A contradiction may leave no answer.
-    if (estimate.failure != EstimateFailure::kNone) asked_ns_ = 0;
+    if (estimate.failure != EstimateFailure::kNone) tested_ns_ = 0;
     if (IsAttitudeUnknown(measured)) disagreement_.reset();
     return;
   }
-  asked_ns_ = exposure_ns_;
+  tested_ns_ = exposure_ns_;
   // What presses may look like weight.
   if (estimate.failure != EstimateFailure::kNone || !estimate.loads.loads.empty()) return;
   const Vec3 skin_mps2 = estimate.known_loads.specific_force_mps2;

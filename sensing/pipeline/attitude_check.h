@@ -16,10 +16,10 @@ struct AttitudeDisagreement {
   double angle_deg = 0;
 };
 
-/// Asks the skin alone for the specific force, now and then: a measured one that is wrong (a link that is
-/// mounted otherwise, joints with a wrong zero) bends the answer in all ways, contacts that are not there
-/// among them, so that it must be left out to be judged. While it is contradicted it stays left out, and
-/// forces are right all the same. One thread.
+/// Estimates the specific force from the shape of the skin alone, every 3 s: a measured one that is wrong (a
+/// link that is mounted otherwise, joints with a wrong zero) distorts the whole estimate, phantom contacts
+/// included, so that it must be left out to be tested. While it is contradicted it stays left out, and forces
+/// stay right. One thread.
 class AttitudeCheck {
  public:
   static constexpr double kLimit = 3;  ///< of AttitudeDisagreement::deviations
@@ -30,13 +30,13 @@ class AttitudeCheck {
   void Observe(const MeasuredLoads& measured, const MeasuredLoads& baseline, const SkinEstimate& estimate);
   void Restart() { *this = {}; }
 
-  /// Of the newest frame that told; none: they agree.
+  /// Of the newest untouched frame that was tested; none: they agree.
   const std::optional<AttitudeDisagreement>& disagreement() const { return disagreement_; }
 
  private:
   std::optional<AttitudeDisagreement> disagreement_;
-  bool asks_skin_ = false;   // in the frame in work
-  int64_t asked_ns_ = 0;     // exposure of the frame in which the skin was asked last; 0: never
+  bool tests_ = false;       // in the frame in work
+  int64_t tested_ns_ = 0;    // exposure of the frame that was tested last; 0: none
   int64_t exposure_ns_ = 0;  // of the frame in work
 };
 

@@ -1,12 +1,11 @@
 #include "sensing/pipeline/judge.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 
 #include "sensing/core/similar_skin.h"
+#include "sensing/pipeline/known_loads_reasons.h"
+#include "sensing/pipeline/reason_text.h"
 
 namespace taclink {
 namespace {
@@ -19,9 +18,6 @@ constexpr double kDeepestDentMm = 16;
 constexpr double kWidestGap = 3.5;
 // A tangent's forces are wrong by a fifth a millimeter (force-accuracy.md); likewise.
 constexpr double kFirstOrderMm = 0.6;
-constexpr double kPressureDeviations = 3;
-// Markers that are uncertain by more for the specific force alone, contacts of 0.02 N may hide among.
-constexpr double kMostAttitudeErrorMm = 0.2;
 // chi^2 per number of a region of 3 x 3 markers: right answers stay below 3, wrong ones are above, those of a
 // half covered camera from 3.2 on (bench whole: none of 7 105 sound frames lies between 3 and 5).
 constexpr double kMostRegionResidual = 3;
@@ -42,15 +38,6 @@ constexpr double kWaveDeg = 75, kBeltMm = 24;
 // Of the limit of detection all around: below, sums on the inflated barrel were up to a quarter too small or
 // too large, and on slack skins, which press far above it, within a tenth.
 constexpr double kHugLimits = 4;
-
-std::string Text(const char* format, ...) {
-  char text[400];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof text, format, arguments);
-  va_end(arguments);
-  return text;
-}
 
 // A marker of that ring is seen on the path or on one of so many beside it.
 bool IsSeenNear(const LinkModel& model, const SkinShape& shape, int path, int ring, int beside) {
@@ -171,10 +158,9 @@ std::optional<Reason> FailureReason(EstimateFailure failure) {
     case EstimateFailure::kNone:
       return std::nullopt;
     case EstimateFailure::kNoEquilibrium:
-      return Reason{
-          ReasonId::kNoEquilibrium,
-          "no skin of this model is stable under the pressure that is told; check the pressure and the "
-          "model's material"};
+      return Reason{ReasonId::kNoEquilibrium,
+                    "no skin of this model is stable under the measured pressure; check the pressure and the "
+                    "model's material"};
     case EstimateFailure::kImpossible:
       return Reason{ReasonId::kImpossible,
                     "what was found is not physically possible; check that the calibration is this link's"};
@@ -187,89 +173,12 @@ std::optional<Reason> FailureReason(EstimateFailure failure) {
       "press less"};
 }
 
-void AddPressureReasons(const Evidence& evidence, LinkState& state) {
-  if (state.pressure.stale)
-    state.reasons.push_back({ReasonId::kPressureUnknown,
-                             "the pressure is not known: " + state.pressure.trouble + "; check the sensor"});
-  else if (!evidence.is_told)
-    state.reasons.push_back(
-        {ReasonId::kPressureUnknown,
-         "nobody tells the pressure: forces hold for a skin that was slack when its baseline was taken; "
-         "configure pressure_kpa (0 if it is never inflated), or a sensor"});
-  if (!state.pressure_estimate) return;
-  const MeasuredLoads &told = evidence.told, &baseline = evidence.baseline;
-  const double now_mpa = state.pressure_estimate->mpa;
-  const double baseline_off_mpa = std::abs(evidence.estimate.loads.baseline_error[0]),
-               most_baseline_off_mpa = kPressureDeviations * baseline.pressure_sigma_mpa;
-  const double off_mpa = std::abs(now_mpa - told.pressure_mpa),
-               most_off_mpa = kPressureDeviations * told.pressure_sigma_mpa;
-  if (baseline_off_mpa > most_baseline_off_mpa)
-    state.reasons.push_back(
-        {ReasonId::kPressureMismatch,
-         Text("the skin's shape says %.3f kPa, and %.3f kPa when the baseline was taken; told were %.3f and "
-              "%.3f kPa; check the sensor and the baseline's pressure, or tare",
-              1e3 * now_mpa, 1e3 * (baseline.pressure_mpa + evidence.estimate.loads.baseline_error[0]),
-              1e3 * told.pressure_mpa, 1e3 * baseline.pressure_mpa),
-         baseline_off_mpa, most_baseline_off_mpa});
-  else if (off_mpa > most_off_mpa && evidence.is_told)
-    state.reasons.push_back(
-        {ReasonId::kPressureMismatch,
-         Text("the skin's shape says %.3f kPa, the sensor %.3f kPa; check the sensor, its hose and the "
-              "baseline's pressure",
-              1e3 * now_mpa, 1e3 * told.pressure_mpa),
-         off_mpa, most_off_mpa});
-}
-
-// Of measured loads and of the estimate's errors of them: the change since the baseline, for what both have
-// in common is no difference.
-double AttitudeDeviations(const Evidence& evidence) {
-  const Mat3 covariance =
-      evidence.told.specific_force_covariance + evidence.baseline.specific_force_covariance;
-  if (covariance.isZero(0)) return 0;
-  const LoadEstimate& loads = evidence.estimate.loads;
-  const Vec3 off = (loads.known_error - loads.baseline_error).tail<3>();
-  return std::sqrt(std::max(0.0, off.dot(covariance.ldlt().solve(off))));
-}
-
-void AddAttitudeReasons(const Evidence& evidence, LinkState& state) {
-  constexpr const char* kRemedy =
-      "check where the link is mounted (pose), the URDF, the joints' zeros and the sensor's frame";
-  if (const auto& off = evidence.attitude) {
-    state.reasons.push_back(
-        {ReasonId::kAttitudeMismatch,
-         Text("since the baseline the skin shows another change of attitude than is measured, %.0f deg off: "
-              "(%.1f, %.1f, %.1f) instead of (%.1f, %.1f, %.1f) m/s2; the measured one is not used; %s",
-              off->angle_deg, off->skin_mps2.x(), off->skin_mps2.y(), off->skin_mps2.z(),
-              off->measured_mps2.x(), off->measured_mps2.y(), off->measured_mps2.z(), kRemedy),
-         off->deviations, AttitudeCheck::kLimit});
-    return;
-  }
-  if (const double deviations = AttitudeDeviations(evidence); deviations > AttitudeCheck::kLimit) {
-    state.reasons.push_back(
-        {ReasonId::kAttitudeMismatch,
-         Text("the skin contradicts the measured attitude by %.1f standard deviations; %s", deviations,
-              kRemedy),
-         deviations, AttitudeCheck::kLimit});
-    return;
-  }
-  const double limit_mm = kMostAttitudeErrorMm * LengthUnit(evidence.model);
-  if (evidence.attitude_error_mm <= limit_mm) return;
-  const std::string trouble = state.specific_force ? state.specific_force->trouble : "";
-  state.reasons.push_back(
-      {ReasonId::kAttitudeUnknown,
-       Text("the attitude is not known, and the skin tells it only to %.1f mm of its sag: weak contacts may "
-            "be "
-            "missed or off; %s",
-            evidence.attitude_error_mm,
-            trouble.empty() ? "send joint states, or the attitude (UpdateAttitude)" : trouble.c_str()),
-       evidence.attitude_error_mm, limit_mm});
-}
-
 Reason ApartReason(const CameraAgreement& agreement, double most_apart) {
   return {ReasonId::kCamerasDisagree,
-          Text("of %d of %d markers the two cameras' lines of sight do not meet: one camera has moved, lags "
-               "behind, or is another link's; check both, and calibrate again",
-               agreement.apart, agreement.pairs),
+          ReasonText(
+              "of %d of %d markers the two cameras' lines of sight do not meet: one camera has moved, lags "
+              "behind, or is another link's; check both, and calibrate again",
+              agreement.apart, agreement.pairs),
           agreement.apart, most_apart};
 }
 
@@ -281,24 +190,27 @@ void AddAgreementReason(const Evidence& evidence, LinkState& state) {
   if (evidence.motion && evidence.motion->late_s > 0) {
     state.reasons.push_back(
         {ReasonId::kLate,
-         Text("the %s camera shows the skin's motion %.2f s later than the other: its pictures are late; "
-              "plug it in again, on a port of its own, or lower the frame rate; then touch the skin quickly",
-              Name(evidence.motion->camera), evidence.motion->late_s),
+         ReasonText(
+             "the %s camera shows the skin's motion %.2f s later than the other: its pictures are late; "
+             "plug it in again, on a port of its own, or lower the frame rate; then touch the skin quickly",
+             Name(evidence.motion->camera), evidence.motion->late_s),
          evidence.motion->late_s});
   } else if (lost) {
     return;
   } else if (evidence.motion) {
     state.reasons.push_back(
         {ReasonId::kCamerasDisagree,
-         Text("the %s camera sees the skin move where the other does not, or did so less than 2 s ago: one "
-              "lags behind, has moved itself, or is another link's; check both, and calibrate again",
-              Name(evidence.motion->camera))});
+         ReasonText(
+             "the %s camera sees the skin move where the other does not, or did so less than 2 s ago: one "
+             "lags behind, has moved itself, or is another link's; check both, and calibrate again",
+             Name(evidence.motion->camera))});
   } else if (evidence.sees_alone) {
     state.reasons.push_back(
         {ReasonId::kCamerasDisagree,
-         Text("the %s camera shows the skin pressed where the other shows it untouched: the pictures are "
-              "of two moments, or a camera has moved or is another link's; check both, and calibrate again",
-              Name(*evidence.sees_alone))});
+         ReasonText(
+             "the %s camera shows the skin pressed where the other shows it untouched: the pictures are "
+             "of two moments, or a camera has moved or is another link's; check both, and calibrate again",
+             Name(*evidence.sees_alone))});
   } else if (agreement.apart > most_apart) {
     state.reasons.push_back(ApartReason(agreement, most_apart));
   }
@@ -308,16 +220,17 @@ void AddResidualReason(LinkState& state) {
   if (state.forces.region_residual > kMostRegionResidual)
     state.reasons.push_back(
         {ReasonId::kResidual,
-         Text("a region of markers is off the estimated shape by %.1f times what is expected, and the loads "
-              "there may be others; check the model, and calibrate again",
-              std::sqrt(state.forces.region_residual)),
+         ReasonText(
+             "a region of markers is off the estimated shape by %.1f times what is expected, and the loads "
+             "there may be others; check the model, and calibrate again",
+             std::sqrt(state.forces.region_residual)),
          std::sqrt(state.forces.region_residual), std::sqrt(kMostRegionResidual)});
   else if (state.forces.residual > kMostResidual)
     state.reasons.push_back(
         {ReasonId::kResidual,
-         Text("the markers are off the estimated shape by %.1f times what is expected, and the loads "
-              "may be others; check the model, and calibrate again",
-              state.forces.residual),
+         ReasonText("the markers are off the estimated shape by %.1f times what is expected, and the loads "
+                    "may be others; check the model, and calibrate again",
+                    state.forces.residual),
          state.forces.residual, kMostResidual});
 }
 
@@ -330,8 +243,9 @@ void AddModelReason(const SkinEstimate& estimate, double unit, LinkState& state)
   if (const double off_mm = estimate.first_order_mm; off_mm > kFirstOrderMm * unit)
     state.reasons.push_back(
         {ReasonId::kForceModel,
-         Text("the %s force model was asked for, but the skin is %.1f mm from where it holds; choose auto",
-              Name(state.forces.model), off_mm),
+         ReasonText(
+             "the %s force model was asked for, but the skin is %.1f mm from where it holds; choose auto",
+             Name(state.forces.model), off_mm),
          off_mm, kFirstOrderMm * unit});
 }
 
@@ -342,9 +256,10 @@ void AddHugReason(LinkState& state) {
     if (!contact.is_ring_contact || contact.normal_force_n >= least_n) continue;
     state.reasons.push_back(
         {ReasonId::kEncircled,
-         Text("what presses alike all around is not far above its limit of detection, %.2f N: its sum may be "
-              "a quarter off, either way; let air out, or ask only whether something presses",
-              state.forces.limit_around_n)});
+         ReasonText(
+             "what presses alike all around is not far above its limit of detection, %.2f N: its sum may be "
+             "a quarter off, either way; let air out, or ask only whether something presses",
+             state.forces.limit_around_n)});
     return;
   }
 }
@@ -362,15 +277,16 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
   if (const double shift_mm = evidence.estimate.loads.camera_shift_mm; shift_mm > kMostCameraShiftMm * unit)
     state.reasons.push_back(
         {ReasonId::kCamerasMoved,
-         Text("the cameras have moved or turned since they were calibrated, so far that markers would be off "
-              "by "
-              "up to %.2f mm; it is taken off, but see what moved them, and calibrate again",
-              shift_mm),
+         ReasonText(
+             "the cameras have moved or turned since they were calibrated, so far that markers would be off "
+             "by "
+             "up to %.2f mm; it is taken off, but see what moved them, and calibrate again",
+             shift_mm),
          shift_mm, kMostCameraShiftMm * unit});
   if (const double moved_mm = evidence.estimate.unsettled_mm; moved_mm > 0)
     state.reasons.push_back(
         {ReasonId::kUnsettled,
-         Text(
+         ReasonText(
              "the skin may buckle where no camera sees it: its shape there moved by "
              "%.1f mm in the last step; forces and seen markers had settled; inflate the skin, or press less",
              moved_mm),
@@ -379,9 +295,10 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
   if (const double dent_mm = DeepestDent(evidence); dent_mm > kDeepestDentMm * unit)
     state.reasons.push_back(
         {ReasonId::kTooDeep,
-         Text("pressed in by %.0f mm: beyond %.0f mm forces were not compared with the truth; press less, or "
-              "inflate the skin",
-              dent_mm, kDeepestDentMm * unit),
+         ReasonText(
+             "pressed in by %.0f mm: beyond %.0f mm forces were not compared with the truth; press less, or "
+             "inflate the skin",
+             dent_mm, kDeepestDentMm * unit),
          dent_mm, kDeepestDentMm * unit});
 }
 
@@ -409,11 +326,12 @@ void AddSightReasons(const Evidence& evidence, LinkState& state) {
   if (const Gap gap = WidestGap(evidence.model, state.shape, widest_mm); gap.length_mm() > widest_mm)
     state.reasons.push_back(
         {ReasonId::kSparseMarkers,
-         Text("at path %d no marker is in sight from z = %.0f mm to %.0f mm, but a dent on this skin decays "
-              "within %.1f mm, so that loads may hide there; clean the cameras' view, or use a model with "
-              "more "
-              "rings",
-              gap.path + 1, gap.begin_mm, gap.end_mm, decay_mm),
+         ReasonText(
+             "at path %d no marker is in sight from z = %.0f mm to %.0f mm, but a dent on this skin decays "
+             "within %.1f mm, so that loads may hide there; clean the cameras' view, or use a model with "
+             "more "
+             "rings",
+             gap.path + 1, gap.begin_mm, gap.end_mm, decay_mm),
          gap.length_mm(), widest_mm});
 }
 
@@ -453,7 +371,7 @@ void Judge(const Evidence& evidence, LinkState& state) {
   state.reasons.clear();
   const bool few_are_seen = seen < kLostShare * all;
   const bool lost = few_are_seen || !AreOfOneSkin(evidence.agreement);
-  std::string few = seen < kDegradedShare * all ? Text(
+  std::string few = seen < kDegradedShare * all ? ReasonText(
                                                       "%d of %d markers seen; check lenses, lamps, that "
                                                       "nothing hides the skin, and that no camera has "
                                                       "been swapped or turned",
@@ -468,8 +386,7 @@ void Judge(const Evidence& evidence, LinkState& state) {
     state.reasons.push_back({ReasonId::kFewMarkers, few, seen, kDegradedShare * all});
   if (auto failure = FailureReason(evidence.estimate.failure); failure && !lost)
     state.reasons.push_back(*std::move(failure));
-  if (!lost) AddPressureReasons(evidence, state);
-  if (!lost && state.forces.converged) AddAttitudeReasons(evidence, state);
+  if (!lost) AddKnownLoadsReasons(evidence, state);
   if (!lost && evidence.drift) state.reasons.push_back(*evidence.drift);
   if (!lost && state.forces.converged) {
     AddShapeReasons(evidence, state);

@@ -34,12 +34,12 @@ struct Evidence {
   std::optional<MotionDisagreement> motion;           ///< see CameraMotion
   std::optional<CameraId> sees_alone;                 ///< see RestComparison
   std::optional<AttitudeDisagreement> attitude = {};  ///< none: measured attitude and skin agree
-  double attitude_error_mm = 0;     ///< of a marker, by what is not known of the specific force
-  std::optional<Reason> drift;      ///< none: the baseline has not drifted far
-  bool is_baseline_forced = false;  ///< taken although something touched or moved
-  MeasuredLoads told;               ///< the pressure that was taken as told
-  bool is_told = true;              ///< false: by nobody, or by a sensor that fell silent
-  MeasuredLoads baseline;           ///< and that of the baseline
+  double attitude_error_mm = 0;      ///< of a marker, by what is not known of the specific force
+  std::optional<Reason> drift;       ///< none: the baseline has not drifted far
+  bool is_baseline_forced = false;   ///< taken although something touched or moved
+  MeasuredLoads measured;            ///< known loads that the estimate took
+  bool is_pressure_measured = true;  ///< false: there is no sensor, or it fell silent
+  MeasuredLoads baseline;            ///< known loads of the baseline
   const SkinEstimate& estimate;
 };
 

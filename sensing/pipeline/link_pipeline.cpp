@@ -375,10 +375,10 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.specific_force = frame.specific_force;
   state.stage_ms = {};
   const bool stale = frame.pressure.stale;
-  MeasuredLoads told = s.MeasuredAt(frame);
-  // A sensor that fell silent, or none at all: the shape tells the pressure.
-  const bool is_told = !stale && (frame.pressure_mpa || s.options.pressure_mpa ||
-                                  frame.pressure.origin != PressureOrigin::kNone);
+  const MeasuredLoads measured = s.MeasuredAt(frame);
+  // Without a sensor, or when it fell silent, the pressure is estimated from the shape.
+  const bool is_pressure_measured = !stale && (frame.pressure_mpa || s.options.pressure_mpa ||
+                                               frame.pressure.origin != PressureOrigin::kNone);
 
   const auto timed = [&s](double& stage_ms, auto&& stage) {
     const int64_t start = s.clock.MonotonicNs();
@@ -392,24 +392,23 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });
   if (s.rest) {
     if (stale) return s.WaitForPressure(state);
-    s.TakeRest(frame, told, state);
+    s.TakeRest(frame, measured, state);
     return;
   }
-  const MeasuredLoads measured = told;
-  told = s.attitude.LoadsOf(measured, frame.times.exposure_monotonic_ns);
-  const std::optional<MeasuredLoads> known = is_told ? std::optional(told) : std::nullopt;
+  MeasuredLoads loads = s.attitude.LoadsOf(measured, frame.times.exposure_monotonic_ns);
+  const std::optional<MeasuredLoads> known = is_pressure_measured ? std::optional(loads) : std::nullopt;
   timed(state.stage_ms.register_, [&] { s.Label(state); });
   s.motion->Observe(frame.times, s.labels);
   state.times.tracked_ns = s.clock.MonotonicNs();
   timed(state.stage_ms.force,
-        [&] { s.skin->Run(s.labels, known, s.keeper.DriftMm(), *s.estimator, s.finder, state, told); });
+        [&] { s.skin->Run(s.labels, known, s.keeper.DriftMm(), *s.estimator, s.finder, state, loads); });
   s.TakeBackRejected(state);
   s.predicted_mm = state.shape.positions_mm;
   const SkinEstimate& estimate = s.estimator->estimate();
   s.attitude.Observe(measured, s.skin->baseline_loads(), estimate);
   s.estimator->WriteKnownLoads(state);
   if (estimate.failure == EstimateFailure::kNone)
-    s.keeper.Apply(WithEstimate(told, state), estimate, state.shape);
+    s.keeper.Apply(WithEstimate(loads, state), estimate, state.shape);
   state.total_force_n.setZero();
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   Judge({.model = s.model,
@@ -421,8 +420,8 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
          .attitude_error_mm = s.estimator->AttitudeErrorMm(),
          .drift = s.keeper.DriftReason(),
          .is_baseline_forced = s.keeper.is_forced(),
-         .told = told,
-         .is_told = is_told,
+         .measured = loads,
+         .is_pressure_measured = is_pressure_measured,
          .baseline = s.skin->baseline_loads(),
          .estimate = estimate},
         state);

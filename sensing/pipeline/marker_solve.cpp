@@ -38,12 +38,12 @@ bool LeaveOutliersOut(const Eigen::VectorXd& by_cameras_mm, SkinShape& shape) {
 }  // namespace
 
 LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, LoadsPair loads, SkinShape shape,
-                       bool is_told) {
+                       bool is_pressure_measured) {
   LinkState state;
   state.shape = std::move(shape);
   ContactFinder finder(model);
   const SkinEstimate& estimate = estimator.estimate();
-  if (!is_told) {
+  if (!is_pressure_measured) {
     MarkerObservations seen;
     for (const MeasuredDisplacement& measured : state.shape.measured) {
       seen.displacement_mm.push_back(measured.displacement_mm);
@@ -69,8 +69,8 @@ LinkState SolveMarkers(const LinkModel& model, StateEstimator& estimator, LoadsP
          .motion = {},
          .sees_alone = {},
          .drift = {},
-         .told = loads.now,
-         .is_told = is_told,
+         .measured = loads.now,
+         .is_pressure_measured = is_pressure_measured,
          .baseline = loads.baseline,
          .estimate = estimate},
         state);

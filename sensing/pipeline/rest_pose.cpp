@@ -7,7 +7,7 @@ namespace taclink {
 namespace {
 
 // Spots stand still but for noise; what moves faster than that from pair to pair, MarkerMean sees.
-constexpr double kStillPx = 1.5, kBesidePx = 8, kMovedSpots = 0.1;
+constexpr double kStillSpotPx = 1.5, kBesidePx = 8, kMovedSpots = 0.1;
 
 }  // namespace
 
@@ -55,7 +55,7 @@ Result<bool> RestPose::Add(const DetectionPair& detections, const std::array<cv:
 bool RestPose::HasMoved(const DetectionPair& pair) const {
   const auto is_at = [](const Detections& spots, const Vec2& place_px) {
     return std::any_of(spots.begin(), spots.end(), [&](const Detection& spot) {
-      return (spot.center_px - place_px).squaredNorm() < kStillPx * kStillPx;
+      return (spot.center_px - place_px).squaredNorm() < kStillSpotPx * kStillSpotPx;
     });
   };
   for (const CameraId id : kBothCameras) {

@@ -9,8 +9,8 @@
 namespace taclink {
 namespace {
 
-constexpr double kTouchedN = 0.05;          // in ForceUnit
-constexpr double kLeastSeenFraction = 0.5;  // in each picture
+constexpr double kTouchedN = 0.05;        // in ForceUnit
+constexpr double kLeastSeenInTare = 0.5;  // in each picture
 // Between the means of both halves, of the marker that moved most; in LengthUnit.
 constexpr double kMovedMm = 0.15;
 
@@ -45,7 +45,7 @@ std::optional<Error> TareCollector::Objection(const LinkState& state) const {
   }
   for (const CameraId id : kBothCameras) {
     const int seen = state.cameras[Index(id)].labelled;
-    if (seen >= kLeastSeenFraction * markers_) continue;
+    if (seen >= kLeastSeenInTare * markers_) continue;
     return Refused("the " + std::string(Name(id)) + " camera sees only " + std::to_string(seen) + " of " +
                    std::to_string(markers_) + " markers; clear its view, or force it");
   }

@@ -279,8 +279,8 @@ void LogLinkSolver::SolveForces(const LoadsPair& loads) {
          .attitude = {},
          .attitude_error_mm = estimator_->AttitudeErrorMm(),
          .drift = {},
-         .told = loads.now,
-         .is_told = IsPressureTold(),
+         .measured = loads.now,
+         .is_pressure_measured = IsPressureTold(),
          .baseline = loads.baseline,
          .estimate = estimate},
         state_);

@@ -39,8 +39,8 @@ class JudgeTest : public ::testing::Test {
            .attitude_error_mm = attitude_error_mm_,
            .drift = {},
            .is_baseline_forced = is_baseline_forced_,
-           .told = told_,
-           .is_told = is_told_,
+           .measured = measured_,
+           .is_pressure_measured = is_pressure_measured_,
            .baseline = baseline_,
            .estimate = estimate_},
           state_);
@@ -62,8 +62,8 @@ class JudgeTest : public ::testing::Test {
   std::optional<CameraId> sees_alone_;
   std::optional<AttitudeDisagreement> attitude_;
   double attitude_error_mm_ = 0;
-  bool is_told_ = true, is_baseline_forced_ = false;
-  MeasuredLoads told_{.pressure_mpa = 1e-3, .pressure_sigma_mpa = 5e-5},
+  bool is_pressure_measured_ = true, is_baseline_forced_ = false;
+  MeasuredLoads measured_{.pressure_mpa = 1e-3, .pressure_sigma_mpa = 5e-5},
       baseline_{.pressure_mpa = 5e-4, .pressure_sigma_mpa = 5e-5};
 };
 
@@ -76,7 +76,7 @@ TEST_F(JudgeTest, WhatIsWellIsOk) {
 TEST_F(JudgeTest, AForcedBaselineIsNamedWhereItMayExplainWhatIsWrong) {
   is_baseline_forced_ = true;
   EXPECT_THAT(Reasons(), ::testing::IsEmpty());
-  is_told_ = false;
+  is_pressure_measured_ = false;
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureUnknown)) << "does not come of it";
   estimate_.failure = EstimateFailure::kNotConverged;
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kNotConverged, ReasonId::kPressureUnknown,
@@ -120,7 +120,7 @@ TEST_F(JudgeTest, ALagIsToldBesidePicturesOfTwoSkins) {
 }
 
 TEST_F(JudgeTest, APressureThatNobodyTellsIsTold) {
-  is_told_ = false;
+  is_pressure_measured_ = false;
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureUnknown));
   EXPECT_EQ(state_.status, LinkStatus::kDegraded);
   EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("pressure_kpa"));
@@ -207,11 +207,11 @@ TEST_F(JudgeTest, ABaselinesPressureThatDoesNotFitIsTold) {
   estimate_.loads.baseline_error[0] = -1.6e-4;
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureMismatch));
   EXPECT_THAT(state_.status_reason,
-              ::testing::HasSubstr("0.340 kPa when the baseline was taken; told were 1.000 and 0.500 kPa"));
+              ::testing::HasSubstr("0.340 kPa when the baseline was taken; measured were 1.000 and 0.500 kPa"));
 }
 
 TEST_F(JudgeTest, AnAttitudeThatDoesNotFitIsTold) {
-  told_.specific_force_covariance = baseline_.specific_force_covariance = 0.04 * Mat3::Identity();
+  measured_.specific_force_covariance = baseline_.specific_force_covariance = 0.04 * Mat3::Identity();
   // Of the change since the baseline: 3 sqrt(0.08) is 0.85.
   estimate_.loads.known_error[1] = 0.4;
   estimate_.loads.baseline_error[1] = -0.4;
