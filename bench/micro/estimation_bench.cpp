@@ -81,6 +81,19 @@ std::vector<SkinShape> Frames(const LinkModel& model, Motion motion) {
   return frames;
 }
 
+// Of a link that moves, the error of the measured specific force is estimated as well.
+LoadsPair Loads(bool has_attitude) {
+  LoadsPair loads{
+      .now = {.pressure_mpa = kPressureMpa, .pressure_sigma_mpa = PressureSigma(PressureOrigin::kSimulated)},
+      .baseline = {}};
+  constexpr double kSigmaMps2 = 0.2;
+  if (has_attitude) {
+    loads.now.specific_force_covariance = kSigmaMps2 * kSigmaMps2 * Mat3::Identity();
+    loads.baseline.specific_force_covariance = loads.now.specific_force_covariance;
+  }
+  return loads;
+}
+
 void Estimation(benchmark::State& state) {
   const LinkModel model = LoadLinkModel("cylinder").value();
   const auto motion = static_cast<Motion>(state.range(0));
@@ -89,9 +102,9 @@ void Estimation(benchmark::State& state) {
   std::vector<SkinShape> frames = Frames(model, motion);
   NodalForces forces;
   std::vector<Contact> contacts;
-  const LoadsPair pressure{.now = {kPressureMpa, PressureSigma(PressureOrigin::kSimulated)}, .baseline = {}};
+  const LoadsPair loads = Loads(state.range(1) == 1);
   const auto estimate = [&](SkinShape& frame) {
-    estimator.Estimate(pressure, frame, forces);
+    estimator.Estimate(loads, frame, forces);
     estimator.FindContacts(finder, frame, forces, contacts);
   };
   SkinShape untouched = Measured(model, PushedMarkers(model)[0], kNoises);
@@ -171,12 +184,8 @@ BENCHMARK(LiveEstimation)
     ->Unit(benchmark::kMillisecond);
 
 BENCHMARK(Estimation)
-    ->Arg(kRest)
-    ->Arg(kStanding)
-    ->Arg(kMoving)
-    ->Arg(kFromNowhere)
-    ->Arg(kCold)
-    ->ArgName("rest_standing_moving_nowhere_cold")
+    ->ArgsProduct({{kRest, kStanding, kMoving, kFromNowhere, kCold}, {0, 1}})
+    ->ArgNames({"rest_standing_moving_nowhere_cold", "attitude"})
     ->Unit(benchmark::kMicrosecond);
 
 }  // namespace

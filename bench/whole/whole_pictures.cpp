@@ -135,6 +135,26 @@ void WholePictures::Spoil(int frame, CameraId id, cv::Mat& gray) {
   }
 }
 
+// By joint states, say. None in a scene without motion.
+std::optional<SpecificForceReading> WholePictures::MeasuredSpecificForce(const SkinTruth& truth) const {
+  if (!whole_.scene.motion) return std::nullopt;
+  const LinkFault& fault = whole_.fault;
+  if (!fault.is_attitude_known) {
+    MeasuredLoads unknown;
+    unknown.ForgetAttitude();
+    return SpecificForceReading{.mps2 = unknown.specific_force_mps2,
+                                .covariance = unknown.specific_force_covariance,
+                                .origin = AttitudeOrigin::kNone};
+  }
+  constexpr double kSigmaMps2 = 0.2;
+  const double off_rad = fault.mount_off_rad.norm();
+  Vec3 mps2 = truth.specific_force_mps2;
+  if (off_rad > 0) mps2 = Eigen::AngleAxisd(off_rad, fault.mount_off_rad / off_rad) * mps2;
+  return SpecificForceReading{.mps2 = mps2,
+                              .covariance = kSigmaMps2 * kSigmaMps2 * Mat3::Identity(),
+                              .origin = AttitudeOrigin::kJointStates};
+}
+
 void WholePictures::Take(int frame, StereoFrame& pictures, SkinTruth& truth) {
   const double time_s = frame / whole_.scene.frame_rate_hz;
   const LinkFault& fault = whole_.fault;
@@ -169,6 +189,7 @@ void WholePictures::Take(int frame, StereoFrame& pictures, SkinTruth& truth) {
   pictures.sequence = static_cast<uint64_t>(frame);
   pictures.times.exposure_monotonic_ns =
       static_cast<int64_t>((frame + 1) / whole_.scene.frame_rate_hz * 1e9);  // 0 would be none
+  pictures.specific_force = MeasuredSpecificForce(truth);
   pictures.pressure_mpa.reset();
   pictures.pressure.origin = PressureOrigin::kNone;
   if (!fault.is_pressure_told) return;

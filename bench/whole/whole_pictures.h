@@ -2,6 +2,7 @@
 
 #include <array>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "bench/whole/whole_scenes.h"
 #include "sensing/capture/encode.h"
@@ -25,6 +26,7 @@ class WholePictures {
 
  private:
   void Draw(Renderer& renderer, int frame, const SkinTruth& truth, CameraId id);
+  std::optional<SpecificForceReading> MeasuredSpecificForce(const SkinTruth& truth) const;
   void Spoil(int frame, CameraId id, cv::Mat& gray);
 
   const WholeScene& whole_;

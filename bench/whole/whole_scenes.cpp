@@ -21,6 +21,7 @@ class SceneMaker {
   std::vector<WholeScene> Make() {
     Undisturbed();
     Pressures();
+    Swinging();
     Cameras();
     Light();
     Baselines();
@@ -165,6 +166,64 @@ class SceneMaker {
     }
     Touched("E told 10 % too high, 0.5 kPa", kUsualKpa).fault.modulus_factor = 1.1;
     Touched("E told 10 % too low, 1 kPa", 1).fault.modulus_factor = 0.9;
+  }
+
+  // Two things touch it while it goes from upright to horizontal and back, at up to 1 rad/s.
+  WholeScene& Swung(const std::string& kind, double kpa = 0) {
+    WholeScene& whole = Touched(kind, kpa);
+    constexpr double kReachMm = 150;
+    whole.scene.motion = SceneMotion{.swing = Swing{.axis = Vec3::UnitX(),
+                                                    .pivot_mm = {0, 0, -kReachMm},
+                                                    .mean_rad = kPi / 4,
+                                                    .amplitude_rad = kPi / 4,
+                                                    .period_s = kEndS}};
+    return whole;
+  }
+  // Horizontal, it rolls by half a turn.
+  WholeScene& Rolled(const std::string& kind, double kpa = 0) {
+    WholeScene& whole = Touched(kind, kpa);
+    whole.scene.motion = SceneMotion{
+        .gravity_mps2 = {0, -kStandardGravity, 0},
+        .swing = Swing{
+            .axis = Vec3::UnitZ(), .mean_rad = kPi / 2, .amplitude_rad = kPi / 2, .period_s = 2 * kEndS}};
+    return whole;
+  }
+
+  // What deploy/demo shows.
+  void DemoScenes() {
+    for (const char* name : {"swing_lower", "swing_upper", "swing_tip"}) {
+      const Scene scene = LoadScene(name).value();
+      if (scene.model != model_.name) continue;
+      WholeScene& whole = Add(std::string("demo, ") + name);
+      whole.scene.duration_s = scene.duration_s;
+      whole.scene.pressure = scene.pressure;
+      whole.scene.contacts = scene.contacts;
+      whole.scene.motion = scene.motion;
+      whole.frames = static_cast<int>(scene.duration_s * kRateHz);
+    }
+  }
+
+  void Swinging() {
+    DemoScenes();
+    Swung("swinging");
+    Swung("swinging, 0.5 kPa", kUsualKpa);
+    Swung("swinging, 1 kPa", 1);
+    Rolled("rolling");
+    Rolled("rolling, 0.5 kPa", kUsualKpa);
+    WholeScene& rolled = Rolled("rolling, attitude unknown");
+    rolled.fault.is_attitude_known = false;
+    rolled.named_by = {ReasonId::kAttitudeUnknown};
+    WholeScene& unknown = Swung("swinging, attitude unknown");
+    unknown.fault.is_attitude_known = false;
+    unknown.named_by = {ReasonId::kAttitudeUnknown};
+    for (const double kpa : {0.0, kUsualKpa}) {
+      for (const int axis : {0, 1, 2}) {
+        const std::string about = std::string(" about ") + "xyz"[axis];
+        WholeScene& off = Swung("swinging, mounted 20 deg off" + about + (kpa > 0 ? ", 0.5 kPa" : ""), kpa);
+        off.fault.mount_off_rad = RadFromDeg(20) * Vec3::Unit(axis);
+        off.named_by = {ReasonId::kAttitudeMismatch};
+      }
+    }
   }
 
   // From the beginning, which calibration may take up, and within the run.
@@ -332,15 +391,25 @@ std::string SkinKey(const WholeScene& whole) {
     add(contact.begin_s), add(contact.end_s), add(contact.ramp_s);
     if (contact.move_to) add(contact.move_to->angle_rad), add(contact.move_to->z_mm);
   }
+  if (scene.motion) {
+    const Vec3& gravity = scene.motion->gravity_mps2;
+    key += ";";
+    add(gravity.x()), add(gravity.y()), add(gravity.z());
+  }
+  if (scene.motion && scene.motion->swing) {
+    const Swing& swing = *scene.motion->swing;
+    for (int i = 0; i < 3; ++i) add(swing.axis[i]), add(swing.pivot_mm[i]);
+    add(swing.mean_rad), add(swing.amplitude_rad), add(swing.period_s);
+  }
   return key;
 }
 
 bool IsFault(const WholeScene& scene) {
   const LinkFault& fault = scene.fault;
   return fault.pictures != PictureFault::kNone || fault.pressure_off_mpa != 0 || !fault.is_pressure_told ||
-         fault.modulus_factor != 1 || !fault.told_model.empty() || fault.calibration_off.any() ||
-         fault.tare_s >= 0 || fault.follows_drift || fault.aging.any() ||
-         scene.kind.starts_with("started while touched");
+         !fault.is_attitude_known || !fault.mount_off_rad.isZero(0) || fault.modulus_factor != 1 ||
+         !fault.told_model.empty() || fault.calibration_off.any() || fault.tare_s >= 0 ||
+         fault.follows_drift || fault.aging.any() || scene.kind.starts_with("started while touched");
 }
 
 std::vector<WholeScene> WholeScenes(const LinkModel& model) {

@@ -44,11 +44,13 @@ struct LinkFault {
   double begin_s = -1;          ///< before 0: always; of `pictures` alone
   double pressure_off_mpa = 0;  ///< told less true
   bool is_pressure_told = true;
-  double modulus_factor = 1;   ///< of the material that the link is told, by the true one
-  std::string told_model;      ///< another than the skin's; empty: the skin's
-  bool is_calibrated = false;  ///< the cameras are known beforehand
-  MountError calibration_off;  ///< and where they are not, the top one
-  double tare_s = -1;          ///< a tare is asked for then; before 0: none
+  bool is_attitude_known = true;      ///< of a scene with motion
+  Vec3 mount_off_rad = Vec3::Zero();  ///< rotation vector by which the measured attitude is wrong, link frame
+  double modulus_factor = 1;          ///< of the material that the link is told, by the true one
+  std::string told_model;             ///< another than the skin's; empty: the skin's
+  bool is_calibrated = false;         ///< the cameras are known beforehand
+  MountError calibration_off;         ///< and where they are not, the top one
+  double tare_s = -1;                 ///< a tare is asked for then; before 0: none
   bool follows_drift = false;
   SkinAging aging;
 };
