@@ -20,6 +20,7 @@ namespace {
 
 constexpr double kExactMm = 0.01, kAxial = 3;
 constexpr int kExactFrames = 2;
+constexpr double kSpecificForceSigmaMps2 = 0.2;
 constexpr double kFrameMm =
     1;  // that bodies move from frame to frame, at most: 30 mm/s at 30 frames a second
 
@@ -28,11 +29,6 @@ std::unique_ptr<StateEstimator> Make(const LinkModel& model, const ForceMethod& 
   options.model = method.model;
   options.refinement = method.refinement;
   return MakeStateEstimator(model, options);
-}
-
-// Displacements count from the slack skin.
-LoadsPair PressuresOf(const PathTruth& path) {
-  return {.now = {path.path.pressure_mpa, PressureSigma(PressureOrigin::kSimulated)}, .baseline = {}};
 }
 
 double SecondsSince(int64_t start_ns) {
@@ -56,7 +52,8 @@ class Player {
     path_ = &path;
     seed_ = path_seed;
     if (path.path.bodies.empty()) {
-      Score(path.inflated, path.path.pressure_mpa == 0 ? &outcome_.rest_cpu_ms : nullptr);
+      const bool is_at_rest = path.path.pressure_mpa == 0 && path.path.attitude.empty();
+      Score(path.inflated, is_at_rest ? &outcome_.rest_cpu_ms : nullptr);
       return;
     }
     Show(path.inflated, nullptr);
@@ -87,8 +84,9 @@ class Player {
   void Show(const TrueStage& stage, std::vector<float>* times) {
     seed_ = MixBits(seed_);
     MakeShape(model_, stage, outcome_.noise_mm, seed_, shape_);
+    const LoadsPair loads = LoadsOf(path_->path, PressureSigma(PressureOrigin::kSimulated), seed_);
     const int64_t start = ThreadCpuClock().MonotonicNs();
-    estimator_->Estimate(PressuresOf(*path_), shape_, forces_);
+    estimator_->Estimate(loads, shape_, forces_);
     estimator_->FindContacts(finder_, shape_, forces_, contacts_);
     if (times) times->push_back(static_cast<float>(1e3 * SecondsSince(start)));
     ++outcome_.frames;
@@ -130,7 +128,8 @@ double MemoryOf(const LinkModel& model, const ForceMethod& method, const std::ve
     for (const PathTruth& path : truths) {
       if (path.stages.empty() || ++shown > 3) continue;
       MakeShape(model, path.stages.back(), 0.05, 1, shape);
-      estimator->Estimate(PressuresOf(path), shape, forces);
+      const double pressure_sigma = PressureSigma(PressureOrigin::kSimulated);
+      estimator->Estimate(LoadsOf(path.path, pressure_sigma, 1), shape, forces);
       estimator->FindContacts(finder, shape, forces, contacts);
     }
     return estimator;
@@ -172,14 +171,29 @@ void MakeShape(const LinkModel& model, const TrueStage& truth, double noise_mm, 
   shape.covariances_mm2.assign(count, sigmas.cwiseAbs2().asDiagonal());
   shape.sources.assign(count, MarkerSource::kBoth);
   for (size_t m = 0; m < count; ++m) {
-    Vec3 u = truth.displacements_mm[m];
+    const Vec3 baseline = truth.baseline_mm.empty() ? Vec3(Vec3::Zero()) : truth.baseline_mm[m];
+    Vec3 u = truth.displacements_mm[m] - baseline;
     if (noise_mm > 0) {
       for (int c = 0; c < 3; ++c) u[c] += sigmas[c] * normal(bits);
     }
     shape.displacements_mm[m] = u;
-    shape.positions_mm[m] = model.RestMarker(static_cast<int>(m)) + u;
+    shape.positions_mm[m] = model.RestMarker(static_cast<int>(m)) + baseline + u;
     shape.measured[m] = {u, sigmas.cwiseAbs2().cwiseInverse().asDiagonal()};
   }
+}
+
+LoadsPair LoadsOf(const PressPath& path, double pressure_sigma_mpa, uint64_t seed) {
+  LoadsPair loads;
+  loads.now.pressure_mpa = path.pressure_mpa;
+  loads.now.pressure_sigma_mpa = pressure_sigma_mpa;
+  if (path.attitude.empty()) return loads;
+  std::mt19937_64 bits(MixBits(~seed));  // others than the markers'
+  std::normal_distribution<double> normal;
+  loads.now.specific_force_mps2 = path.specific_force_mps2;
+  for (int c = 0; c < 3; ++c) loads.now.specific_force_mps2[c] += kSpecificForceSigmaMps2 * normal(bits);
+  loads.now.specific_force_covariance = kSpecificForceSigmaMps2 * kSpecificForceSigmaMps2 * Mat3::Identity();
+  loads.baseline.specific_force_mps2 = path.baseline_specific_force_mps2;
+  return loads;
 }
 
 std::vector<AccuracyOutcome> RunAccuracyBench(const LinkModel& model, const std::vector<PathTruth>& truths,

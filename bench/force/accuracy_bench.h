@@ -12,6 +12,7 @@
 #include "sensing/core/link_model.h"
 #include "sensing/core/result.h"
 #include "sensing/core/skin_shape.h"
+#include "sensing/pipeline/state_estimator.h"
 
 namespace taclink {
 
@@ -41,16 +42,20 @@ struct AccuracyOutcome {
   std::vector<SceneScores> scenes;
   std::map<std::string, int> answered;  ///< frames by the force model that the estimator names
   std::vector<float> cpu_ms;            ///< of frames with contacts
-  std::vector<float> rest_cpu_ms;       ///< of frames without pressure and without contacts
+  std::vector<float> rest_cpu_ms;       ///< of frames without pressure, weight and contacts
   int frames = 0, not_converged = 0;
   double construction_s = 0;  ///< CPU time
   double memory_mb = 0;       ///< resident, that the estimator adds to a process
 };
 
-/// Markers of a stage as a camera pair would give them: noise and covariance as said. Exact markers are given
-/// a standard deviation of 0.01 mm.
+/// Markers of a stage, from its baseline, as a camera pair would give them: noise and covariance as said.
+/// Exact markers are given a standard deviation of 0.01 mm.
 void MakeShape(const LinkModel& model, const TrueStage& truth, double noise_mm, uint64_t seed,
                SkinShape& shape);
+
+/// A path's known loads as a link would have them: the pressure as it is, the specific force of a skin with
+/// weight with an error of 0.2 m/s^2 in each component; the baseline's exact.
+LoadsPair LoadsOf(const PressPath& path, double pressure_sigma_mpa, uint64_t seed);
 
 /// Shows every method the same frames, path by path, stage by stage; estimators are restarted before a path.
 /// `truths` must outlive the outcomes. Results do not depend on `jobs`, but for times.

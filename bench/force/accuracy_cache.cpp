@@ -29,6 +29,7 @@ void Put(std::ostream& out, const TrueStage& stage) {
     Put(out, contact.center_mm);
     Put(out, contact.touched_mm);
   }
+  Put(out, stage.baseline_mm);
 }
 
 // Lists are never longer than this: a broken file must not ask for all memory.
@@ -57,16 +58,20 @@ bool Get(std::istream& in, std::vector<Vec3>& points) {
 
 bool Get(std::istream& in, TrueStage& stage) {
   if (!(in >> stage.stage.depth_mm >> stage.stage.drag_mm)) return false;
-  return Get(in, stage.displacements_mm) && GetList(in, stage.contacts, [&](BodyContact& contact) {
-           return Get(in, contact.force_n) && Get(in, contact.center_mm) && Get(in, contact.touched_mm);
-         });
+  return Get(in, stage.displacements_mm) &&
+         GetList(in, stage.contacts,
+                 [&](BodyContact& contact) {
+                   return Get(in, contact.force_n) && Get(in, contact.center_mm) &&
+                          Get(in, contact.touched_mm);
+                 }) &&
+         Get(in, stage.baseline_mm);
 }
 
 }  // namespace
 
 std::string TruthKey(const LinkModel& model, const PressPath& path, int refinement) {
   std::ostringstream key;
-  key << std::setprecision(kDigits) << "taclink truth 1 " << path.name << " refinement " << refinement
+  key << std::setprecision(kDigits) << "taclink truth 2 " << path.name << " refinement " << refinement
       << " length " << model.length_mm << " thickness " << model.thickness_mm << " middle "
       << model.PointAtDepth(0, model.length_mm / 2, 0).x() << " end " << model.PointAtDepth(0, 0, 0).x()
       << " tube " << model.tube_outer_radius_mm << " E " << model.material.youngs_modulus_mpa << " nu "
@@ -78,6 +83,11 @@ std::string TruthKey(const LinkModel& model, const PressPath& path, int refineme
     key << " body " << body.touching.index() << ' ' << at.x() << ' ' << at.y() << ' ' << at.z();
   }
   for (const PressStage& stage : path.stages) key << ' ' << stage.depth_mm << '/' << stage.drag_mm;
+  if (!path.attitude.empty()) {
+    const Vec3 &now = path.specific_force_mps2, &baseline = path.baseline_specific_force_mps2;
+    key << " density " << model.density_kg_m3 << " specific force " << now.x() << ' ' << now.y() << ' '
+        << now.z() << " from " << baseline.x() << ' ' << baseline.y() << ' ' << baseline.z();
+  }
   return key.str();
 }
 

@@ -119,6 +119,22 @@ std::vector<std::pair<std::string, ChosenScene>> ByPressure(
   return groups;
 }
 
+// None, where all skins are weightless.
+std::vector<std::pair<std::string, ChosenScene>> ByAttitude(
+    const std::vector<const AccuracyOutcome*>& outcomes) {
+  std::set<std::string> attitudes;
+  for (const AccuracyOutcome* outcome : outcomes) {
+    for (const SceneScores& scene : outcome->scenes) attitudes.insert(scene.path->path.attitude);
+  }
+  std::vector<std::pair<std::string, ChosenScene>> groups;
+  if (attitudes.size() < 2) return groups;
+  for (const std::string& attitude : attitudes) {
+    groups.emplace_back(attitude.empty() ? "weightless" : attitude,
+                        [attitude](const SceneScores& s) { return s.path->path.attitude == attitude; });
+  }
+  return groups;
+}
+
 ReportTable Costs(const std::vector<const AccuracyOutcome*>& outcomes, double noise_mm) {
   ReportTable table{"Costs and answers, " + NoiseName(noise_mm),
                     {"force model", "link", "refinement", "at rest, ms p50", "p99 / p50", "construction, s",
@@ -200,6 +216,8 @@ std::vector<ReportTable> AccuracyTables(const std::vector<AccuracyOutcome>& outc
   tables.push_back(Costs(shown, detail_noise_mm));
   tables.push_back(Grouped("By kind", shown, detail_noise_mm, ByKind()));
   tables.push_back(Grouped("By pressure", shown, detail_noise_mm, ByPressure(shown)));
+  if (const auto by_attitude = ByAttitude(shown); !by_attitude.empty())
+    tables.push_back(Grouped("By attitude", shown, detail_noise_mm, by_attitude));
   std::erase_if(tables, [](const ReportTable& table) { return table.rows.empty(); });
   return tables;
 }

@@ -27,8 +27,8 @@ using ChosenScene = std::function<bool(const SceneScores&)>;
 AccuracySummary Summarize(const AccuracyOutcome& outcome, const ChosenScene& chosen);
 AccuracySummary Summarize(const AccuracyOutcome& outcome);
 
-/// Everything, by noise; then by kind of scene and by pressure, with `detail_noise_mm`. A frame that another
-/// force model answered, which the costs tell, counts as the one that was asked for.
+/// Everything, by noise; then by kind of scene, by pressure and by attitude, with `detail_noise_mm`. A frame
+/// that another force model answered, which the costs tell, counts as the one that was asked for.
 std::vector<ReportTable> AccuracyTables(const std::vector<AccuracyOutcome>& outcomes, double detail_noise_mm);
 
 /// How many of the path's scenes there are.

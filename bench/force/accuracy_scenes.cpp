@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "sensing/core/known_loads.h"
 #include "sensing/core/similar_skin.h"
 
 namespace taclink {
@@ -114,6 +115,25 @@ std::vector<PressStage> Stages(PressKind kind) {
   return {};
 }
 
+struct HeldScene {
+  PressKind kind;
+  double pressure_mpa;
+  const char* attitude;
+  Vec3 down;  // unit
+};
+
+std::vector<HeldScene> HeldScenes() {
+  const Vec3 lying(0, -1, 0), tilted(0, -kHalf, -kHalf), upside_down(0, 0, 1);
+  return {{PressKind::kRest, 0, "lying", lying},
+          {PressKind::kRest, 0, "upside-down", upside_down},
+          {PressKind::kRest, 1e-3, "lying", lying},
+          {PressKind::kSphereMarker, 0, "lying", lying},
+          {PressKind::kStampMarker, 0, "tilted", tilted},
+          {PressKind::kStampMarker, 5e-4, "upside-down", upside_down},
+          {PressKind::kSphereMarker, 5e-4, "tilted", tilted},
+          {PressKind::kTwo, 1e-3, "lying", lying}};
+}
+
 }  // namespace
 
 const char* Name(PressKind kind) {
@@ -137,15 +157,33 @@ PressPath MakePressPath(const LinkModel& model, PressKind kind, double pressure_
           .kind = kind,
           .model = model.name,
           .pressure_mpa = pressure_mpa,
+          .attitude = {},
+          .specific_force_mps2 = Vec3::Zero(),
+          .baseline_specific_force_mps2 = Vec3::Zero(),
           .bodies = Bodies{unit}.Of(model, kind),
           .stages = std::move(stages)};
 }
 
+PressPath WithWeight(PressPath path, const std::string& attitude, const Vec3& specific_force_mps2) {
+  path.name += "-" + attitude;
+  path.attitude = attitude;
+  path.specific_force_mps2 = specific_force_mps2;
+  path.baseline_specific_force_mps2 = Vec3(0, 0, -kStandardGravity);
+  return path;
+}
+
 std::vector<PressPath> PressPaths(const LinkModel& model, const std::vector<double>& pressures_mpa) {
+  constexpr double kSameMpa = 1e-9;
   std::vector<PressPath> paths;
   for (const double pressure : pressures_mpa) {
     for (int kind = 0; kind < kPressKindCount; ++kind)
       paths.push_back(MakePressPath(model, static_cast<PressKind>(kind), pressure));
+    if (model.MassPerArea() == 0) continue;
+    for (const HeldScene& held : HeldScenes()) {
+      if (std::abs(held.pressure_mpa - pressure) > kSameMpa) continue;
+      paths.push_back(
+          WithWeight(MakePressPath(model, held.kind, pressure), held.attitude, kStandardGravity * held.down));
+    }
   }
   return paths;
 }

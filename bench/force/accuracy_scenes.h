@@ -49,22 +49,28 @@ struct PressStage {
   double drag_mm = 0;
 };
 
-/// Bodies that are pressed into a skin under constant pressure, stage by stage. Every stage is a
+/// Bodies that are pressed into a skin under constant pressure and weight, stage by stage. Every stage is a
 /// scene; a path without bodies is one too.
 struct PressPath {
-  std::string name;  ///< "<kind>-<model>-<pressure>kPa"
+  std::string name;  ///< "<kind>-<model>-<pressure>kPa", of a skin with weight "...-<attitude>"
   PressKind kind = PressKind::kRest;
   std::string model;
   double pressure_mpa = 0;
+  std::string attitude = {};  ///< in which the skin is held; empty: it is weightless
+  /// Gravity less acceleration, link frame; of the slack baseline, from which markers are measured.
+  Vec3 specific_force_mps2 = Vec3::Zero(), baseline_specific_force_mps2 = Vec3::Zero();
   std::vector<PressBody> bodies;
   std::vector<PressStage> stages;
 
   int scenes() const { return bodies.empty() ? 1 : static_cast<int>(stages.size()); }
 };
 
-/// Every kind at every pressure, MPa. Depends on nothing else.
+/// Every kind at every pressure, MPa, without weight; of a model with a density, some of them with weight,
+/// too. Depends on nothing else.
 std::vector<PressPath> PressPaths(const LinkModel& model, const std::vector<double>& pressures_mpa);
 /// Bodies and depths are `unit` times those of the shipped cylinder.
 PressPath MakePressPath(const LinkModel& model, PressKind kind, double pressure_mpa, double unit = 1);
+/// The same of a skin with weight, whose baseline was taken upright.
+PressPath WithWeight(PressPath path, const std::string& attitude, const Vec3& specific_force_mps2);
 
 }  // namespace taclink

@@ -51,7 +51,8 @@ BodyContact ContactOf(const LinkModel& model, const PressedSkin& skin, int index
 
 TrueStage Record(const LinkModel& model, const PressedSkin& skin, const PressPath& path,
                  const PressStage& stage) {
-  TrueStage truth{.stage = stage, .displacements_mm = Displacements(model, skin), .contacts = {}};
+  TrueStage truth{
+      .stage = stage, .displacements_mm = Displacements(model, skin), .contacts = {}, .baseline_mm = {}};
   for (size_t i = 0; i < path.bodies.size(); ++i) {
     const PressBody& body = path.bodies[i];
     truth.contacts.push_back(ContactOf(model, skin, static_cast<int>(i),
@@ -90,6 +91,21 @@ void FollowStages(const LinkModel& model, PressedSkin& skin, PathTruth& truth) {
   }
 }
 
+// All stages have the same baseline: slack, with its weight.
+void AddBaseline(const LinkModel& model, const PressedSkinOptions& options, PathTruth& truth) {
+  if (truth.path.baseline_specific_force_mps2.isZero(0)) return;
+  PressedSkin skin(model, options);
+  const PressSummary weighed = skin.Load({0, truth.path.baseline_specific_force_mps2});
+  if (!weighed.ok() || !weighed.stable) {
+    truth.failure = "baseline: " + weighed.Text();
+    truth.inflated = TrueStage();
+    truth.stages.clear();
+    return;
+  }
+  truth.inflated.baseline_mm = Displacements(model, skin);
+  for (TrueStage& stage : truth.stages) stage.baseline_mm = truth.inflated.baseline_mm;
+}
+
 }  // namespace
 
 double BodyContact::DistanceTo(const Vec3& point_mm) const {
@@ -104,16 +120,18 @@ PathTruth SolvePath(const LinkModel& model, const PressPath& path, int refinemen
   truth.path = path;
   const double unit = UnitsOf(model).length;
   const PressedSkinOptions usual;
-  PressedSkin skin(model, {.refinement = refinement,
-                           .step_mm = unit * usual.step_mm,
-                           .least_step_mm = unit * usual.least_step_mm,
-                           .spacing_mm = unit * usual.spacing_mm});
-  const PressSummary inflated = skin.Inflate(path.pressure_mpa);
+  const PressedSkinOptions options{.refinement = refinement,
+                                   .step_mm = unit * usual.step_mm,
+                                   .least_step_mm = unit * usual.least_step_mm,
+                                   .spacing_mm = unit * usual.spacing_mm};
+  PressedSkin skin(model, options);
+  const PressSummary inflated = skin.Load({path.pressure_mpa, path.specific_force_mps2});
   if (!inflated.ok() || !inflated.stable) {
     truth.failure = "inflating: " + inflated.Text();
   } else {
     truth.inflated = Record(model, skin, PressPath{}, PressStage{});
     if (!path.stages.empty()) FollowStages(model, skin, truth);
+    AddBaseline(model, options, truth);
   }
   truth.cpu_s = 1e-9 * static_cast<double>(ThreadCpuClock().MonotonicNs() - start);
   return truth;

@@ -23,12 +23,13 @@ struct TrueStage {
   PressStage stage;
   std::vector<Vec3> displacements_mm;  ///< of the markers' centres, from the undeformed skin
   std::vector<BodyContact> contacts;   ///< by body; one that does not touch has no force
+  std::vector<Vec3> baseline_mm;       ///< displacements of the baseline, likewise; empty: it is undeformed
 };
 
 /// A path as the forward solver has it, up to where it failed.
 struct PathTruth {
   PressPath path;
-  TrueStage inflated;  ///< before the bodies come
+  TrueStage inflated;  ///< before the bodies come, with its weight
   std::vector<TrueStage> stages;
   std::string failure;  ///< why stages are missing; empty: none are
   double cpu_s = 0;     ///< it took

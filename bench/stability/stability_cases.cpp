@@ -1,7 +1,9 @@
 #include "bench/stability/stability_cases.h"
 
+#include <cmath>
 #include <cstdio>
 
+#include "sensing/core/known_loads.h"
 #include "sensing/model/model_file.h"
 
 namespace taclink {
@@ -10,6 +12,10 @@ namespace {
 constexpr MaterialLaw kBothLaws[] = {MaterialLaw::kSaintVenantKirchhoff, MaterialLaw::kNeoHookean};
 
 constexpr double kToTubeMm = 21.55;  // pressed against it
+
+const Vec3 kLying(0, -kStandardGravity, 0),
+    kTilted = std::sqrt(0.5) * Vec3(0, -kStandardGravity, -kStandardGravity),
+    kUpsideDown(0, 0, kStandardGravity);
 
 const char* ShortName(MaterialLaw law) {
   return law == MaterialLaw::kNeoHookean ? "NH" : "SVK";
@@ -42,6 +48,11 @@ class Cases {
                      .pressure_mpa = ScaledPressureMpa(base_, model, kpa),
                      .depth_mm = depth_mm,
                      .reference_modulus_mpa = reference});
+  }
+  void AddHeld(const std::string& name, const LinkModel& model, double kpa, double depth_mm,
+               const Vec3& specific_force_mps2, double reference = 0) {
+    Add(name, model, kpa, depth_mm, reference);
+    cases.back().specific_force_mps2 = specific_force_mps2;
   }
   LinkModel Varied(double modulus, double thickness_by_radius, MaterialLaw law) const {
     return VariedModel(base_, modulus, thickness_by_radius, PoissonOf(law), law);
@@ -83,6 +94,18 @@ void AddShapesAndLoads(Cases& to, double slenderness) {
   to.Add(Label("E = 1e-4 MPa and t/R = %g", 0.2, law), to.Varied(1e-4, 0.2, law), 1, 5, 0.1);
 }
 
+void AddHeldSkins(Cases& to, double slenderness) {
+  constexpr double kUsual = 0.1, kSoft = 0.02;
+  for (const MaterialLaw law : kBothLaws) {
+    const LinkModel shipped = to.Varied(kUsual, slenderness, law), soft = to.Varied(kSoft, slenderness, law);
+    to.AddHeld(Label("lying, E = %g MPa", kUsual, law), shipped, 0, 0, kLying);
+    to.AddHeld(Label("lying, E = %g MPa", kUsual, law), shipped, 1, 5, kLying);
+    to.AddHeld(Label("lying at 2 g, E = %g MPa", kUsual, law), shipped, 0.5, 0, 2 * kLying);
+    to.AddHeld(Label("upside down, E = %g MPa", kUsual, law), shipped, 0, 5, kUpsideDown);
+    to.AddHeld(Label("lying, E = %g MPa", kSoft, law), soft, 1, 5, kLying, kUsual);
+  }
+}
+
 void AddLive(const LinkModel& base, const std::string& name, const LinkModel& model, double kpa,
              std::vector<SkinCase>& cases) {
   constexpr double kSigmaKpa = 0.02;
@@ -100,6 +123,26 @@ void AddShipped(const LinkModel& base, std::vector<SkinCase>& cases) {
     if (!model) continue;
     for (const double kpa : {0.0, 0.5, 1.5}) AddLive(base, name, *model, kpa, cases);
   }
+}
+
+void AddHeldLive(const LinkModel& base, std::vector<SkinCase>& cases) {
+  constexpr double kSoft = 0.02;
+  const auto add = [&](const std::string& name, const LinkModel& model, double kpa,
+                       const Vec3& specific_force_mps2) {
+    AddLive(base, name, model, kpa, cases);
+    cases.back().specific_force_mps2 = specific_force_mps2;
+  };
+  for (const std::string& name : ShippedModelNames()) {
+    const auto model = LoadLinkModel(name);
+    if (model) add(name + " lying", *model, 0.5, kLying);
+  }
+  add(base.name + " lying", base, 0, kLying);
+  add(base.name + " upside down", base, 0, kUpsideDown);
+  add(base.name + " tilted", base, 1, kTilted);
+  add(base.name + " lying at 2 g", base, 0.5, 2 * kLying);
+  const auto law = MaterialLaw::kNeoHookean;
+  const LinkModel soft = VariedModel(base, kSoft, base.thickness_mm / MidRadius(base), PoissonOf(law), law);
+  add(Label("lying, E = %g MPa", kSoft, law), soft, 1, kLying);
 }
 
 }  // namespace
@@ -140,6 +183,7 @@ std::vector<SkinCase> SkinCases(const LinkModel& base) {
   const double slenderness = base.thickness_mm / MidRadius(base);
   AddMaterials(cases, base, slenderness);
   AddShapesAndLoads(cases, slenderness);
+  AddHeldSkins(cases, slenderness);
   return std::move(cases.cases);
 }
 
@@ -162,6 +206,7 @@ std::vector<SkinCase> LiveCases(const LinkModel& base) {
     AddLive(base, Label("nu = %g", poisson, law), VariedModel(base, 0.1, slenderness, poisson, law), 1,
             cases);
   }
+  AddHeldLive(base, cases);
   return cases;
 }
 

@@ -30,13 +30,15 @@ struct StabilityRow {
   double condition, backward_error, float_error, energy_error, reciprocity;
 };
 
-/// A skin inflated and then pressed by a frictionless sphere of radius 10 mm.
+/// A skin that gets its weight, is inflated and then pressed by a frictionless sphere of radius 10 mm.
 struct SkinCase {
   std::string name;
   LinkModel model;
   double pressure_mpa = 0;
   double pressure_sigma_mpa = 0;  ///< told to the estimator
   double depth_mm = 0;            ///< from the undeformed surface; 0: no body
+  /// Gravity less acceleration, link frame; the live path's baseline is upright. Zero: weightless.
+  Vec3 specific_force_mps2 = Vec3::Zero();
   /// The same skin of another stiffness under loads scaled alike: must move alike.
   double reference_modulus_mpa = 0;  ///< 0: none
 };
@@ -52,11 +54,12 @@ LinkModel VariedModel(const LinkModel& base, double modulus_mpa, double thicknes
 double ScaledPressureMpa(const LinkModel& base, const LinkModel& model, double pressure_kpa);
 
 std::vector<SkinCase> SkinCases(const LinkModel& base);
-/// Every shipped model and the cylinder of other materials, slack, inflated, in suction and over-pressure.
+/// Every shipped model and the cylinder of other materials, slack, inflated, in suction and over-pressure;
+/// some of them lying, tilted and upside down, with their weight.
 std::vector<SkinCase> LiveCases(const LinkModel& base);
 /// What links do with such a skin: markers of the forward solver with noise, untouched and under bodies as
 /// large as the skin asks for, shown to the estimator by itself; what is not right must be told. A row for
-/// each body.
+/// each body; of a skin with weight another, where it is turned.
 std::vector<StabilityRow> RunLiveCase(const SkinCase& skin_case);
 /// Every shipped model, and the cylinder of a soft and of a stiff material.
 std::vector<SkinCase> PictureCases(const LinkModel& base);
@@ -67,7 +70,7 @@ std::vector<StabilityRow> RunPictureCase(const SkinCase& skin_case);
 /// `refinement` of the mesh.
 StabilityRow RunSkinCase(const SkinCase& skin_case, int refinement);
 
-/// NaN, infinities and missing markers for the estimators; NaN and impossible pushes for the forward solver.
+/// NaN, infinities and missing markers for the estimators; NaN and impossible loads for the forward solver.
 std::vector<StabilityRow> RunInputCases(const LinkModel& base,
                                         const std::function<void(const StabilityRow&)>& done);
 

@@ -15,7 +15,7 @@ namespace taclink {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr double kPressureMpa = 1e-3;
+constexpr double kPressureMpa = 1e-3, kHugeMps2 = 1e6;
 constexpr int kStabilityTruthRefinement = 2;
 
 StabilityRow Row(const std::string& name, Ending ending, const std::string& reason) {
@@ -45,7 +45,7 @@ enum class Expected {
 struct InputCase {
   const char* name;
   Expected expected;
-  void (*spoil)(SkinShape& shape, size_t pressed, double& pressure_mpa);
+  void (*spoil)(SkinShape& shape, size_t pressed, MeasuredLoads& now);
 };
 
 void Lose(SkinShape& shape, size_t marker) {
@@ -54,49 +54,58 @@ void Lose(SkinShape& shape, size_t marker) {
 }
 
 std::vector<InputCase> SpoiltMarkers() {
-  return {
-      {"NaN in a far marker", Expected::kSameForce,
-       [](SkinShape& s, size_t, double&) { s.measured[0].displacement_mm.y() = kNan; }},
-      {"NaN in the pressed marker", Expected::kSameForce,
-       [](SkinShape& s, size_t m, double&) { s.measured[m].displacement_mm.x() = kNan; }},
-      {"infinity in the pressed marker", Expected::kSameForce,
-       [](SkinShape& s, size_t m, double&) { s.measured[m].displacement_mm.x() = kInf; }},
-      {"NaN in an information matrix", Expected::kSameForce,
-       [](SkinShape& s, size_t m, double&) { s.measured[m].information_per_mm2(1, 1) = kNan; }},
-      {"infinite information", Expected::kSameForce,
-       [](SkinShape& s, size_t m, double&) { s.measured[m].information_per_mm2(1, 1) = kInf; }},
-      {"NaN in all but the measured displacements", Expected::kSameForce, [](SkinShape& s, size_t, double&) {
-         std::fill(s.displacements_mm.begin(), s.displacements_mm.end(), Vec3::Constant(kNan));
-         std::fill(s.positions_mm.begin(), s.positions_mm.end(), Vec3::Constant(kNan));
-       }}};
+  return {{"NaN in a far marker", Expected::kSameForce,
+           [](SkinShape& s, size_t, MeasuredLoads&) { s.measured[0].displacement_mm.y() = kNan; }},
+          {"NaN in the pressed marker", Expected::kSameForce,
+           [](SkinShape& s, size_t m, MeasuredLoads&) { s.measured[m].displacement_mm.x() = kNan; }},
+          {"infinity in the pressed marker", Expected::kSameForce,
+           [](SkinShape& s, size_t m, MeasuredLoads&) { s.measured[m].displacement_mm.x() = kInf; }},
+          {"NaN in an information matrix", Expected::kSameForce,
+           [](SkinShape& s, size_t m, MeasuredLoads&) { s.measured[m].information_per_mm2(1, 1) = kNan; }},
+          {"infinite information", Expected::kSameForce,
+           [](SkinShape& s, size_t m, MeasuredLoads&) { s.measured[m].information_per_mm2(1, 1) = kInf; }},
+          {"NaN in all but the measured displacements", Expected::kSameForce,
+           [](SkinShape& s, size_t, MeasuredLoads&) {
+             std::fill(s.displacements_mm.begin(), s.displacements_mm.end(), Vec3::Constant(kNan));
+             std::fill(s.positions_mm.begin(), s.positions_mm.end(), Vec3::Constant(kNan));
+           }}};
 }
 
 std::vector<InputCase> LostMarkers() {
   return {
       {"every other marker gone", Expected::kSameForce,
-       [](SkinShape& s, size_t, double&) {
+       [](SkinShape& s, size_t, MeasuredLoads&) {
          for (size_t m = 0; m < s.sources.size(); m += 2) Lose(s, m);
        }},
       {"the half of the markers away from the contact gone", Expected::kSameForce,
-       [](SkinShape& s, size_t m, double&) {
+       [](SkinShape& s, size_t m, MeasuredLoads&) {
          const Vec3 at = s.positions_mm[m];
          for (size_t k = 0; k < s.sources.size(); ++k) {
            if (s.positions_mm[k].head<2>().dot(at.head<2>()) < 0) Lose(s, k);
          }
        }},
       {"a marker 1e6 mm away without information", Expected::kSameForce,
-       [](SkinShape& s, size_t m, double&) { s.measured[m] = {Vec3::Constant(1e6), Mat3::Zero()}; }},
+       [](SkinShape& s, size_t m, MeasuredLoads&) {
+         s.measured[m] = {Vec3::Constant(1e6), Mat3::Zero()};
+       }},
       {"all markers gone", Expected::kNoForce,
-       [](SkinShape& s, size_t, double&) {
+       [](SkinShape& s, size_t, MeasuredLoads&) {
          for (size_t m = 0; m < s.sources.size(); ++m) Lose(s, m);
        }},
       {"all markers NaN", Expected::kNoForce,
-       [](SkinShape& s, size_t, double&) {
+       [](SkinShape& s, size_t, MeasuredLoads&) {
          for (auto& measured : s.measured) measured.displacement_mm.setConstant(kNan);
        }},
-      {"pressure NaN", Expected::kNoForce, [](SkinShape&, size_t, double& pressure) { pressure = kNan; }},
+      {"pressure NaN", Expected::kNoForce,
+       [](SkinShape&, size_t, MeasuredLoads& now) { now.pressure_mpa = kNan; }},
       {"pressure infinite", Expected::kNoForce,
-       [](SkinShape&, size_t, double& pressure) { pressure = kInf; }},
+       [](SkinShape&, size_t, MeasuredLoads& now) { now.pressure_mpa = kInf; }},
+      {"specific force NaN", Expected::kNoForce,
+       [](SkinShape&, size_t, MeasuredLoads& now) { now.specific_force_mps2.y() = kNan; }},
+      {"specific force infinite", Expected::kNoForce,
+       [](SkinShape&, size_t, MeasuredLoads& now) { now.specific_force_mps2.y() = kInf; }},
+      {"specific force of 1e6 m/s^2", Expected::kNoForce,
+       [](SkinShape&, size_t, MeasuredLoads& now) { now.specific_force_mps2.y() = kHugeMps2; }},
   };
 }
 
@@ -145,13 +154,13 @@ void RunEstimator(const LinkModel& model, const ForceMethod& method, const TrueS
   options.model = method.model;
   options.refinement = method.refinement;
   const auto estimator = MakeStateEstimator(model, options);
-  const auto estimate = [&](double pressure_mpa, const SkinShape& shape) {
-    const MeasuredLoads now{pressure_mpa, PressureSigma(PressureOrigin::kSimulated)};
+  const MeasuredLoads measured{kPressureMpa, PressureSigma(PressureOrigin::kSimulated)};
+  const auto estimate = [&](const MeasuredLoads& now, const SkinShape& shape) {
     return SolveMarkers(model, *estimator, {.now = now, .baseline = {}}, shape);
   };
   SkinShape clean;
   MakeShape(model, truth, kNoiseMm, 1, clean);
-  const LinkState without = estimate(kPressureMpa, clean);
+  const LinkState without = estimate(measured, clean);
   const NodalForces& forces = without.forces;
   const std::string who =
       "estimator " + method.name() +
@@ -165,10 +174,10 @@ void RunEstimator(const LinkModel& model, const ForceMethod& method, const TrueS
   for (const InputCase& input : inputs) {
     add(Guarded(who + input.name, [&] {
       SkinShape shape = clean;
-      double pressure = kPressureMpa;
-      input.spoil(shape, pressed, pressure);
+      MeasuredLoads now = measured;
+      input.spoil(shape, pressed, now);
       estimator->Restart();
-      return Verdict(who + input.name, input.expected, estimate(pressure, shape), clean_n);
+      return Verdict(who + input.name, input.expected, estimate(now, shape), clean_n);
     }));
   }
 }
@@ -184,6 +193,9 @@ void RunPushes(const LinkModel& model, const std::function<void(const StabilityR
       {"deeper than the tube", {.depth_mm = 22, .refinement = 1}},
       {"pressure NaN", {.depth_mm = 1, .pressure_mpa = kNan, .refinement = 1}},
       {"pressure of 1 MPa", {.depth_mm = 1, .pressure_mpa = 1, .refinement = 1}},
+      {"specific force NaN", {.depth_mm = 1, .specific_force_mps2 = Vec3(0, kNan, 0), .refinement = 1}},
+      {"specific force of 1e6 m/s^2",
+       {.depth_mm = 1, .specific_force_mps2 = Vec3(0, kHugeMps2, 0), .refinement = 1}},
       {"patch NaN", {.depth_mm = 1, .patch_diameter_mm = kNan, .refinement = 1}}};
   for (const auto& [name, push] : pushes) {
     const auto result = PushSkin(model, push);
@@ -192,7 +204,7 @@ void RunPushes(const LinkModel& model, const std::function<void(const StabilityR
 }
 
 bool IsFinite(const PressedSkin& skin) {
-  return std::isfinite(skin.pressure_mpa()) &&
+  return skin.known_loads().Stacked().allFinite() &&
          std::all_of(skin.state().mids_mm.begin(), skin.state().mids_mm.end(),
                      [](const Vec3& p) { return p.allFinite(); });
 }
@@ -205,6 +217,14 @@ void RunPressedSkin(const LinkModel& model, const std::function<void(const Stabi
       const PressSummary summary = skin.Inflate(pressure);
       return Refusal(name, !summary.ok() && IsFinite(skin),
                      summary.Text() + (IsFinite(skin) ? "" : "; leaves what is not finite behind"));
+    }));
+  }
+  for (const double mps2 : {kNan, kInf, kHugeMps2}) {
+    const std::string name = "pressed skin: specific force of " + std::to_string(mps2) + " m/s^2";
+    add(Guarded(name, [&] {
+      PressedSkin skin(model, {.refinement = 1});
+      const PressSummary summary = skin.Load({0, Vec3(0, mps2, 0)});
+      return Refusal(name, !summary.ok() && IsFinite(skin), summary.Text());
     }));
   }
   for (const double way : {kNan, kInf}) {

@@ -122,28 +122,60 @@ StabilityRow LiveVerdict(const std::string& name, const std::string& faults, con
   return row;
 }
 
+PressPath PathOf(const SkinCase& skin, PressKind kind, const Vec3& specific_force_mps2) {
+  const double unit = UnitsOf(skin.model).length;
+  PressPath path = MakePressPath(skin.model, kind, skin.pressure_mpa, unit);
+  if (!path.stages.empty()) path.stages = {{kLiveDepthMm * unit, 0}};
+  return skin.specific_force_mps2.isZero(0) ? path : WithWeight(path, "held", specific_force_mps2);
+}
+
+StabilityRow NoTruth(const std::string& name, const PathTruth& truth) {
+  return {name, Ending::kRefused, "the skin itself: " + truth.failure, kNan, kNan, kNan, kNan, kNan};
+}
+
+StabilityRow Show(const SkinCase& skin, const PathTruth& truth, const TrueStage& stage, uint64_t seed,
+                  const std::string& name, StateEstimator& estimator) {
+  SkinShape shape;
+  MakeShape(skin.model, stage, kNoiseMm * UnitsOf(skin.model).length, seed, shape);
+  const LinkState state = SolveMarkers(skin.model, estimator,
+                                       LoadsOf(truth.path, skin.pressure_sigma_mpa, seed), std::move(shape));
+  const bool answers = state.forces.converged && !state.shape.positions_mm.empty();
+  return LiveVerdict(name, answers ? Faults(skin, truth.path, stage, state).text() : "no answer", state);
+}
+
 // The skin without and with bodies, each once, by an estimator that knows nothing of what was before.
 std::vector<StabilityRow> RunPath(const SkinCase& skin, PressKind kind) {
-  const SkinUnits unit = UnitsOf(skin.model);
-  PressPath path = MakePressPath(skin.model, kind, skin.pressure_mpa, unit.length);
-  if (!path.stages.empty()) path.stages = {{kLiveDepthMm * unit.length, 0}};
+  const PressPath path = PathOf(skin, kind, skin.specific_force_mps2);
   const std::string name = skin.name + ", " + Name(kind);
   const PathTruth truth = SolvePath(skin.model, path, TruthRefinement(skin.model));
-  if (!truth.failure.empty() || truth.inflated.displacements_mm.empty())
-    return {{name, Ending::kRefused, "the skin itself: " + truth.failure, kNan, kNan, kNan, kNan, kNan}};
+  if (!truth.failure.empty() || truth.inflated.displacements_mm.empty()) return {NoTruth(name, truth)};
   const auto estimator = MakeStateEstimator(skin.model, {});
-  const double sigma = skin.pressure_sigma_mpa;
   std::vector<StabilityRow> rows;
   for (const TrueStage& stage : truth.stages.empty() ? std::vector{truth.inflated} : truth.stages) {
-    SkinShape shape;
-    MakeShape(skin.model, stage, kNoiseMm * unit.length, 1, shape);
     estimator->Restart();
-    const LinkState state = SolveMarkers(
-        skin.model, *estimator, {.now = {skin.pressure_mpa, sigma}, .baseline = {}}, std::move(shape));
-    const bool answers = state.forces.converged && !state.shape.positions_mm.empty();
-    rows.push_back(LiveVerdict(name, answers ? Faults(skin, path, stage, state).text() : "no answer", state));
+    rows.push_back(Show(skin, truth, stage, 1, name, *estimator));
   }
   return rows;
+}
+
+// Nothing touches the skin, which turns about the link's X axis by an eighth of a turn from frame to frame.
+// The worst of the frames.
+StabilityRow RunTurning(const SkinCase& skin) {
+  constexpr int kAttitudes = 8;
+  const std::string name = skin.name + ", turned 45 deg a frame";
+  const auto estimator = MakeStateEstimator(skin.model, {});
+  StabilityRow worst{name, Ending::kRight, "ok", kNan, kNan, kNan, kNan, kNan};
+  for (int i = 0; i < kAttitudes; ++i) {
+    const double angle = 2 * kPi * i / kAttitudes;
+    const Vec3 down(0, -std::sin(angle), -std::cos(angle));
+    const PressPath path = PathOf(skin, PressKind::kRest, skin.specific_force_mps2.norm() * down);
+    const PathTruth truth = SolvePath(skin.model, path, TruthRefinement(skin.model));
+    if (!truth.failure.empty()) return NoTruth(name, truth);
+    const StabilityRow row =
+        Show(skin, truth, truth.inflated, static_cast<uint64_t>(i) + 1, name, *estimator);
+    if (row.ending > worst.ending) worst = row;
+  }
+  return worst;
 }
 
 }  // namespace
@@ -153,6 +185,7 @@ std::vector<StabilityRow> RunLiveCase(const SkinCase& skin) {
   for (const PressKind kind : kKinds) {
     for (StabilityRow& row : RunPath(skin, kind)) rows.push_back(std::move(row));
   }
+  if (!skin.specific_force_mps2.isZero(0)) rows.push_back(RunTurning(skin));
   return rows;
 }
 

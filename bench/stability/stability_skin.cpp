@@ -6,6 +6,7 @@
 
 #include "bench/stability/stability_cases.h"
 #include "bench/stability/stability_measure.h"
+#include "sensing/shell/body_force.h"
 #include "sensing/shell/linear_shell.h"
 #include "sensing/shell/pressed_skin.h"
 
@@ -13,7 +14,7 @@ namespace taclink {
 namespace {
 
 constexpr double kSphereMm = 10, kClearMm = 0.1;
-constexpr int kInflations = 32, kPresses = 8;  // steps of each path, for the work
+constexpr int kWeighings = 32, kInflations = 32, kPresses = 8;  // steps of each path, for the work
 constexpr double kMostResidual = 2e-7, kMostEnergyError = 0.01, kMostReciprocity = 1e-4,
                  kMostScalingMm = 1e-4, kMostLinearError = 0.01, kMostBackward = 1e-12;
 
@@ -29,7 +30,10 @@ struct Path {
 
 // All that acts at the end of a path, made anew.
 struct EndLoads {
-  EndLoads(const SkinCase& c, const Path& path) : pressure(path.skin.pressure_mpa()) {
+  EndLoads(const SkinCase& c, const Path& path)
+      : pressure(path.skin.pressure_mpa()),
+        corner_areas_mm2(CornerAreas(path.skin.shell().surface())),
+        weight(corner_areas_mm2, c.model.MassPerArea() * c.specific_force_mps2) {
     const RigidContactOptions options{
         .spacing_mm = PressedSkinOptions{}.spacing_mm,
         .stiffness_n_mm3 =
@@ -37,6 +41,7 @@ struct EndLoads {
     tube = std::make_unique<RigidContact>(path.skin.shell(), options);
     tube->SetBody(RigidBar{Vec3::Zero(), Vec3::UnitZ(), c.model.tube_outer_radius_mm});
     loads = {&pressure, tube.get()};
+    if (!c.specific_force_mps2.isZero(0)) loads.push_back(&weight);
     if (c.depth_mm <= 0) return;
     body = std::make_unique<RigidContact>(path.skin.shell(), options);
     body->SetBody(path.body);
@@ -44,6 +49,8 @@ struct EndLoads {
   }
 
   FollowerPressure pressure;
+  std::vector<Eigen::Vector4d> corner_areas_mm2;  // weight refers to them
+  BodyForce weight;
   std::unique_ptr<RigidContact> tube, body;
   std::vector<const ElementLoad*> loads;
 };
@@ -63,22 +70,46 @@ double VolumeOf(const PressedSkin& skin) {
   return StoredOf(skin) - skin.shell().Energy(skin.state(), load);
 }
 
+// Of the whole weight, N mm: the work that it does between two states is the difference.
+double FallOf(const SkinCase& c, const PressedSkin& skin) {
+  if (c.specific_force_mps2.isZero(0)) return 0;
+  const auto corner_areas_mm2 = CornerAreas(skin.shell().surface());
+  const BodyForce weight(corner_areas_mm2, c.model.MassPerArea() * c.specific_force_mps2);
+  const ElementLoad* const load[] = {&weight};
+  return StoredOf(skin) - skin.shell().Energy(skin.state(), load);
+}
+
+// As it grows, the weight's work is as that of a growing pressure below.
+void Weigh(const SkinCase& c, Path& path) {
+  std::vector<double> falls = {FallOf(c, path.skin)};
+  const double step = 1.0 / kWeighings;
+  for (int i = 1; i <= kWeighings && path.refused.empty(); ++i) {
+    const double share = i == kWeighings ? 1 : i * step;
+    Note(path, path.skin.Load({0, share * c.specific_force_mps2}), "weighing");
+    falls.push_back(FallOf(c, path.skin));
+  }
+  if (path.refused.empty()) path.work_nmm = falls.back() - Simpson(falls, step);
+}
+
 // Work of the pressure is the integral of p by V = p V at the end less that of V by p.
 void Inflate(const SkinCase& c, Path& path) {
+  const double fall = FallOf(c, path.skin);
   std::vector<double> volumes = {VolumeOf(path.skin)};
   const double step = c.pressure_mpa / kInflations;
   for (int i = 1; i <= kInflations && path.refused.empty(); ++i) {
     Note(path, path.skin.Inflate(i == kInflations ? c.pressure_mpa : i * step), "inflating");
     volumes.push_back(VolumeOf(path.skin));
   }
-  if (path.refused.empty()) path.work_nmm = c.pressure_mpa * volumes.back() - Simpson(volumes, step);
+  if (!path.refused.empty()) return;
+  path.work_nmm += c.pressure_mpa * volumes.back() - Simpson(volumes, step);
+  path.work_nmm += FallOf(c, path.skin) - fall;
 }
 
 double EnergyWithLoads(const SkinCase& c, const Path& path) {
   return path.skin.shell().Energy(path.skin.state(), EndLoads(c, path).loads);
 }
 
-// At constant pressure the body's work is the change of the energy with all loads.
+// At constant pressure and weight the body's work is the change of the energy with all loads.
 void Press(const SkinCase& c, Path& path) {
   const double z = c.model.length_mm / 2;
   const Vec3 surface = c.model.PointAtDepth(0, z, 0), out = c.model.OutwardNormal(0, z);
@@ -106,7 +137,8 @@ std::unique_ptr<const Path> Follow(const SkinCase& c, int refinement) {
   auto owned = std::make_unique<Path>(c, refinement);
   Path& path = *owned;
   const double rest = StoredOf(path.skin);
-  if (c.pressure_mpa != 0) Inflate(c, path);
+  if (!c.specific_force_mps2.isZero(0)) Weigh(c, path);
+  if (path.refused.empty() && c.pressure_mpa != 0) Inflate(c, path);
   path.stored_nmm = StoredOf(path.skin) - rest;
   if (path.refused.empty() && c.depth_mm > 0) Press(c, path);
   return owned;
@@ -136,6 +168,7 @@ void CheckScaling(const SkinCase& c, const Path& path, int refinement, Checks& c
   const double share = c.reference_modulus_mpa / c.model.material.youngs_modulus_mpa;
   reference.model.material.youngs_modulus_mpa = c.reference_modulus_mpa;
   reference.pressure_mpa *= share;
+  reference.specific_force_mps2 *= share;
   const auto other = Follow(reference, refinement);
   checks.Check("shape against that of E = 0.1, mm:",
                other->refused.empty() ? LargestDistance(path.skin.state(), other->skin.state()) : kNan,

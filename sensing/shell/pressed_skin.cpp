@@ -31,6 +31,20 @@ RigidContactOptions ContactOptions(const LinkModel& model, const PressedSkinOpti
           .sticks = sticks};
 }
 
+double RadiusAtMid(const LinkModel& model) {
+  return model.PointAtDepth(0, model.length_mm / 2, model.thickness_mm / 2).head<2>().norm();
+}
+
+// By how far a specific force across the axis moves the middle of a linear skin: as a beam between its
+// clamps, w L^4 / 384 E I, and by shear, w L^2 / 8 k G A with k = 1/2 of a thin tube [timoshenko1921]. Along
+// the axis it moves the skin less.
+double SagMm(const LinkModel& model, double specific_force_mps2) {
+  const double length2 = model.length_mm * model.length_mm, radius = RadiusAtMid(model);
+  const double force_n_per_mm2 = model.MassPerArea() * specific_force_mps2;
+  return force_n_per_mm2 * length2 / (model.material.youngs_modulus_mpa * model.thickness_mm) *
+         (length2 / (192 * radius * radius) + 0.75);
+}
+
 double LongestMotion(const ShellState& from, const ShellState& to) {
   double longest = 0;
   for (size_t i = 0; i < from.mids_mm.size(); ++i) {
@@ -60,6 +74,8 @@ PressedSkin::PressedSkin(const LinkModel& model, const PressedSkinOptions& optio
       shell_(SkinSurface(mesh_), model.material),
       solver_(shell_, SolverOptions(model)),
       pressure_(0),
+      corner_areas_mm2_(CornerAreas(shell_.surface())),
+      body_force_(corner_areas_mm2_, Vec3::Zero()),
       state_(shell_.Rest()) {
   if (model.tube_outer_radius_mm > 0) {
     tube_ = std::make_unique<RigidContact>(shell_, ContactOptions(model, options, false));
@@ -81,8 +97,15 @@ Vec3 PressedSkin::Marker(int marker) const {
   return markers_.Position(state_.mids_mm, state_.directors, marker);
 }
 
+void PressedSkin::Apply(const KnownLoads& loads) {
+  known_loads_ = loads;
+  pressure_ = FollowerPressure(loads.pressure_mpa);
+  body_force_ = BodyForce(corner_areas_mm2_, model_.MassPerArea() * loads.specific_force_mps2);
+}
+
 EquilibriumSummary PressedSkin::Settle(ShellState& state) {
   std::vector<const ElementLoad*> loads = {&pressure_};
+  if (!known_loads_.specific_force_mps2.isZero(0)) loads.push_back(&body_force_);
   if (tube_) loads.push_back(tube_.get());
   for (const RigidContact& body : bodies_) loads.push_back(&body);
   return solver_.Solve(loads, {}, state);
@@ -160,24 +183,28 @@ PressSummary PressedSkin::Follow(double longest, double least, double usual_mm, 
 }
 
 double PressureScale(const LinkModel& model) {
-  const double radius = model.PointAtDepth(0, model.length_mm / 2, model.thickness_mm / 2).head<2>().norm();
-  return model.material.youngs_modulus_mpa * model.thickness_mm / radius;
+  return model.material.youngs_modulus_mpa * model.thickness_mm / RadiusAtMid(model);
 }
 
-PressSummary PressedSkin::Inflate(double pressure_mpa) {
-  if (!std::isfinite(pressure_mpa)) return Refused(EquilibriumStop::kNotFinite);
-  const double from = pressure_mpa_, change = pressure_mpa - from;
-  if (change == 0) return {};
-  const double step = options_.pressure_step * PressureScale(model_);
-  const double radius =
-      model_.PointAtDepth(0, model_.length_mm / 2, model_.thickness_mm / 2).head<2>().norm();
-  if (std::abs(change) > kMostSteps * step) return Refused(EquilibriumStop::kMaxIterations);
-  const double longest = std::min(1.0, step / std::abs(change));
-  // A linear skin's growth: the radius times the pressure over its scale.
-  const double usual_mm = radius * std::abs(change) / PressureScale(model_);
+PressSummary PressedSkin::Load(const KnownLoads& loads) {
+  if (!loads.Stacked().allFinite()) return Refused(EquilibriumStop::kNotFinite);
+  const KnownLoads from = known_loads_;
+  const double change = loads.pressure_mpa - from.pressure_mpa;
+  const Vec3 turn = loads.specific_force_mps2 - from.specific_force_mps2;
+  const double sag_mm = SagMm(model_, turn.norm());
+  if (change == 0 && sag_mm == 0) {
+    Apply(loads);
+    return {};
+  }
+  const double step = options_.pressure_step * PressureScale(model_), radius = RadiusAtMid(model_);
+  double longest = 1;
+  if (change != 0) longest = std::min(longest, step / std::abs(change));
+  if (sag_mm > 0) longest = std::min(longest, options_.pressure_step * radius / sag_mm);
+  if (longest * kMostSteps < 1) return Refused(EquilibriumStop::kMaxIterations);
+  // A linear skin's growth, the radius times the pressure over its scale, and its sag.
+  const double usual_mm = radius * std::abs(change) / PressureScale(model_) + sag_mm;
   return Follow(longest, longest / 256, usual_mm, [&](double at) {
-    pressure_mpa_ = from + at * change;
-    pressure_ = FollowerPressure(pressure_mpa_);
+    Apply({from.pressure_mpa + at * change, from.specific_force_mps2 + at * turn});
   });
 }
 

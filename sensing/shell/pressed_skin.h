@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "sensing/core/known_loads.h"
 #include "sensing/core/link_model.h"
+#include "sensing/shell/body_force.h"
 #include "sensing/shell/equilibrium.h"
 #include "sensing/shell/marker_map.h"
 #include "sensing/shell/rigid_contact.h"
@@ -21,11 +23,12 @@ double PressureScale(const LinkModel& model);
 inline constexpr double kPressureStep = 0.044;
 
 struct PressedSkinOptions {
-  int refinement = 2;                    ///< elements per interval of the marker grid
-  double step_mm = 1;                    ///< longest motion of a body from one equilibrium to the next
-  double least_step_mm = 0.01;           ///< gives up below
-  double pressure_step = kPressureStep;  ///< likewise of the pressure, of PressureScale
-  double spacing_mm = 0.8;               ///< of contact points
+  int refinement = 2;           ///< elements per interval of the marker grid
+  double step_mm = 1;           ///< longest motion of a body from one equilibrium to the next
+  double least_step_mm = 0.01;  ///< gives up below
+  /// Longest change of pressure, of PressureScale; of weight, what moves a skin as far.
+  double pressure_step = kPressureStep;
+  double spacing_mm = 0.8;  ///< of contact points
   /// Of the wall under a body, times Young's modulus / thickness: a soft wall gives way locally, which a
   /// shell does not know. The default makes its forces those of three-dimensional bricks
   /// (docs/reports/calculix.md).
@@ -51,14 +54,17 @@ struct PressSummary {
   std::string Text() const;
 };
 
-/// A link's skin as the nonlinear shell, under pressure and pressed by rigid bodies; the inner tube stops it.
-/// Each change is followed in steps, as long as they succeed. One thread.
+/// A link's skin as the nonlinear shell, under pressure and weight and pressed by rigid bodies; the inner
+/// tube stops it. Each change is followed in steps, as long as they succeed. One thread.
 class PressedSkin {
  public:
   PressedSkin(const LinkModel& model, const PressedSkinOptions& options);
 
-  /// Errors are in the summary; the state stays at the last equilibrium.
-  PressSummary Inflate(double pressure_mpa);
+  /// From the known loads before, in a straight line. A model without a density has no weight. Errors are in
+  /// the summary; the state stays at the last equilibrium.
+  PressSummary Load(const KnownLoads& loads);
+  /// The pressure alone.
+  PressSummary Inflate(double pressure_mpa) { return Load({pressure_mpa, known_loads_.specific_force_mps2}); }
   /// A body that does not touch yet. Returns its index.
   int AddBody(const RigidBody& body, bool sticks);
   /// Moves all bodies in a straight line, together, `by_mm` each by index.
@@ -67,7 +73,8 @@ class PressedSkin {
   const NonlinearShell& shell() const { return shell_; }
   const ShellMesh& mesh() const { return mesh_; }
   const ShellState& state() const { return state_; }
-  double pressure_mpa() const { return pressure_mpa_; }
+  double pressure_mpa() const { return known_loads_.pressure_mpa; }
+  const KnownLoads& known_loads() const { return known_loads_; }
   RigidContact::Summary ContactOf(int body) const {
     return bodies_[static_cast<size_t>(body)].Summarize(state_);
   }
@@ -82,6 +89,7 @@ class PressedSkin {
   };
   template <typename Advance>
   PressSummary Follow(double longest, double least, double usual_mm, Advance advance);
+  void Apply(const KnownLoads& loads);
   EquilibriumSummary Settle(ShellState& state);
   static ShellState Extrapolated(const Point& before, const Point& last, double at);
 
@@ -92,7 +100,9 @@ class PressedSkin {
   NonlinearShell shell_;
   EquilibriumSolver solver_;
   FollowerPressure pressure_;
-  double pressure_mpa_ = 0;
+  std::vector<Eigen::Vector4d> corner_areas_mm2_;  // body_force_ refers to them
+  BodyForce body_force_;
+  KnownLoads known_loads_;
   std::unique_ptr<RigidContact> tube_;
   std::deque<RigidContact> bodies_;
   ShellState state_;

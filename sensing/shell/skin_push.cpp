@@ -13,6 +13,7 @@ namespace taclink {
 namespace {
 
 constexpr double kMaxPressureMpa = 0.02;  // several times what any skin of this kind bears
+constexpr double kMaxSpecificForceMps2 = 100;
 
 constexpr double kStartMm = 0.1;  // of the disc, outside the skin
 constexpr double kRimMm = 0.25;   // radius of the disc's edge
@@ -39,6 +40,9 @@ Result<void> Check(const LinkModel& model, const SkinPush& push) {
   if (!(std::abs(push.pressure_mpa) <= kMaxPressureMpa)) {
     return Error{ErrorCode::kInvalidArgument, "the pressure must be between -20 and 20 kPa"};
   }
+  if (!(push.specific_force_mps2.norm() <= kMaxSpecificForceMps2)) {
+    return Error{ErrorCode::kInvalidArgument, "the specific force must be at most 100 m/s^2"};
+  }
   const double z = model.markers.rings_z_mm[static_cast<size_t>(model.RingOf(push.marker))];
   const double room = model.PointAtDepth(0, z, model.thickness_mm).x() - model.tube_outer_radius_mm;
   if (push.depth_mm > room) {
@@ -64,6 +68,16 @@ std::vector<int> NodesUnderDisc(const ShellMesh& mesh, int center, const Vec3& a
   return nodes;
 }
 
+// Of the nodes, by weight alone.
+std::vector<Vec3> LinearSag(const LinkModel& model, const LinearShell& shell,
+                            const Vec3& specific_force_mps2) {
+  const Vec3 n_per_mm2 = model.MassPerArea() * specific_force_mps2;
+  std::vector<NodalLoad> weights;
+  for (int node = 0; node < shell.mesh().node_count(); ++node)
+    weights.push_back({node, shell.mesh().areas_mm2[static_cast<size_t>(node)] * n_per_mm2});
+  return shell.Solve(weights).translations_mm;
+}
+
 SkinPushResult PushLinear(const LinkModel& model, const SkinPush& push) {
   const LinearShell shell(model, push.refinement);
   const ShellMesh& mesh = shell.mesh();
@@ -72,8 +86,9 @@ SkinPushResult PushLinear(const LinkModel& model, const SkinPush& push) {
   const auto height = [&](int node, const std::vector<Vec3>& of) {
     return axis.dot(of[static_cast<size_t>(node)]);
   };
+  const std::vector<Vec3> sag_mm = LinearSag(model, shell, push.specific_force_mps2);
   const auto inflated = [&](int node) {
-    return push.pressure_mpa * height(node, shell.PerPressure().translations_mm);
+    return push.pressure_mpa * height(node, shell.PerPressure().translations_mm) + height(node, sag_mm);
   };
 
   SkinPushResult result;
@@ -113,8 +128,11 @@ Error NoEquilibrium(const char* where, const PressSummary& summary) {
 
 Result<SkinPushResult> PushNonlinear(const LinkModel& model, const SkinPush& push) {
   PressedSkin skin(model, {.refinement = push.refinement});
-  const PressSummary inflated = skin.Inflate(push.pressure_mpa);
-  if (!inflated.ok()) return NoEquilibrium("inflating", inflated);
+  const PressSummary inflated = skin.Load({push.pressure_mpa, push.specific_force_mps2});
+  if (!inflated.ok()) {
+    const bool is_weightless = push.specific_force_mps2.isZero(0);
+    return NoEquilibrium(is_weightless ? "inflating" : "applying pressure and weight", inflated);
+  }
   const ShellMesh& mesh = skin.mesh();
   const auto center = static_cast<size_t>(mesh.NodeOfMarker(model, push.marker));
   const Vec3 axis = mesh.normals[center];

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "sensing/core/contact.h"
+#include "sensing/core/geometry.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/result.h"
 
@@ -14,6 +15,8 @@ struct SkinPush {
   int marker = 0;
   double depth_mm = 0;  ///< of the disc, from the uninflated radius
   double pressure_mpa = 0;
+  /// Gravity less the link's acceleration, link frame; zero: weightless. Nothing to a model without density.
+  Vec3 specific_force_mps2 = Vec3::Zero();
   double patch_diameter_mm = 5.5;
   /// Of the marker grid. A linear mesh coarser than the disc is pushed at one node.
   int refinement = 3;
@@ -22,7 +25,7 @@ struct SkinPush {
 
 struct SkinPushResult {
   double force_n = 0;        ///< on the disc, outwards; 0: the disc does not touch
-  double inflation_mm = 0;   ///< of the marker's place without the disc, along the normal
+  double inflation_mm = 0;   ///< of the marker's place without the disc, along the normal; with what sags
   int nodes_in_contact = 0;  ///< or points between them
   /// Nonlinear only: how far the wall under the disc gives way, mm; how the solution went.
   double indentation_mm = 0;

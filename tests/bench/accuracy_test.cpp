@@ -5,6 +5,7 @@
 #include <set>
 
 #include "bench/force/accuracy_report.h"
+#include "sensing/core/known_loads.h"
 #include "sensing/model/model_file.h"
 #include "tests/support/temporary_folder.h"
 
@@ -38,6 +39,17 @@ TEST(AccuracyScenes, AreManyAndOfEveryKind) {
   EXPECT_EQ(names.size(), paths.size());
   EXPECT_EQ(kinds.size(), static_cast<size_t>(kPressKindCount));
   EXPECT_GE(scenes, 60);
+}
+
+TEST(AccuracyScenes, SomeAreOfSkinsWithWeight) {
+  LinkModel model = Cylinder();
+  const auto held = [&] {
+    const auto paths = PressPaths(model, {0, 0.0005, 0.001, 0.0015});
+    return std::count_if(paths.begin(), paths.end(), [](const PressPath& p) { return !p.attitude.empty(); });
+  };
+  EXPECT_EQ(held(), 8);
+  model.density_kg_m3 = 0;
+  EXPECT_EQ(held(), 0);
 }
 
 TEST(AccuracyScenes, BodiesStartWhereTheyTouchTheUndeformedSkin) {
@@ -157,6 +169,47 @@ TEST(AccuracyTruth, IsInBalanceAndAtRestWithoutLoads) {
   }
 }
 
+TEST(AccuracyTruth, OfASkinWithWeightCountsFromItsBaseline) {
+  const LinkModel model = Cylinder();
+  const auto held = [&](const std::string& attitude, const Vec3& down) {
+    return WithWeight(MakePressPath(model, PressKind::kRest, 0), attitude, kStandardGravity * down);
+  };
+  const auto sag_mm = [&](const PathTruth& truth) {
+    SkinShape shape;
+    MakeShape(model, truth.inflated, 0, 1, shape);
+    double sag = 0;
+    for (const auto& measured : shape.measured) sag = std::max(sag, measured.displacement_mm.norm());
+    return sag;
+  };
+  const PathTruth upright = SolvePath(model, held("upright", -Vec3::UnitZ()), 1);
+  const PathTruth lying = SolvePath(model, held("lying", -Vec3::UnitY()), 1);
+  ASSERT_EQ(upright.failure + lying.failure, "");
+  EXPECT_LT(sag_mm(upright), 1e-9);
+  EXPECT_NEAR(sag_mm(lying), 3.6, 0.6);  // as three-dimensional solids
+  const std::string key = TruthKey(model, lying.path, 1), text = TruthText(lying, key);
+  PathTruth read;
+  ASSERT_TRUE(ReadTruth(text, key, read));
+  EXPECT_EQ(TruthText(read, key), text);
+  LinkModel heavier = model;
+  heavier.density_kg_m3 *= 1.01;
+  EXPECT_NE(TruthKey(heavier, lying.path, 1), key);
+}
+
+TEST(AccuracyBench, KnowsTheSpecificForceOfNowRoughlyAndOfTheBaselineExactly) {
+  const PressPath path = MakePressPath(Cylinder(), PressKind::kRest, 0.001);
+  const LoadsPair weightless = LoadsOf(path, 1e-5, 1);
+  EXPECT_EQ(weightless.now.Loads(), (KnownLoads{0.001, Vec3::Zero()}));
+  EXPECT_TRUE(weightless.now.specific_force_covariance.isZero(0));
+  const Vec3 lying(0, -kStandardGravity, 0);
+  const LoadsPair held = LoadsOf(WithWeight(path, "lying", lying), 1e-5, 1);
+  EXPECT_EQ(held.baseline.Loads(), (KnownLoads{0, Vec3(0, 0, -kStandardGravity)}));
+  EXPECT_TRUE(held.baseline.specific_force_covariance.isZero(0));
+  const double off = (held.now.specific_force_mps2 - lying).norm();
+  EXPECT_GT(off, 0);
+  EXPECT_LT(off, 1);
+  EXPECT_NEAR(held.now.specific_force_covariance(0, 0), 0.04, 1e-12);
+}
+
 TEST(AccuracyTruth, IsKeptAsItWas) {
   const LinkModel model = Cylinder();
   const PathTruth truth = SolvePath(model, ShortPath(model), 1);
@@ -245,6 +298,14 @@ TEST(AccuracyReport, TellsWhoAnswered) {
   const std::string first = Markdown(tables.front()), costs = Markdown(tables.at(1));
   EXPECT_THAT(first, ::testing::HasSubstr("| linear | can | 2 | 0.250 | 25.0 | 25.0 | 50.0 |"));
   EXPECT_THAT(costs, ::testing::HasSubstr("nonlinear 2, pressurised 1 |"));
+  EXPECT_THAT(tables.back().title, ::testing::HasSubstr("By pressure"));
+  PathTruth held = path;
+  held.path.attitude = "lying";
+  outcome.scenes.push_back({&held, &stage, {frame}});
+  const ReportTable by_attitude = AccuracyTables({outcome}, 0.05).back();
+  EXPECT_EQ(by_attitude.header.back(), "lying");
+  EXPECT_THAT(Markdown(by_attitude), ::testing::HasSubstr("weightless"));
+  outcome.scenes.pop_back();
   const std::string svg = AccuracyPlot({outcome, other}, 0.05);
   EXPECT_THAT(svg, ::testing::HasSubstr(">linear 2<"));
   EXPECT_THAT(svg, ::testing::HasSubstr(">nonlinear 2<"));

@@ -67,5 +67,22 @@ TEST(StabilityCases, AStiffSkinEndsRightAndAnImpossibleLoadIsRefused) {
   EXPECT_EQ(RunSkinCase(stiff, 1).ending, Ending::kRefused);
 }
 
+// 5 g, which is to 1 MPa as half of gravity is to 0.1 MPa.
+TEST(StabilityCases, AStiffSkinThatLiesEndsRight) {
+  const LinkModel base = ShippedCylinder();
+  SkinCase lying{.name = "lying",
+                 .model = VariedModel(base, 1, 0.0915, 0.49, MaterialLaw::kSaintVenantKirchhoff),
+                 .pressure_mpa = 0,
+                 .depth_mm = 3,
+                 .specific_force_mps2 = Vec3(0, -50, 0),
+                 .reference_modulus_mpa = 0.1};
+  lying.pressure_mpa = ScaledPressureMpa(base, lying.model, 1);
+  const StabilityRow right = RunSkinCase(lying, 1);
+  EXPECT_EQ(right.ending, Ending::kRight) << right.reason;
+  EXPECT_LT(right.energy_error, 0.01);
+  lying.specific_force_mps2.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(RunSkinCase(lying, 1).ending, Ending::kRefused);
+}
+
 }  // namespace
 }  // namespace taclink

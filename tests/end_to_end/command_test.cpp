@@ -39,6 +39,10 @@ TEST_F(CommandTest, BadInputGivesOneLineAndAnExitCode) {
                 "paths 1 to 24");
   ExpectRefused({"skin", "push", "--model", "cylinder", "--node", "7,5", "--depth-mm", "30"}, 1, "tube");
   ExpectRefused({"skin", "push", "--model", "cylinder", "--node", "7", "--depth-mm", "5"}, 2, "--node");
+  for (const char* gravity : {"unknown", "0,-9.81", "0,0,101"})
+    ExpectRefused(
+        {"skin", "push", "--model", "cylinder", "--node", "7,5", "--depth-mm", "5", "--gravity", gravity}, 1,
+        "'" + std::string(gravity) + "' is not a specific force: give X,Y,Z");
   ExpectRefused({"simulate", "--scene", Path("none.yaml"), "--out", Path("out")}, 1, "none.yaml");
   ExpectRefused({"list", "--server", "127.0.0.1:1"}, 1, "127.0.0.1:1");
 }
@@ -89,6 +93,22 @@ TEST_F(CommandTest, SkinPushAnswersWithForceAndInflation) {
   EXPECT_NEAR(real.at("inflation_mm").get<double>(), 1.5, 0.1);
   EXPECT_NEAR(push("linear", "1").at("force_n").get<double>(), 0.30,
               0.03);  // linear column of the probe table
+}
+
+// Path 7 is on top of a link that lies like that.
+TEST_F(CommandTest, SkinPushSagsByGravity) {
+  const auto push = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"skin",       "push", "--model",      "cylinder", "--node", "7,5",
+                                          "--depth-mm", "5",    "--refinement", "1",        "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Finished run = Taclink(arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return json::parse(run.out);
+  };
+  const json weightless = push({}), lying = push({"--gravity", "0,-9.81,0"});
+  EXPECT_EQ(weightless.at("inflation_mm").get<double>(), 0);
+  EXPECT_NEAR(lying.at("inflation_mm").get<double>(), -3.6, 0.8);  // as three-dimensional solids
+  EXPECT_LT(lying.at("force_n").get<double>(), 0.8 * weightless.at("force_n").get<double>());
 }
 
 }  // namespace

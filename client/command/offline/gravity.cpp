@@ -4,17 +4,24 @@
 
 namespace taclink::command {
 
+Result<Vec3> SpecificForceFrom(const std::string& text) {
+  Vec3 mps2 = Vec3::Zero();
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &mps2.x(), &mps2.y(), &mps2.z(), &used) != 3 ||
+      static_cast<size_t>(used) != text.size() || !(mps2.norm() <= 100))
+    return Error{ErrorCode::kInvalidArgument,
+                 "'" + text + "' is not a specific force: give X,Y,Z in m/s^2, at most 100"};
+  return mps2;
+}
+
 Result<void> TakeGravity(const std::string& text, double sigma_mps2, MeasuredLoads& loads) {
   if (text == "unknown") {
     loads.ForgetAttitude();
     return {};
   }
-  Vec3& mps2 = loads.specific_force_mps2;
-  int used = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &mps2.x(), &mps2.y(), &mps2.z(), &used) != 3 ||
-      static_cast<size_t>(used) != text.size() || !(mps2.norm() <= 100))
-    return Error{ErrorCode::kInvalidArgument,
-                 "'" + text + "' is not a specific force: give X,Y,Z in m/s^2, at most 100, or 'unknown'"};
+  const auto mps2 = SpecificForceFrom(text);
+  if (!mps2) return Error{mps2.error().code, mps2.error().message + ", or 'unknown'"};
+  loads.specific_force_mps2 = *mps2;
   loads.specific_force_covariance = sigma_mps2 * sigma_mps2 * Mat3::Identity();
   return {};
 }

@@ -5,6 +5,7 @@
 
 #include "client/command/cli/commands.h"
 #include "client/command/cli/json.h"
+#include "client/command/offline/gravity.h"
 #include "sensing/model/model_file.h"
 #include "sensing/shell/skin_push.h"
 
@@ -16,6 +17,7 @@ struct PushOptions {
   std::vector<int> node;
   double depth_mm = 0;
   double pressure_kpa = 0;
+  std::string gravity;
   double patch_diameter_mm = 5.5;
   int refinement = 3;
   std::string force_model = "nonlinear";
@@ -32,11 +34,19 @@ Result<void> Push(const PushOptions& options) {
                      model->name + "' has paths 1 to " + std::to_string(model->markers.paths) +
                      " and rings 1 to " + std::to_string(model->markers.rings())};
   }
+  if (auto good = CheckWeight(*model, options.gravity); !good) return good.error();
+  Vec3 specific_force_mps2 = Vec3::Zero();
+  if (!options.gravity.empty()) {
+    const auto given = SpecificForceFrom(options.gravity);
+    if (!given) return given.error();
+    specific_force_mps2 = *given;
+  }
   const auto result = PushSkin(
       *model,
       {.marker = model->MarkerIndex(path - 1, ring - 1),
        .depth_mm = options.depth_mm,
        .pressure_mpa = options.pressure_kpa * 1e-3,
+       .specific_force_mps2 = specific_force_mps2,
        .patch_diameter_mm = options.patch_diameter_mm,
        .refinement = options.refinement,
        .force_model = options.force_model == "linear" ? ForceModel::kLinear : ForceModel::kNonlinear});
@@ -72,6 +82,9 @@ void AddSkin(const Arguments& app, Selected& selected) {
       .Must(Within(-1e3, 1e3));
   push.AddOption("--pressure-kpa", options->pressure_kpa, "Gauge pressure inside the skin")
       .Must(Within(-20, 20));
+  push.AddOption("--gravity", options->gravity,
+                 "X,Y,Z: specific force in the link's frame (m/s^2, the direction in which things fall), for "
+                 "the skin's weight; without, it is weightless");
   push.AddOption("--patch-diameter-mm", options->patch_diameter_mm, "Of the disc").Must(Within(0, 1e3));
   push.AddOption("--refinement", options->refinement, "Elements per marker interval").Must(Between(1, 8));
   push.AddOption("--force-model", options->force_model, "nonlinear, or linear: small displacements only")
