@@ -21,6 +21,7 @@ class SceneMaker {
   std::vector<WholeScene> Make() {
     Undisturbed();
     Pressures();
+    DemoScenes();
     Swinging();
     Cameras();
     Light();
@@ -204,25 +205,25 @@ class SceneMaker {
   }
 
   void Swinging() {
-    DemoScenes();
-    Swung("swinging");
     Swung("swinging, 0.5 kPa", kUsualKpa);
     Swung("swinging, 1 kPa", 1);
-    Rolled("rolling");
     Rolled("rolling, 0.5 kPa", kUsualKpa);
-    WholeScene& rolled = Rolled("rolling, attitude unknown");
-    rolled.fault.is_attitude_known = false;
-    rolled.named_by = {ReasonId::kAttitudeUnknown};
-    WholeScene& unknown = Swung("swinging, attitude unknown");
-    unknown.fault.is_attitude_known = false;
-    unknown.named_by = {ReasonId::kAttitudeUnknown};
-    for (const double kpa : {0.0, kUsualKpa}) {
-      for (const int axis : {0, 1, 2}) {
-        const std::string about = std::string(" about ") + "xyz"[axis];
-        WholeScene& off = Swung("swinging, mounted 20 deg off" + about + (kpa > 0 ? ", 0.5 kPa" : ""), kpa);
-        off.fault.mount_off_rad = RadFromDeg(20) * Vec3::Unit(axis);
-        off.named_by = {ReasonId::kAttitudeMismatch};
-      }
+    // A slack barrel that lies has no equilibrium under these discs.
+    if (model_.name == "cylinder") {
+      Swung("swinging");
+      Rolled("rolling");
+      Swung("swinging, attitude unknown").fault.is_attitude_known = false;
+      MountedOff(0);
+    }
+    MountedOff(kUsualKpa);
+  }
+
+  void MountedOff(double kpa) {
+    for (const int axis : {0, 1, 2}) {
+      const std::string about = std::string(" about ") + "xyz"[axis];
+      WholeScene& off = Swung("swinging, mounted 20 deg off" + about + (kpa > 0 ? ", 0.5 kPa" : ""), kpa);
+      off.fault.mount_off_rad = RadFromDeg(20) * Vec3::Unit(axis);
+      off.named_by = {ReasonId::kAttitudeMismatch};
     }
   }
 

@@ -94,6 +94,7 @@ struct LinkPipeline::Stages {
   AcquireReason reason = AcquireReason::kFirst;  // of the frame in work
   uint64_t sequence = 0;                         // of the frame before
   LabelledMarkers acquired, labels;
+  std::vector<Vec3> untouched_mm;  // of the last frame that had an estimate
   std::vector<Vec3> predicted_mm;  // the shape of the last frame that had one
   std::shared_ptr<StateEstimator> estimator;
   ContactFinder finder;
@@ -136,6 +137,19 @@ struct LinkPipeline::Stages {
     if (reason == AcquireReason::kNone) return tracker->Follow(pictures, predicted_mm, state.tracking);
     if (tracker) tracker->Forget();
     Detect(state);
+  }
+
+  // The tracker's displacements are those that contacts cause.
+  void FollowUntouched(const SkinEstimate& estimate) {
+    const auto count = static_cast<size_t>(model.markers.count());
+    if (estimate.failure != EstimateFailure::kNone ||
+        estimate.untouched_mm.size() != 3 * static_cast<Eigen::Index>(count))
+      return;
+    untouched_mm.resize(count);
+    for (size_t m = 0; m < count; ++m)
+      untouched_mm[m] = model.RestMarker(static_cast<int>(m)) +
+                        estimate.untouched_mm.segment<3>(3 * static_cast<Eigen::Index>(m));
+    tracker->SetUntouched(untouched_mm);
   }
 
   void BeginRest(const std::optional<StereoRig>& rig, int pairs, BaselineOrigin origin) {
@@ -405,6 +419,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   s.TakeBackRejected(state);
   s.predicted_mm = state.shape.positions_mm;
   const SkinEstimate& estimate = s.estimator->estimate();
+  s.FollowUntouched(estimate);
   s.attitude.Observe(measured, s.skin->baseline_loads(), estimate);
   s.estimator->WriteKnownLoads(state);
   if (estimate.failure == EstimateFailure::kNone)

@@ -36,15 +36,7 @@ class UpdateAttitudeTest : public ::testing::Test {
     writer->WritesDone();
     return writer->Finish();
   }
-  v1::LinkFrame FrameOf(size_t link) {
-    server_.script(link).Push(++sequence_, server_.clock().MonotonicNs());
-    while (true) {
-      auto frame = reader_->Next(kForever);
-      EXPECT_TRUE(frame.ok()) << frame.error().message;
-      if (!frame || (frame->sequence() == sequence_ && frame->times().exposure_ns() != 0))
-        return std::move(*frame);
-    }
-  }
+  v1::LinkFrame FrameOf(size_t link) { return NextFrame(server_, *reader_, link, ++sequence_); }
 
   TestServer server_;
   client::Client connection_;

@@ -176,4 +176,16 @@ inline v1::Thresholds MakeThresholds(double warning_n, double alarm_n = 0, doubl
   return thresholds;
 }
 
+/// Exposes a frame of a fake source now, and waits until a client gets it.
+inline v1::LinkFrame NextFrame(TestServer& server, client::FrameReader& reader, size_t link,
+                               uint64_t sequence) {
+  server.script(link).Push(sequence, server.clock().MonotonicNs());
+  while (true) {
+    auto frame = reader.Next(kForever);
+    EXPECT_TRUE(frame.ok()) << frame.error().message;
+    if (!frame || (frame->sequence() == sequence && frame->times().exposure_ns() != 0))
+      return std::move(*frame);
+  }
+}
+
 }  // namespace taclink::server

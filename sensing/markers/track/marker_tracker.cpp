@@ -23,6 +23,8 @@ constexpr double kMaxSpread = 1.6, kBlurVariance = 0.6;  // px^2
 constexpr double kMaxResidualPx = 3, kResidualWeight = 0.3;
 constexpr int kResidualStride = 32;  // each frame, every so many markers teach the residuals
 
+constexpr double kSamePlaceMm = 0.2;  // projecting costs more than all the rest
+
 }  // namespace
 
 MarkerTracker::MarkerTracker(const SimilarSkin& skin, MarkerTrackerOptions options)
@@ -145,6 +147,18 @@ void MarkerTracker::Follow(const Pictures& gray, std::span<const Vec3> predicted
     if (camera.had_picture) Search(id, gray[c], counts);
     counts.share_read =
         std::min(1.0, static_cast<double>(camera.pixels_read) / static_cast<double>(gray[c].total()));
+  }
+}
+
+void MarkerTracker::SetUntouched(std::span<const Vec3> untouched_mm) {
+  if (untouched_mm.size() != rest_mm_.size()) return;
+  for (size_t m = 0; m < rest_mm_.size(); ++m) {
+    const Vec3 place = scale_ * untouched_mm[m];
+    if ((place - rest_mm_[m]).squaredNorm() < kSamePlaceMm * kSamePlaceMm) continue;
+    rest_mm_[m] = place;
+    for (const CameraId id : kBothCameras) {
+      if (const auto pixel = check_.projector(id).Project(place)) cameras_[Index(id)].rest_px[m] = *pixel;
+    }
   }
 }
 

@@ -78,6 +78,9 @@ class MarkerTracker {
              TrackingReport& report);
   /// A label that later stages don't believe: it is looked for again, where the prediction has it.
   void Reject(CameraId id, int marker) { Drop(cameras_[Index(id)].tracks[static_cast<size_t>(marker)]); }
+  /// Where the untouched skin has the markers, link frame, by marker: displacements that contacts cause are
+  /// counted from there. At first: as at rest.
+  void SetUntouched(std::span<const Vec3> untouched_mm);
   /// Nothing is known of where the markers are.
   void Forget();
 
