@@ -85,9 +85,7 @@ std::vector<InputCase> LostMarkers() {
          }
        }},
       {"a marker 1e6 mm away without information", Expected::kSameForce,
-       [](SkinShape& s, size_t m, MeasuredLoads&) {
-         s.measured[m] = {Vec3::Constant(1e6), Mat3::Zero()};
-       }},
+       [](SkinShape& s, size_t m, MeasuredLoads&) { s.measured[m] = {Vec3::Constant(1e6), Mat3::Zero()}; }},
       {"all markers gone", Expected::kNoForce,
        [](SkinShape& s, size_t, MeasuredLoads&) {
          for (size_t m = 0; m < s.sources.size(); ++m) Lose(s, m);

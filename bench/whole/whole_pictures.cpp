@@ -147,8 +147,10 @@ std::optional<SpecificForceReading> WholePictures::MeasuredSpecificForce(const S
                                 .origin = AttitudeOrigin::kNone};
   }
   constexpr double kSigmaMps2 = 0.2;
+  // An error of one standard deviation that stays: joints' zeros are off.
+  const Vec3 error_mps2 = kSigmaMps2 * Vec3(1, -1, 1).normalized();
   const double off_rad = fault.mount_off_rad.norm();
-  Vec3 mps2 = truth.specific_force_mps2;
+  Vec3 mps2 = truth.specific_force_mps2 + error_mps2;
   if (off_rad > 0) mps2 = Eigen::AngleAxisd(off_rad, fault.mount_off_rad / off_rad) * mps2;
   return SpecificForceReading{.mps2 = mps2,
                               .covariance = kSigmaMps2 * kSigmaMps2 * Mat3::Identity(),

@@ -84,10 +84,10 @@ struct SpecificForceReading {
   std::string trouble = {};  ///< what is wrong with its source and what to do; empty: nothing
 };
 
-/// Where the simulation of a link's frame has a joint of the arm.
+/// State of the arm's joint that moves a simulated link, at the exposure.
 struct SimulatedJoint {
   std::string name;
-  double position_rad = 0, velocity_radps = 0;
+  double position_rad = 0, velocity_radps = 0;  ///< rad, rad/s
 };
 
 struct LinkState;

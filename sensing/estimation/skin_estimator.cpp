@@ -262,6 +262,14 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
   return is_seen_settled;
 }
 
+// To first order, which serves as the skin was linearized near the specific force that fits best. The
+// pressure stays as measured: drift and the comparison with rest images take up its error.
+void SkinEstimator::AddWeightError(const UntouchedSkin& untouched, SkinEstimate& estimate) {
+  const Vec3 error_mps2 = estimate.loads.known_error.tail<3>();
+  if (error_mps2.isZero(0)) return;
+  estimate.untouched_mm.noalias() += untouched.markers_by_loads.rightCols<3>() * error_mps2;
+}
+
 void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& estimate) {
   const bool is_new_frame = !std::exchange(is_same_frame_, false);
   if (is_new_frame && (past_.has_last || past_.has_next))

@@ -40,8 +40,8 @@ struct SkinEstimate {
   /// make of them (loads.by_cameras_mm) is taken off.
   Eigen::VectorXd displacements_mm;
   Eigen::VectorXd baseline_mm;  ///< of the model's markers in the baseline, likewise
-  Eigen::VectorXd
-      untouched_mm;  ///< of the model's markers, under the pressure and the estimated specific force alone
+  /// Of the model's markers under the measured pressure and the estimated specific force, without contacts.
+  Eigen::VectorXd untouched_mm;
   LoadEstimate loads;
   KnownLoads known_loads;  ///< with the estimated error taken off
   /// The longest way of a point of the skin from where the tangent of a first-order model that was asked for

@@ -68,13 +68,6 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const UntouchedS
 
 // Least squares for the errors of the known loads alone, in units of the prior: sets the errors, and chi^2
 // per number that they leave. False: a marker by itself is off by more than noise.
-// An attitude that is not measured is estimated far from where the skin was linearized.
-void SkinEstimator::AddWeightError(const UntouchedSkin& untouched, SkinEstimate& estimate) {
-  const Vec3 error_mps2 = estimate.loads.known_error.tail<3>();
-  if (error_mps2.isZero(0)) return;
-  estimate.untouched_mm.noalias() += untouched.markers_by_loads.rightCols<3>() * error_mps2;
-}
-
 bool SkinEstimator::ExplainByKnownLoads(const MarkerObservations& observed, const UntouchedSkin& untouched,
                                         const KnownLoads& measured, const KnownLoadsPrior& prior,
                                         SkinEstimate& estimate) {

@@ -14,7 +14,7 @@ namespace taclink {
 struct SkinProblem {
   MarkerObservations observed = {};  ///< from the slack skin
   UntouchedSkin untouched = {};      ///< a place to linearize at, near what the skin would be untouched
-  KnownLoads loads = {};             ///< as measured
+  KnownLoads loads = {};  ///< those of `untouched`: as measured, or fitted where they are not known well
   KnownLoadsPrior prior = {};
 };
 

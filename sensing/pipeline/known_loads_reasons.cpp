@@ -1,6 +1,5 @@
 #include "sensing/pipeline/known_loads_reasons.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -34,8 +33,7 @@ void AddPressureReasons(const Evidence& evidence, LinkState& state) {
     state.reasons.push_back(
         {ReasonId::kPressureMismatch,
          ReasonText("the skin's shape shows %.3f kPa, and %.3f kPa when the baseline was taken; measured "
-                    "were %.3f and "
-                    "%.3f kPa; check the sensor and the baseline's pressure, or tare",
+                    "were %.3f and %.3f kPa; check the sensor and the baseline's pressure, or tare",
                     1e3 * now_mpa, 1e3 * (baseline.pressure_mpa + evidence.estimate.loads.baseline_error[0]),
                     1e3 * measured.pressure_mpa, 1e3 * baseline.pressure_mpa),
          baseline_off_mpa, most_baseline_off_mpa});
@@ -47,17 +45,6 @@ void AddPressureReasons(const Evidence& evidence, LinkState& state) {
              "baseline's pressure",
              1e3 * now_mpa, 1e3 * measured.pressure_mpa),
          off_mpa, most_off_mpa});
-}
-
-// Of measured loads and of the estimate's errors of them: the change since the baseline, for what both have
-// in common is no difference.
-double AttitudeDeviations(const Evidence& evidence) {
-  const Mat3 covariance =
-      evidence.measured.specific_force_covariance + evidence.baseline.specific_force_covariance;
-  if (covariance.isZero(0)) return 0;
-  const LoadEstimate& loads = evidence.estimate.loads;
-  const Vec3 off = (loads.known_error - loads.baseline_error).tail<3>();
-  return std::sqrt(std::max(0.0, off.dot(covariance.ldlt().solve(off))));
 }
 
 void AddAttitudeReasons(const Evidence& evidence, LinkState& state) {
@@ -74,7 +61,8 @@ void AddAttitudeReasons(const Evidence& evidence, LinkState& state) {
          off->deviations, AttitudeCheck::kLimit});
     return;
   }
-  if (const double deviations = AttitudeDeviations(evidence); deviations > AttitudeCheck::kLimit) {
+  const double deviations = AttitudeDeviations(evidence.measured, evidence.baseline, evidence.estimate.loads);
+  if (deviations > AttitudeCheck::kLimit) {
     state.reasons.push_back(
         {ReasonId::kAttitudeMismatch,
          ReasonText("the skin contradicts the measured attitude by %.1f standard deviations; %s", deviations,

@@ -36,8 +36,7 @@ NonlinearSkin::NonlinearSkin(const LinkModel& model, const Scene& scene, std::ve
 
 void NonlinearSkin::Evaluate(double time_s, SkinTruth& truth) {
   const double t = StartTruth(scene_, time_s, truth);
-  if (scene_.motion)
-    truth.specific_force_mps2 = scene_.motion->SpecificForce(t, Vec3(0, 0, model_.length_mm / 2));
+  truth.specific_force_mps2 = scene_.SpecificForceOf(model_.length_mm, t);
   const auto part = std::find_if(parts_.begin(), parts_.end() - 1,
                                  [&](const PlayedPart& played) { return t < played.part.end_s; });
   const std::vector<SkinKey>& keys = part->keys;

@@ -66,7 +66,7 @@ std::vector<PressureKey> ReadPressure(YamlMap& root) {
 }
 
 Vec3 ReadVector(YamlMap& map, const std::string& key, double most, const Vec3& otherwise = Vec3::Zero()) {
-  if (!map.Has(key)) return otherwise;
+  if (!map.Knows(key)) return otherwise;
   const auto numbers = map.Numbers(key, 3, {.min = -most, .max = most});
   return numbers.size() == 3 ? Vec3(numbers[0], numbers[1], numbers[2]) : Vec3(Vec3::Zero());
 }
@@ -108,7 +108,12 @@ std::optional<SceneMotion> ReadMotion(YamlMap& root, const Scene& scene) {
     if (std::abs(periods - std::round(periods)) > 1e-6)
       root.Fail("duration_s", "must be a multiple of the swing's period_s, or 'loop: false'", {"loop"});
   }
-  // Where a ramp of a given depth begins is known of a skin that rests only.
+  constexpr double kMostMps2 = 100;
+  if (motion.swing && motion.MostMps2() > kMostMps2)
+    root.Fail("motion",
+              "accelerates by more than 100 m/s2; use a smaller amplitude, a longer period or a "
+              "nearer pivot");
+  // The depth of the first touch is computed for a skin at rest only.
   for (const SceneContact& contact : scene.contacts) {
     if (contact.depth_mm)
       root.Fail("contacts", "must have 'force_n' in a scene with 'motion' (" + contact.where + ")");
@@ -179,6 +184,14 @@ StereoRig MountedRig(const StereoRig& nominal, const CameraEffects& effects) {
     rig[id].camera_from_link = nominal_from_real.Inverse() * nominal[id].camera_from_link;
   }
   return rig;
+}
+
+Vec3 Scene::SpecificForceOf(double length_mm, double time_s) const {
+  return motion ? motion->SpecificForce(time_s, Vec3(0, 0, length_mm / 2)) : Vec3(Vec3::Zero());
+}
+
+double Scene::SceneTime(double time_s) const {
+  return loop ? std::fmod(time_s, duration_s) : std::min(time_s, duration_s);
 }
 
 double Scene::PressureKpa(double time_s) const {

@@ -87,6 +87,10 @@ struct Scene {
   std::vector<SceneContact> contacts;
   CameraEffects camera;
 
+  /// Of a link's center, m/s^2, link frame; zero without motion: the skin is weightless. Likewise.
+  Vec3 SpecificForceOf(double length_mm, double time_s) const;
+  /// Within [0, duration_s], of a time since the start: a loop begins again, otherwise the end stays.
+  double SceneTime(double time_s) const;
   double PressureKpa(double time_s) const;  ///< time within [0, duration_s]
 };
 

@@ -107,8 +107,7 @@ double SceneLoads::TouchingDepth(size_t contact, const SkinSpot& spot, const She
 
 SkinLoad SceneLoads::At(const ScenePart& part, double time_s, double on_at_s) const {
   SkinLoad load{.pressure_mpa = PressureMpa(part, time_s), .discs = {}};
-  if (scene_.motion)
-    load.specific_force_mps2 = scene_.motion->SpecificForce(time_s, Vec3(0, 0, model_.length_mm / 2));
+  load.specific_force_mps2 = scene_.SpecificForceOf(model_.length_mm, time_s);
   for (size_t i = 0; i < plans_.size(); ++i) {
     SkinDisc& disc = load.discs.emplace_back();
     const ContactPlan& plan = plans_[i];

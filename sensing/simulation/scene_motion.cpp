@@ -1,5 +1,6 @@
 #include "sensing/simulation/scene_motion.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "sensing/core/units.h"
@@ -36,6 +37,15 @@ Vec3 SceneMotion::SpecificForce(double time_s, const Vec3& point_mm) const {
   const Vec3 acceleration =
       swing->AccelerationRadps2(time_s) * swing->axis.cross(arm_m) + rate.cross(rate.cross(arm_m));
   return Eigen::AngleAxisd(-swing->AngleRad(time_s), swing->axis) * gravity_mps2 - acceleration;
+}
+
+double SceneMotion::MostMps2() const {
+  if (!swing) return gravity_mps2.norm();
+  constexpr int kSamples = 64;
+  double most = 0;
+  for (int i = 0; i < kSamples; ++i)
+    most = std::max(most, SpecificForce(swing->period_s * i / kSamples, Vec3::Zero()).norm());
+  return most;
 }
 
 }  // namespace taclink

@@ -30,6 +30,8 @@ struct SceneMotion {
 
   /// Gravity less the acceleration of a point of the link, m/s^2, link frame.
   Vec3 SpecificForce(double time_s, const Vec3& point_mm) const;
+  /// The largest norm of it over a period, at the link's origin.
+  double MostMps2() const;
 };
 
 }  // namespace taclink

@@ -341,7 +341,8 @@ Error SceneSolver::Refusal(double time_s, const std::string& why) const {
   std::snprintf(time, sizeof time, "%.3f", time_s);
   return {ErrorCode::kFailedPrecondition,
           where + ": no equilibrium of the skin at " + time + " s (" + why + "); use a smaller " +
-              (most > 0 ? "depth or force" : "pressure") + ", or 'skin: linear'"};
+              (most > 0 ? "depth or force" : "pressure") +
+              (scene_.motion ? ", a slower or smaller swing, or a higher pressure" : ", or 'skin: linear'")};
 }
 
 }  // namespace taclink

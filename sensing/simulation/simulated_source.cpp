@@ -129,11 +129,12 @@ void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
         .covariance = kSpecificForceSigmaMps2 * kSpecificForceSigmaMps2 * Mat3::Identity(),
         .origin = AttitudeOrigin::kSimulated};
   }
-  if (scene_.motion && scene_.motion->swing) {
+  if (scene_.motion && scene_.motion->swing && !scene_.motion->swing->joint.empty()) {
     const Swing& swing = *scene_.motion->swing;
+    const double time_s = scene_.SceneTime(truth_.time_s);
     frame.joint = {.name = swing.joint,
-                   .position_rad = swing.AngleRad(truth_.time_s),
-                   .velocity_radps = swing.RateRadps(truth_.time_s)};
+                   .position_rad = swing.AngleRad(time_s),
+                   .velocity_radps = swing.RateRadps(time_s)};
   }
   frame.times = {};
   frame.times.exposure_monotonic_ns = ExposureNs(frame_number);

@@ -8,7 +8,7 @@
 namespace taclink {
 
 double StartTruth(const Scene& scene, double time_s, SkinTruth& truth) {
-  const double t = scene.loop ? std::fmod(time_s, scene.duration_s) : std::min(time_s, scene.duration_s);
+  const double t = scene.SceneTime(time_s);
   truth.time_s = time_s;
   truth.frame = static_cast<uint64_t>(std::max(0.0, std::round(time_s * scene.frame_rate_hz)));
   truth.pressure_mpa = kMpaPerKpa * scene.PressureKpa(t);

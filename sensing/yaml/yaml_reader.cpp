@@ -99,6 +99,11 @@ bool YamlMap::Has(const std::string& key) const {
   return node_.IsMap() && node_[key].IsDefined();
 }
 
+bool YamlMap::Knows(const std::string& key) {
+  asked_.insert(key);
+  return Has(key);
+}
+
 YAML::Node YamlMap::Find(const std::string& key, bool required) {
   asked_.insert(key);
   if (node_.IsMap()) {

@@ -23,6 +23,8 @@ namespace taclink {
 class YamlMap {
  public:
   bool Has(const std::string& key) const;
+  /// Has(key); either way the key is a known one.
+  bool Knows(const std::string& key);
   /// Has(key); the key becomes a known one, and an error is recorded if it is required and missing.
   bool Ask(const std::string& key, bool required);
   /// Whether an error was recorded for the key of this mapping, or for one below it.

@@ -25,8 +25,7 @@ class SimulatedJoints final : public AttitudeSource {
     const auto found = std::ranges::find(joints, joint.name, &JointInfo::name);
     if (found == joints.end()) return;
     const auto index = static_cast<size_t>(found - joints.begin());
-    // Of links that move together, the first with a newer exposure counts; positions beyond the joint's range
-    // are of no use to anybody.
+    // Refused where the joint has a newer state already.
     static_cast<void>(poses_.joints().Add({.time_ns = time_ns,
                                            .joints = {&index, 1},
                                            .positions = {&joint.position_rad, 1},

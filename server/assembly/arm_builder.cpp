@@ -49,6 +49,30 @@ Result<bool> IsInflatedByScene(const LinkConfig& link) {
   return std::ranges::any_of(scene->pressure, [](const PressureKey& key) { return key.kpa != 0; });
 }
 
+// The joint that a simulated link's scene moves is one of the arm's, within its range.
+Result<void> CheckSceneJoint(const LinkConfig& link, const ArmKinematics& kinematics) {
+  const auto* simulated = std::get_if<SimulatedSourceConfig>(&link.source);
+  if (simulated == nullptr) return {};
+  const auto scene = LoadScene(simulated->scene);
+  if (!scene) return scene.error();
+  if (!scene->motion || !scene->motion->swing || scene->motion->swing->joint.empty()) return {};
+  const Swing& swing = *scene->motion->swing;
+  const std::string where =
+      "link '" + link.name + "': scene '" + scene->name + "': swing.joint '" + swing.joint;
+  const auto joint = std::ranges::find(kinematics.joints(), swing.joint, &JointInfo::name);
+  if (joint == kinematics.joints().end()) {
+    std::string names;
+    for (const JointInfo& each : kinematics.joints()) names += (names.empty() ? "" : ", ") + each.name;
+    return Error{ErrorCode::kInvalidArgument, where + "' is no joint of the arm's URDF (" + names + ")"};
+  }
+  const double low = swing.mean_rad - swing.amplitude_rad, high = swing.mean_rad + swing.amplitude_rad;
+  if (joint->limits && (low < joint->limits->lower || high > joint->limits->upper)) {
+    return Error{ErrorCode::kInvalidArgument,
+                 where + "' swings beyond the range that the arm's URDF gives it; use a smaller amplitude"};
+  }
+  return {};
+}
+
 // SourceKind names the alternatives of SourceConfig in their order.
 static_assert(std::variant_size_v<SourceConfig> == static_cast<size_t>(SourceKind::kLog));
 
@@ -140,6 +164,10 @@ std::vector<Result<LinkParts>> BuildLinks(const Config& config, Clock& clock) {
 Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock) {
   auto poses = BuildPoses(config);
   if (!poses) return poses.error();
+  for (const LinkConfig& link : config.links) {
+    if (*poses == nullptr || (*poses)->kinematics() == nullptr) break;
+    if (const auto good = CheckSceneJoint(link, *(*poses)->kinematics()); !good) return good.error();
+  }
   std::vector<LinkParts> links;
   std::vector<std::string> names;
   for (auto& parts : BuildLinks(config, clock)) {

@@ -206,8 +206,9 @@ TEST_F(JudgeTest, ABaselinesPressureThatDoesNotFitIsTold) {
   EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   estimate_.loads.baseline_error[0] = -1.6e-4;
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureMismatch));
-  EXPECT_THAT(state_.status_reason,
-              ::testing::HasSubstr("0.340 kPa when the baseline was taken; measured were 1.000 and 0.500 kPa"));
+  EXPECT_THAT(
+      state_.status_reason,
+      ::testing::HasSubstr("0.340 kPa when the baseline was taken; measured were 1.000 and 0.500 kPa"));
 }
 
 TEST_F(JudgeTest, AnAttitudeThatDoesNotFitIsTold) {

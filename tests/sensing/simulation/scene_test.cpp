@@ -71,6 +71,9 @@ TEST(Scene, RefusesMotionThatItCannotPlay) {
   EXPECT_EQ(Message(swing + "loop: false\n"), "accepted");
   EXPECT_THAT(Message("motion: {swing: {axis: [0, 0, 0], amplitude_deg: 3, period_s: 4}}\n"),
               AllOf(HasSubstr("s.yaml:4"), HasSubstr("axis")));
+  EXPECT_THAT(Message("motion: {gravity: [0, 0, -9.8]}\n"), HasSubstr("gravity_mps2"));
+  EXPECT_THAT(Message("motion: {swing: {amplitude_deg: 360, period_s: 0.1, pivot_mm: [0, 0, -500]}}\n"),
+              AllOf(HasSubstr("100 m/s2"), HasSubstr("amplitude")));
   EXPECT_THAT(Message("motion: {}\nskin: linear\n"), AllOf(HasSubstr("motion"), HasSubstr("nonlinear")));
   EXPECT_THAT(
       Message("motion: {}\ncontacts:\n  - {at: {path: 2, ring: 3}, depth_mm: 2, begin_s: 1, end_s: 3}\n"),

@@ -68,11 +68,28 @@ TEST_F(SimulatedSourceTest, GivesTheSpecificForceOfAMovingLink) {
     frame_.specific_force = SpecificForceReading{};  // of a frame before
     ASSERT_TRUE((*source)->Next(frame_, milliseconds(20)).ok());
     ASSERT_EQ(frame_.specific_force.has_value(), moves);
+    EXPECT_FALSE(frame_.joint);
     if (!moves) continue;
     EXPECT_EQ(frame_.specific_force->mps2, Vec3(0, -9.81, 0));
     EXPECT_EQ(frame_.specific_force->origin, AttitudeOrigin::kSimulated);
     EXPECT_GT(frame_.specific_force->covariance.trace(), 0);
   }
+}
+
+TEST_F(SimulatedSourceTest, AJointFollowsTheSwingLoopByLoop) {
+  const Scene scene =
+      ParseScene("s.yaml",
+                 "taclink_scene: 1\nname: s\nduration_s: 4\nrefinement: 1\nframe_rate_hz: 10\n"
+                 "motion: {swing: {amplitude_deg: 30, period_s: 4, joint: shoulder}}\n")
+          .value();
+  auto source = SimulatedSource::Make(Model("cylinder"), scene, clock_);
+  ASSERT_TRUE(source.ok()) << source.error().message;
+  ASSERT_TRUE((*source)->Start().ok());
+  for (int i = 0; i <= 50; ++i) ASSERT_TRUE((*source)->Next(frame_, milliseconds(200)).ok());
+  ASSERT_TRUE(frame_.joint);  // 1 s into the second loop
+  EXPECT_EQ(frame_.joint->name, "shoulder");
+  EXPECT_NEAR(frame_.joint->position_rad, 0, 1e-9);
+  EXPECT_NEAR(frame_.joint->velocity_radps, RadFromDeg(30) * 2 * kPi / 4, 1e-9);
 }
 
 TEST_F(SimulatedSourceTest, SkipsToTheNewestWhenLate) {
