@@ -180,6 +180,8 @@ const char* SiName(ReasonUnit unit) {
       return "Pa";
     case ReasonUnit::kSeconds:
       return "s";
+    case ReasonUnit::kHertz:
+      return "Hz";
     case ReasonUnit::kNone:
       break;
   }

@@ -64,6 +64,7 @@ Json FrameJson(const WholeFrame& frame) {
   return {{"time_s", frame.time_s},
           {"status", StatusText(frame)},
           {"reasons", reasons},
+          {"status_reason", frame.status_reason},
           {"has_forces", frame.has_forces},
           {"right", frame.is_right},
           {"silently_wrong", frame.is_silent},

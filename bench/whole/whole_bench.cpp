@@ -172,6 +172,7 @@ WholeFrame ScoreWhole(const LinkModel& model, const WholeScene& scene, const Ski
   WholeFrame frame = Scorer(model, scene, truth, state).Score();
   frame.time_s = truth.time_s;
   frame.status = state.status;
+  frame.status_reason = state.status_reason;
   for (const Reason& reason : state.reasons) frame.reasons.push_back(reason.id);
   frame.has_forces = state.measured() && state.forces.converged && state.status != LinkStatus::kLost;
   if (!state.measured())

@@ -27,7 +27,8 @@ struct WholeFrame {
   /// them were found.
   int above_limit = 0, found_above_limit = 0;
   double cpu_ms = 0;
-  std::string how;  ///< what is wrong, for people
+  std::string how;            ///< what is wrong, for people
+  std::string status_reason;  ///< as the link gives it
 };
 
 /// What became of one scene.

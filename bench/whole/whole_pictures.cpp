@@ -1,5 +1,6 @@
 #include "bench/whole/whole_pictures.h"
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -23,6 +24,10 @@ Renderer MakeRenderer(const LinkModel& model, const WholeScene& whole, const Cam
   return {model, MountedRig(model.nominal_rig, effects), effects, whole.scene.seed};
 }
 
+bool IsCompressed(PictureFault fault) {
+  return fault == PictureFault::kJpeg || fault == PictureFault::kReencoded;
+}
+
 void Warp(cv::Mat& gray, double turn_deg, double scale, double shift_px) {
   const cv::Point2f middle(static_cast<float>(gray.cols - 1) / 2, static_cast<float>(gray.rows - 1) / 2);
   cv::Mat by = cv::getRotationMatrix2D(middle, turn_deg, scale);
@@ -42,6 +47,13 @@ void Shade(cv::Mat& gray, Light light) {
       pixel = cv::saturate_cast<uchar>(light(x, y, static_cast<double>(pixel)));
     }
   }
+}
+
+// Exchanges left and right.
+void Mirror(cv::Mat& gray) {
+  cv::Mat mirrored;
+  cv::flip(gray, mirrored, 1);
+  gray = std::move(mirrored);
 }
 
 void AddNoise(cv::Mat& gray, double levels, unsigned seed) {
@@ -87,7 +99,10 @@ void WholePictures::Draw(Renderer& renderer, int frame, const SkinTruth& truth, 
 // What happens to the light, or after the lens.
 void WholePictures::Spoil(int frame, CameraId id, cv::Mat& gray) {
   const LinkFault& fault = whole_.fault;
-  const double amount = fault.amount;
+  const double time_s = frame / whole_.scene.frame_rate_hz;
+  const double grown =
+      fault.grows_s > 0 ? std::clamp((time_s - std::max(0.0, fault.begin_s)) / fault.grows_s, 0.0, 1.0) : 1;
+  const double amount = grown * fault.amount;
   const auto seed = static_cast<unsigned>(2 * frame + static_cast<int>(Index(id)));
   switch (fault.pictures) {
     case PictureFault::kRolled:
@@ -96,13 +111,15 @@ void WholePictures::Spoil(int frame, CameraId id, cv::Mat& gray) {
       return Warp(gray, 0, 1, amount);
     case PictureFault::kScaled:
       return Warp(gray, 0, amount, 0);
+    case PictureFault::kMirrored:
+      return Mirror(gray);
     case PictureFault::kHazed: {
       const double mean = cv::mean(gray)[0];
       return Shade(gray,
                    [&](double, double, double level) { return (1 - amount) * level + amount * (mean + 40); });
     }
     case PictureFault::kBlurred:
-      cv::GaussianBlur(gray, gray, {}, amount);
+      if (amount > 0) cv::GaussianBlur(gray, gray, {}, amount);
       return AddNoise(gray, whole_.scene.camera.sensor_noise_levels, seed);
     case PictureFault::kCovered:
       return Shade(gray,
@@ -157,33 +174,77 @@ std::optional<SpecificForceReading> WholePictures::MeasuredSpecificForce(const S
                               .origin = AttitudeOrigin::kJointStates};
 }
 
+// Whether the image before is shown again.
+bool WholePictures::Repeats(int frame) const {
+  switch (whole_.fault.pictures) {
+    case PictureFault::kFrozen:
+    case PictureFault::kReencoded:
+      return true;
+    case PictureFault::kHalfRate:
+      return frame % 2 != 0;
+    default:
+      return false;
+  }
+}
+
+// An encoder that keeps to a rate changes its quality from image to image.
+int WholePictures::QualityOf(int frame) const {
+  if (whole_.fault.pictures == PictureFault::kJpeg) return static_cast<int>(whole_.fault.amount);
+  constexpr int kLeast = 80, kDifferent = 10;
+  return kLeast + frame % kDifferent;
+}
+
+void WholePictures::Tear(int frame, CameraId id) {
+  cv::Mat& gray = gray_[Index(id)];
+  const cv::Mat upper = gray.rowRange(0, gray.rows / 2).clone();
+  Draw(renderer_, frame, then_, id);
+  upper.copyTo(gray.rowRange(0, gray.rows / 2));
+}
+
+void WholePictures::LoseMarkers(double time_s, SkinTruth& truth) const {
+  const LinkFault& fault = whole_.fault;
+  truth.marker_is_lost.assign(fault.lost_markers.empty() ? 0 : truth.marker_mm.size(), false);
+  for (size_t i = 0; i < fault.lost_markers.size(); ++i) {
+    const double part = static_cast<double>(i) / static_cast<double>(fault.lost_markers.size());
+    if (time_s >= fault.lost_s + part * fault.grows_s)
+      truth.marker_is_lost[static_cast<size_t>(fault.lost_markers[i])] = true;
+  }
+}
+
 void WholePictures::Take(int frame, StereoFrame& pictures, SkinTruth& truth) {
   const double time_s = frame / whole_.scene.frame_rate_hz;
   const LinkFault& fault = whole_.fault;
   const bool is_on = fault.pictures != PictureFault::kNone && time_s >= fault.begin_s;
   skin_.Evaluate(time_s, truth);
   aging_.Move(truth);
-  if (is_on && fault.pictures == PictureFault::kLate)
+  LoseMarkers(time_s, truth);
+  const bool is_of_then = fault.pictures == PictureFault::kLate || fault.pictures == PictureFault::kTorn;
+  if (is_on && is_of_then)
     skin_.Evaluate(std::max(0.0, time_s - fault.amount), then_);
   else if (is_on && other_)
     other_->Evaluate(time_s, then_);
   for (const CameraId id : kBothCameras) {
     const auto i = Index(id);
     const bool is_spoiled = is_on && fault.cameras[i];
-    if (is_spoiled && fault.pictures == PictureFault::kFrozen && frame > 0) continue;
+    if (is_spoiled && frame > 0 && Repeats(frame)) continue;
+    if (is_on && fault.pictures == PictureFault::kTwice && id == CameraId::kBottom) {
+      gray_[0].copyTo(gray_[i]);
+      continue;
+    }
     const bool has_then = fault.pictures == PictureFault::kLate || other_;
     Draw(is_spoiled ? moved_ : renderer_, frame, is_spoiled && has_then ? then_ : truth, id);
+    if (is_spoiled && fault.pictures == PictureFault::kTorn) Tear(frame, id);
     if (is_spoiled) Spoil(frame, id, gray_[i]);
   }
   const bool is_swapped = is_on && fault.pictures == PictureFault::kSwapped;
   for (size_t i = 0; i < kCameraCount; ++i) {
     const cv::Mat& gray = gray_[is_swapped ? 1 - i : i];
     RawImage& image = pictures.images[i];
-    if (is_on && fault.cameras[i] && fault.pictures == PictureFault::kJpeg) {
+    if (is_on && fault.cameras[i] && IsCompressed(fault.pictures)) {
       image.format = PixelFormat::kMjpeg;
       image.width_px = gray.cols;
       image.height_px = gray.rows;
-      image.valid = encoder_.Encode(gray, static_cast<int>(fault.amount), image.bytes).ok();
+      image.valid = encoder_.Encode(gray, QualityOf(frame), image.bytes).ok();
     } else {
       PackYuyv(gray, {}, image);
     }

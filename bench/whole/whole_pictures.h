@@ -28,6 +28,10 @@ class WholePictures {
   void Draw(Renderer& renderer, int frame, const SkinTruth& truth, CameraId id);
   std::optional<SpecificForceReading> MeasuredSpecificForce(const SkinTruth& truth) const;
   void Spoil(int frame, CameraId id, cv::Mat& gray);
+  bool Repeats(int frame) const;
+  int QualityOf(int frame) const;
+  void Tear(int frame, CameraId id);
+  void LoseMarkers(double time_s, SkinTruth& truth) const;
 
   const WholeScene& whole_;
   SimulatedSkin& skin_;

@@ -15,25 +15,30 @@ namespace taclink {
 /// What the world does to a link's pictures.
 enum class PictureFault : int {
   kNone,
-  kFrozen,    ///< the same picture again and again
-  kLate,      ///< of `amount` seconds ago
-  kCrossed,   ///< of another link's camera
-  kSwapped,   ///< of this link's other camera
-  kRolled,    ///< turned by `amount` degrees about its middle
-  kShifted,   ///< by `amount` px
-  kMoved,     ///< the camera itself, by `amount` mm across its axis
-  kTurned,    ///< the camera itself, by `amount` degrees about an axis in the picture
-  kScaled,    ///< about its middle, by a factor of `amount`
-  kHazed,     ///< `amount` of the light is spread evenly over the picture
-  kBlurred,   ///< by `amount` px more
-  kCovered,   ///< `amount` of its width is dark
-  kDark,      ///< `amount` of the light is left
-  kNoisy,     ///< `amount` gray levels more, each pixel
-  kDarkSide,  ///< one side has `amount` of the light
-  kFalloff,   ///< light falls to `amount` toward the far end, which is the picture's middle
-  kGlow,      ///< a bright disc of `amount` px in the middle
-  kRim,       ///< a bright reflection along `amount` of the rim
-  kJpeg,      ///< compressed with quality `amount`
+  kFrozen,     ///< the same picture again and again
+  kLate,       ///< of `amount` seconds ago
+  kCrossed,    ///< of another link's camera
+  kSwapped,    ///< of this link's other camera
+  kRolled,     ///< turned by `amount` degrees about its middle
+  kShifted,    ///< by `amount` px
+  kMoved,      ///< the camera itself, by `amount` mm across its axis
+  kTurned,     ///< the camera itself, by `amount` degrees about an axis in the picture
+  kScaled,     ///< about its middle, by a factor of `amount`
+  kHazed,      ///< `amount` of the light is spread evenly over the picture
+  kBlurred,    ///< by `amount` px more
+  kCovered,    ///< `amount` of its width is dark
+  kDark,       ///< `amount` of the light is left
+  kNoisy,      ///< `amount` gray levels more, each pixel
+  kDarkSide,   ///< one side has `amount` of the light
+  kFalloff,    ///< light falls to `amount` toward the far end, which is the picture's middle
+  kGlow,       ///< a bright disc of `amount` px in the middle
+  kRim,        ///< a bright reflection along `amount` of the rim
+  kJpeg,       ///< compressed with quality `amount`
+  kReencoded,  ///< the same image again and again, compressed anew each time
+  kHalfRate,   ///< every second image is the one before
+  kTorn,       ///< the lower half is of `amount` seconds ago
+  kMirrored,   ///< left and right exchanged
+  kTwice,      ///< both images are of the top camera
 };
 
 /// One trouble, and since when.
@@ -41,8 +46,11 @@ struct LinkFault {
   PictureFault pictures = PictureFault::kNone;
   std::array<bool, kCameraCount> cameras = {true, true};
   double amount = 0;
-  double begin_s = -1;          ///< before 0: always; of `pictures` alone
-  double pressure_off_mpa = 0;  ///< told less true
+  double begin_s = -1;            ///< before 0: always; of `pictures` alone
+  double grows_s = 0;             ///< from nothing to `amount` within that time; of light and lens alone
+  std::vector<int> lost_markers;  ///< break off at `lost_s`, one after the other within `grows_s`
+  double lost_s = -1;             ///< before 0: they were never there
+  double pressure_off_mpa = 0;    ///< told less true
   bool is_pressure_told = true;
   bool is_attitude_known = true;      ///< of a scene with motion
   Vec3 mount_off_rad = Vec3::Zero();  ///< rotation vector by which the measured attitude is wrong, link frame

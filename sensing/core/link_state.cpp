@@ -1,5 +1,7 @@
 #include "sensing/core/link_state.h"
 
+#include <algorithm>
+
 #include "sensing/core/link_state_fields.h"
 
 namespace taclink {
@@ -52,6 +54,10 @@ const char* Name(ReasonId id) {
       return "attitude_unknown";
     case ReasonId::kAttitudeMismatch:
       return "attitude_mismatch";
+    case ReasonId::kCamerasSwapped:
+      return "cameras_swapped";
+    case ReasonId::kFrameRate:
+      return "frame_rate";
     case ReasonId::kNoFrames:
       return "no_frames";
     case ReasonId::kWorker:
@@ -64,6 +70,8 @@ ReasonUnit UnitOf(ReasonId id) {
   switch (id) {
     case ReasonId::kLate:
       return ReasonUnit::kSeconds;
+    case ReasonId::kFrameRate:
+      return ReasonUnit::kHertz;
     case ReasonId::kPressureMismatch:
       return ReasonUnit::kMegapascals;
     case ReasonId::kAttitudeUnknown:
@@ -79,11 +87,32 @@ ReasonUnit UnitOf(ReasonId id) {
   }
 }
 
+bool DoubtsContacts(ReasonId id) {
+  switch (id) {
+    case ReasonId::kPressureUnknown:
+    case ReasonId::kAttitudeUnknown:
+    case ReasonId::kTooDeep:
+    case ReasonId::kBeyondMarkers:
+    case ReasonId::kEncircled:
+    case ReasonId::kSparseMarkers:
+    case ReasonId::kForceModel:
+    case ReasonId::kDrift:
+      return false;
+    default:
+      return true;
+  }
+}
+
 std::optional<ReasonId> ReasonNamed(std::string_view name) {
   for (int i = 0; i < kReasonCount; ++i) {
     if (name == Name(static_cast<ReasonId>(i))) return static_cast<ReasonId>(i);
   }
   return std::nullopt;
+}
+
+bool AreContactsCertain(const LinkState& state) {
+  return state.measured() && state.has_forces() &&
+         std::ranges::none_of(state.reasons, [](const Reason& reason) { return DoubtsContacts(reason.id); });
 }
 
 void LinkState::ClearMeasurement() {

@@ -49,14 +49,19 @@ enum class ReasonId : uint8_t {
   kForcedBaseline,    ///< beside another reason: a baseline that was taken by force may explain it
   kAttitudeUnknown,   ///< the specific force is not known well enough for accurate forces
   kAttitudeMismatch,  ///< the measured specific force does not fit the skin's shape
+  kCamerasSwapped,    ///< the top camera's images are those of the bottom camera, and the other way round
+  kFrameRate,         ///< a camera gives fewer new images than the link gives frames
 };
-inline constexpr int kReasonCount = static_cast<int>(ReasonId::kAttitudeMismatch) + 1;
+inline constexpr int kReasonCount = static_cast<int>(ReasonId::kFrameRate) + 1;
 const char* Name(ReasonId id);
+/// Whether contacts of a frame with this reason may be invented or missing. False: they are there, and what
+/// is in doubt is only how large or accurate their forces are.
+bool DoubtsContacts(ReasonId id);
 /// None: another version's.
 std::optional<ReasonId> ReasonNamed(std::string_view name);
 
 /// What a reason's number is in.
-enum class ReasonUnit : uint8_t { kNone, kMillimeters, kMegapascals, kSeconds };
+enum class ReasonUnit : uint8_t { kNone, kMillimeters, kMegapascals, kSeconds, kHertz };
 /// kNone: a number of markers, or a ratio.
 ReasonUnit UnitOf(ReasonId id);
 
@@ -127,5 +132,8 @@ struct LinkState {
   /// All fields of the measurement back to their defaults (see link_state_fields.h); buffers stay.
   void ClearMeasurement();
 };
+
+/// Whether it is certain which contacts a frame has: forces are known, and no reason doubts it.
+bool AreContactsCertain(const LinkState& state);
 
 }  // namespace taclink

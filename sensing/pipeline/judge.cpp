@@ -274,7 +274,9 @@ void AddShapeReasons(const Evidence& evidence, LinkState& state) {
          "forces may be a quarter off, and each much further; take them for an upper bound"});
   else
     AddHugReason(state);
-  if (const double shift_mm = evidence.estimate.loads.camera_shift_mm; shift_mm > kMostCameraShiftMm * unit)
+  const bool is_diagnosed = evidence.diagnosis && evidence.diagnosis->id == ReasonId::kCamerasMoved;
+  if (const double shift_mm = evidence.estimate.loads.camera_shift_mm;
+      shift_mm > kMostCameraShiftMm * unit && !is_diagnosed)
     state.reasons.push_back(
         {ReasonId::kCamerasMoved,
          ReasonText(
@@ -364,26 +366,27 @@ bool IsGrave(ReasonId id) {
   return id == ReasonId::kNotConverged || id == ReasonId::kImpossible || id == ReasonId::kNoEquilibrium;
 }
 
+Reason FewMarkersReason(int seen, int all, double limit) {
+  return {ReasonId::kFewMarkers,
+          ReasonText("%d of %d markers seen; check lenses, lamps, that nothing hides the skin", seen, all),
+          seen, limit};
+}
+
 }  // namespace
 
 void Judge(const Evidence& evidence, LinkState& state) {
   const int seen = state.shape.seen(), all = evidence.model.markers.count();
   state.reasons.clear();
+  // A cause comes before what it does.
+  if (evidence.diagnosis) state.reasons.push_back(*evidence.diagnosis);
   const bool few_are_seen = seen < kLostShare * all;
   const bool lost = few_are_seen || !AreOfOneSkin(evidence.agreement);
-  std::string few = seen < kDegradedShare * all ? ReasonText(
-                                                      "%d of %d markers seen; check lenses, lamps, that "
-                                                      "nothing hides the skin, and that no camera has "
-                                                      "been swapped or turned",
-                                                      seen, all)
-                                                : "";
-  if (few_are_seen && evidence.camera_trouble) few += "; " + evidence.camera_trouble->text;
-  if (few_are_seen) state.reasons.push_back({ReasonId::kFewMarkers, few, seen, kLostShare * all});
-  if (evidence.camera_trouble && (!few_are_seen || evidence.camera_trouble->id == ReasonId::kFrozen))
-    state.reasons.push_back(*evidence.camera_trouble);
+  if (evidence.camera_trouble) state.reasons.push_back(*evidence.camera_trouble);
+  if (few_are_seen) state.reasons.push_back(FewMarkersReason(seen, all, kLostShare * all));
+  if (evidence.camera_warning && !evidence.camera_trouble) state.reasons.push_back(*evidence.camera_warning);
   AddAgreementReason(evidence, state);
   if (!few_are_seen && seen < kDegradedShare * all)
-    state.reasons.push_back({ReasonId::kFewMarkers, few, seen, kDegradedShare * all});
+    state.reasons.push_back(FewMarkersReason(seen, all, kDegradedShare * all));
   if (auto failure = FailureReason(evidence.estimate.failure); failure && !lost)
     state.reasons.push_back(*std::move(failure));
   if (!lost) AddKnownLoadsReasons(evidence, state);

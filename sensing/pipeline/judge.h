@@ -29,8 +29,10 @@ inline bool AreOfOneSkin(const CameraAgreement& agreement) {
 /// All that is known of how good a frame's answer is.
 struct Evidence {
   const LinkModel& model;
-  std::optional<Reason> camera_trouble;  ///< none: both cameras' pictures are there
+  std::optional<Reason> camera_trouble;       ///< none: both cameras' pictures are there
+  std::optional<Reason> camera_warning = {};  ///< of a camera whose picture is there
   CameraAgreement agreement;
+  std::optional<Reason> diagnosis = {};               ///< of the cameras; see CameraDiagnosis
   std::optional<MotionDisagreement> motion;           ///< see CameraMotion
   std::optional<CameraId> sees_alone;                 ///< see RestComparison
   std::optional<AttitudeDisagreement> attitude = {};  ///< none: measured attitude and skin agree

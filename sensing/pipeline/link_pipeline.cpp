@@ -12,6 +12,7 @@
 #include "sensing/markers/track/marker_tracker.h"
 #include "sensing/pipeline/attitude_check.h"
 #include "sensing/pipeline/baseline_keeper.h"
+#include "sensing/pipeline/camera_diagnosis.h"
 #include "sensing/pipeline/camera_motion.h"
 #include "sensing/pipeline/judge.h"
 #include "sensing/pipeline/mean_loads.h"
@@ -64,7 +65,8 @@ struct LinkPipeline::Stages {
         clock(pipeline_clock),
         estimator(MakeStateEstimator(link_model, pipeline_options.force)),
         finder(link_model, pipeline_options.contact),
-        keeper(link_model, pipeline_options.drift) {
+        keeper(link_model, pipeline_options.drift),
+        diagnosis(link_model) {
     BeginRest(options.rig, options.rest_frames, BaselineOrigin::kStart);
   }
 
@@ -99,6 +101,7 @@ struct LinkPipeline::Stages {
   std::shared_ptr<StateEstimator> estimator;
   ContactFinder finder;
   BaselineKeeper keeper;
+  CameraDiagnosis diagnosis;
   AttitudeCheck attitude;
 
   double MsSince(int64_t start_ns) const {
@@ -137,6 +140,12 @@ struct LinkPipeline::Stages {
     if (reason == AcquireReason::kNone) return tracker->Follow(pictures, predicted_mm, state.tracking);
     if (tracker) tracker->Forget();
     Detect(state);
+  }
+
+  // As the last estimate had them.
+  std::span<const Vec3> UntouchedMarkers() {
+    if (untouched_mm.empty()) untouched_mm = model.RestMarkers();
+    return untouched_mm;
   }
 
   // The tracker's displacements are those that contacts cause.
@@ -400,7 +409,10 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
     stage_ms = s.MsSince(start);
   };
   timed(state.stage_ms.decode, [&] {
-    s.camera_pictures.Take(frame, s.CurrentRig(), s.rest || s.options.pictures_may_repeat, state);
+    const ImageRepeats repeats = s.rest                          ? ImageRepeats::kAtRest
+                                 : s.options.pictures_may_repeat ? ImageRepeats::kAllowed
+                                                                 : ImageRepeats::kFault;
+    s.camera_pictures.Take(frame, s.CurrentRig(), repeats, state);
   });
   if (s.WaitsForRest(frame.times)) return s.SkipRest(state);
   timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });
@@ -428,7 +440,9 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
   Judge({.model = s.model,
          .camera_trouble = s.camera_pictures.trouble(),
+         .camera_warning = s.camera_pictures.warning(),
          .agreement = s.skin->agreement(),
+         .diagnosis = s.diagnosis.reason(),
          .motion = s.motion->disagreement(),
          .sees_alone = s.skin->sees_alone(),
          .attitude = s.attitude.disagreement(),
@@ -440,6 +454,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
          .baseline = s.skin->baseline_loads(),
          .estimate = estimate},
         state);
+  s.diagnosis.Observe(state, s.pictures, s.CurrentRig(), s.UntouchedMarkers());
   // A tare ends where nothing is measured; where there is a shape without forces it waits for a while.
   if (estimate.failure == EstimateFailure::kNone || !state.measured())
     s.keeper.Learn(frame.times, state, s.labels, *s.skin, *s.estimator, s.clock);

@@ -7,6 +7,7 @@
 
 #include "sensing/markers/detect/detector.h"
 #include "sensing/markers/label/rest_labels.h"
+#include "sensing/pipeline/image_noise.h"
 #include "sensing/pipeline/rest_match.h"
 #include "sensing/pipeline/rest_pose.h"
 
@@ -14,11 +15,6 @@ namespace taclink {
 namespace {
 
 constexpr const char* kRefused = "calibration refused: ";
-// Swapped pictures that fit are refused if they put the cameras nearer to the nominal ones by this much
-// (difference of half the squared distance in tolerances).
-constexpr double kSwapMargin = 6;
-constexpr double kSwapDoubt = 12;  // stands for a pair that does not fit as given
-
 Error Refusal(const std::string& what) {
   return {ErrorCode::kInvalidArgument, kRefused + what};
 }
@@ -60,17 +56,14 @@ Result<RestResult> Calibrate(const LinkModel& model, const std::vector<Detection
   return *pose.result();
 }
 
-// True if the pictures explain the model better the other way round.
-bool LookSwapped(const LinkModel& model, std::vector<DetectionPair> pairs, RestPictures first_pair,
-                 const Result<RestResult>& as_given, RestConditions rest, CalibrationOptions options) {
-  for (auto& pair : pairs) std::swap(pair[0], pair[1]);
-  std::swap(first_pair[0], first_pair[1]);
-  options.progress = nullptr;
-  if (as_given) rest.loads = as_given->loads;
-  const auto swapped = Calibrate(model, pairs, first_pair, rest, options);
-  if (!swapped) return false;
-  return swapped->calibration.departure_cost + kSwapMargin <
-         (as_given ? as_given->calibration.departure_cost : kSwapDoubt);
+// Exactly, or but for compression.
+bool ShowTheSame(const cv::Mat& top, const cv::Mat& bottom) {
+  if (top.size() == bottom.size() && cv::norm(top, bottom, cv::NORM_INF) == 0) return true;
+  NoiseSample one, other;
+  one.Take(top);
+  other.Take(bottom);
+  const auto correlation = NoiseSample::Correlation(one, other);
+  return correlation && *correlation > kOneSensorsNoise;
 }
 
 }  // namespace
@@ -91,6 +84,9 @@ Result<RestResult> CalibrateFromPictures(const LinkModel& model, std::span<const
       if (auto good = CheckSize(model, id, picture); !good) return good.error();
       detector.Detect(picture, detections[i][Index(id)]);
     }
+    if (ShowTheSame(pairs[i][0], pairs[i][1]))
+      return Refusal("the top and the bottom picture of pair " + std::to_string(i + 1) +
+                     " are the same image; give one of each camera");
   }
   CalibrationOptions rest_of_way = options;
   if (options.progress) {
@@ -99,13 +95,6 @@ Result<RestResult> CalibrateFromPictures(const LinkModel& model, std::span<const
     };
   }
   auto result = Calibrate(model, detections, pairs.front(), rest, rest_of_way);
-  if (options.progress) options.progress({0.9, "try the pictures the other way round"});
-  if (LookSwapped(model, detections, pairs.front(), result, rest, options)) {
-    return Refusal(
-        "the pictures look swapped: they fit the model with top as bottom and bottom as top; give them the "
-        "other "
-        "way round");
-  }
   if (options.progress) options.progress({1, "done"});
   return result;
 }

@@ -1,30 +1,13 @@
 #include "sensing/pipeline/picture_stage.h"
 
-#include <algorithm>
 #include <string>
 #include <utility>
 
+#include "sensing/pipeline/reason_text.h"
+
 namespace taclink {
-namespace {
-
-// Stops at the first pixel that differs: of a sensor with noise, one of the first. Pictures without light
-// need not have noise.
-bool IsRepeated(const cv::Mat& now, const cv::Mat& before) {
-  if (now.empty() || now.size() != before.size()) return false;
-  bool is_uniform = true;
-  for (int row = 0; row < now.rows; ++row) {
-    const uchar* pixels = now.ptr(row);
-    if (!std::equal(pixels, pixels + now.cols, before.ptr(row))) return false;
-    is_uniform = is_uniform && std::all_of(pixels, pixels + now.cols,
-                                           [&](uchar pixel) { return pixel == now.at<uchar>(0, 0); });
-  }
-  return !is_uniform;
-}
-
-}  // namespace
-
 std::optional<Reason> PictureStage::TroubleOf(CameraId id, const RawImage& image, const CameraModel& expected,
-                                              bool may_repeat) {
+                                              ImageRepeats repeats, int64_t exposure_ns) {
   const auto i = Index(id);
   const std::string camera = std::string(Name(id)) + " camera";
   if (!image.valid)
@@ -39,27 +22,55 @@ std::optional<Reason> PictureStage::TroubleOf(CameraId id, const RawImage& image
                                          std::to_string(gray.rows) + ", the camera's model is for " +
                                          std::to_string(expected.width_px) + "x" +
                                          std::to_string(expected.height_px)};
-  if (!may_repeat && IsRepeated(gray, before_[i]))
-    return Reason{
-        ReasonId::kFrozen,
-        camera +
-            ": the picture is the one before, pixel by pixel, which a sensor's noise never repeats: "
-            "the camera hangs; plug it in again"};
+  if (repeats == ImageRepeats::kAllowed) return std::nullopt;
+  repetitions_[i].Take(gray, before_[i], exposure_ns, repeats == ImageRepeats::kAtRest);
+  if (repeats == ImageRepeats::kFault && repetitions_[i].is_repeated()) {
+    if (auto rate = RateReason(id)) return rate;
+    return Reason{ReasonId::kFrozen,
+                  camera +
+                      ": the picture has the noise of the one before, which a sensor's noise never repeats: "
+                      "the camera hangs; plug it in again"};
+  }
   return std::nullopt;
 }
 
-void PictureStage::Take(const StereoFrame& frame, const StereoRig& rig, bool may_repeat, LinkState& state) {
+std::optional<Reason> PictureStage::RateReason(CameraId id) const {
+  const auto rates = repetitions_[Index(id)].rates();
+  if (!rates) return std::nullopt;
+  return Reason{
+      ReasonId::kFrameRate,
+      ReasonText("the %s camera gives %.1f new images a second, but the link takes %.1f: the others are "
+                 "repeated; set both cameras to one frame rate, and check exposure time and USB bandwidth",
+                 Name(id), rates->new_hz, rates->all_hz),
+      rates->new_hz, rates->all_hz};
+}
+
+bool PictureStage::ShowTheSame() const {
+  const auto correlation = NoiseSample::Correlation(repetitions_[0].noise(), repetitions_[1].noise());
+  return correlation && *correlation > kOneSensorsNoise;
+}
+
+void PictureStage::Take(const StereoFrame& frame, const StereoRig& rig, ImageRepeats repeats,
+                        LinkState& state) {
   trouble_.reset();
+  warning_.reset();
   for (const CameraId id : kBothCameras) {
     const RawImage& image = frame.images[Index(id)];
-    const auto trouble = TroubleOf(id, image, rig[id], may_repeat);
+    const auto trouble = TroubleOf(id, image, rig[id], repeats, frame.times.exposure_monotonic_ns);
     has_[Index(id)] = !trouble;
+    if (trouble && trouble->id == ReasonId::kCamera) repetitions_[Index(id)].Miss();
+    if (!trouble && repeats == ImageRepeats::kFault && !warning_) warning_ = RateReason(id);
     state.cameras[Index(id)].bad_picture = trouble && image.valid && trouble->id == ReasonId::kCamera;
     if (trouble && trouble_)
       trouble_->text += "; " + trouble->text;
     else if (trouble)
       trouble_ = trouble;
   }
+  if (repeats == ImageRepeats::kAllowed || !has_[0] || !has_[1] || !ShowTheSame()) return;
+  has_ = {};
+  trouble_ = Reason{ReasonId::kCamera,
+                    "both cameras give the same image: one device stands for both, or one sends the other's; "
+                    "check which devices the link's top and bottom camera are"};
 }
 
 }  // namespace taclink

@@ -8,31 +8,42 @@
 #include "sensing/core/camera_model.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/link_state.h"
+#include "sensing/pipeline/image_noise.h"
 
 namespace taclink {
+
+/// What an image that repeats the one before means.
+enum class ImageRepeats : uint8_t {
+  kAllowed,  ///< nothing: images come from files or a simulation
+  kAtRest,   ///< nothing either: there may be one rest pair only. How images differ is learned
+  kFault     ///< the camera hangs
+};
 
 /// Makes gray pictures of what cameras send, and says what is wrong with it. One thread.
 class PictureStage {
  public:
-  /// `rig`: what the pictures should be of. `may_repeat`: of files, and while rest pictures are taken, of
-  /// which there may be one pair only; a camera that hangs then shows in the first frame that is measured.
-  /// Writes the cameras' bad_picture.
-  void Take(const StereoFrame& frame, const StereoRig& rig, bool may_repeat, LinkState& state);
+  /// `rig`: what the pictures should be of. Writes the cameras' bad_picture.
+  void Take(const StereoFrame& frame, const StereoRig& rig, ImageRepeats repeats, LinkState& state);
 
   /// Of the last frame; 8 bits. What is not there is not to be used.
   bool has(size_t camera) const { return has_[camera]; }
   const cv::Mat& gray(size_t camera) const { return gray_[camera]; }
   /// Why one or both are not there; none: they are.
   const std::optional<Reason>& trouble() const { return trouble_; }
+  /// What is wrong with a camera whose picture is there.
+  const std::optional<Reason>& warning() const { return warning_; }
 
  private:
   std::optional<Reason> TroubleOf(CameraId id, const RawImage& image, const CameraModel& expected,
-                                  bool may_repeat);
+                                  ImageRepeats repeats, int64_t exposure_ns);
+  std::optional<Reason> RateReason(CameraId id) const;
+  bool ShowTheSame() const;
 
   std::array<GrayDecoder, kCameraCount> decoders_;
+  std::array<ImageRepetition, kCameraCount> repetitions_;
   std::array<cv::Mat, kCameraCount> gray_, before_;
   std::array<bool, kCameraCount> has_{};
-  std::optional<Reason> trouble_;
+  std::optional<Reason> trouble_, warning_;
 };
 
 }  // namespace taclink

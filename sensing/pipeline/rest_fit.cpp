@@ -8,6 +8,8 @@
 #include "sensing/camera/rest_check.h"
 #include "sensing/core/similar_skin.h"
 #include "sensing/pipeline/displaced_labels.h"
+#include "sensing/pipeline/image_displacement.h"
+#include "sensing/pipeline/rest_orientation.h"
 
 namespace taclink {
 namespace {
@@ -87,6 +89,8 @@ RestFit::RestFit(const LinkModel& model, const std::optional<StereoRig>& rig,
 
 Result<RestResult> RestFit::Explain(const MeasuredLoads& loads) const {
   auto result = rig_ ? ExplainByRig(*rig_, loads) : Calibrate(loads);
+  if (const std::string trouble = CameraTrouble(result, loads); !trouble.empty())
+    return Error{ErrorCode::kInvalidArgument, trouble};
   if (!result) return result;
   if (const auto shape = ShapeAt(result->loads); !shape) return shape.error();
   return result;
@@ -97,6 +101,18 @@ Result<RestResult> RestFit::Calibrate(const MeasuredLoads& loads) const {
   if (!shape) return shape.error();
   if (!IsRestUncertain(*shape)) return CalibrateAt(*shape, loads, options_);
   return Refine(loads);
+}
+
+// What is wrong with the cameras, or with which of their images is which.
+std::string RestFit::CameraTrouble(const Result<RestResult>& result, const MeasuredLoads& loads) const {
+  const auto shape = ShapeAt(result ? result->loads : loads);
+  if (!shape || (!result && IsRestUncertain(*shape))) return {};
+  if (!rig_) return OrientationTrouble(*shape, steady_, pairs_.first, options_.domes);
+  if (result) return {};
+  std::vector<Vec3> skin_mm;
+  for (int m = 0; m < model_.markers.count(); ++m) skin_mm.push_back(shape->Marker(m));
+  const auto diagnosis = DiagnoseImages(model_, *rig_, skin_mm, steady_);
+  return diagnosis ? diagnosis->text : std::string();
 }
 
 Result<RestShape> RestFit::ShapeAt(const MeasuredLoads& loads) const {

@@ -3,6 +3,7 @@
 #include <array>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "sensing/camera/calibration.h"
@@ -54,6 +55,7 @@ class RestFit {
     std::array<RestMatch, kCameraCount> matches;
     double score = 0;  // of SettledCamera, both cameras
   };
+  std::string CameraTrouble(const Result<RestResult>& result, const MeasuredLoads& loads) const;
   Result<RestShape> ShapeAt(const MeasuredLoads& loads) const;
   Result<FoundCameras> FindCameras(const RestShape& shape) const;
   Result<MarkerMean> Mean(const StereoRig& rig, const std::array<RestMatch, kCameraCount>* first) const;

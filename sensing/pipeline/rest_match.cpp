@@ -14,8 +14,9 @@ constexpr double kMovedGate = 1;   // the same, for what is left
 constexpr int kMaxTurns = 5;
 // So many markers more must be explained by a camera that is off the nominal one by sqrt(2) tolerances more.
 constexpr double kMarkersPerDeparture = 4;
-constexpr double kMissing = 0.1;         // a ring or path is missing if no larger part of it is seen
-constexpr double kMaxUnexplained = 0.6;  // of a ring's number of markers, in one picture
+constexpr double kMissing = 0.1;            // a ring or path is missing if no larger part of it is seen
+constexpr double kMostLostPaths = 1.0 / 6;  // paths whose markers may have broken off; a model has others
+constexpr double kMaxUnexplained = 0.6;     // of a ring's number of markers, in one picture
 constexpr double kRingWidth = 0.08;  // of a ring's radius in the picture: cameras sit a little off the axis
 
 // The nearest of `points` to p, and its distance; -1: there is none.
@@ -171,6 +172,8 @@ std::string GridTrouble(const LinkModel& model, const std::array<RestMatch, kCam
       return std::find(bottom.begin(), bottom.end(), one) != bottom.end();
     });
     if (!both && (!rings || top.empty() || bottom.empty())) continue;
+    const size_t most = std::max(top.size(), bottom.size());
+    if (!rings && static_cast<double>(most) <= kMostLostPaths * model.markers.paths) continue;
     return std::string("the pictures do not show the model's ") + (rings ? "ring " : "path ") +
            std::to_string(top.front());
   }

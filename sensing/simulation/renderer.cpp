@@ -87,6 +87,7 @@ Renderer::Renderer(const LinkModel& model, const StereoRig& rig, const CameraEff
 }
 
 bool Renderer::Sees(const SkinTruth& truth, CameraId id, int marker) const {
+  if (!truth.marker_is_lost.empty() && truth.marker_is_lost[static_cast<size_t>(marker)]) return false;
   const Eye& eye = eyes_[Index(id)];
   const bool may_hide = eye.hides_at_rest || truth.inner_wall.largest_inward_change_mm > kHardlyDeformedMm;
   const Vec3& p = truth.marker_mm[static_cast<size_t>(marker)];

@@ -30,7 +30,7 @@ class Renderer {
   /// 8-bit brightness as the sensor delivers it.
   void Render(const SkinTruth& truth, CameraId id, cv::Mat& gray);
 
-  /// Whether the camera can see the marker at all: not behind the skin, in front of the lens.
+  /// Whether the camera can see the marker at all: not broken off, not behind the skin, in front of the lens.
   bool Sees(const SkinTruth& truth, CameraId id, int marker) const;
 
   /// Where the centroid of a marker's outline is in the picture, its jitter included. Says nothing of what

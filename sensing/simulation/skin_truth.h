@@ -37,6 +37,7 @@ struct SkinTruth {
   std::vector<Vec3> marker_mm;              ///< centres (see MarkerGrid::center_depth_mm), by marker index
   std::vector<Vec3> marker_wall_mm;         ///< feet of the domes on the inner wall
   std::vector<Vec3> marker_normal;          ///< of the skin there, unit, away from the axis
+  std::vector<bool> marker_is_lost;         ///< broken off the skin; empty: none is
   RadiusGrid inner_wall;
   std::vector<TrueContact> contacts;  ///< those that push now
   Vec3 total_force_n = Vec3::Zero();  ///< their sum

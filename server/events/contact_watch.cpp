@@ -56,7 +56,7 @@ void ContactWatch::Tell(EventKind kind, Track& track, int64_t now_ns, std::vecto
                    .end_reason = {}}});
 }
 
-void ContactWatch::Follow(const Contact& contact, int64_t now_ns, std::vector<Told>& told) {
+void ContactWatch::Follow(const Contact& contact, bool is_certain, int64_t now_ns, std::vector<Told>& told) {
   Track& track = TrackOf(contact);
   track.current = contact.id;
   track.seen = true;
@@ -65,7 +65,7 @@ void ContactWatch::Follow(const Contact& contact, int64_t now_ns, std::vector<To
   const double force_n = contact.force_n.norm();
   track.peak_n = std::max(track.peak_n, force_n);
   if (force_n >= options_.end_n) track.strong_ns = now_ns;
-  if (!track.begun && force_n >= options_.begin_n) {
+  if (!track.begun && is_certain && force_n >= options_.begin_n) {
     track.begun = true;
     track.begin_ns = now_ns;
     Tell(EventKind::kContactBegin, track, now_ns, told);
@@ -76,6 +76,7 @@ void ContactWatch::Follow(const Contact& contact, int64_t now_ns, std::vector<To
 
 void ContactWatch::Take(const LinkState& state, std::vector<Told>& told) {
   const int64_t now_ns = state.times.published_ns;
+  const bool is_certain = AreContactsCertain(state);
   if (state.measured() && state.baseline.taken_utc_ns != baseline_utc_ns_) {
     baseline_utc_ns_ = state.baseline.taken_utc_ns;
     new_baseline_ = !tracks_.empty();
@@ -84,11 +85,10 @@ void ContactWatch::Take(const LinkState& state, std::vector<Told>& told) {
     track.seen = std::any_of(state.contacts.begin(), state.contacts.end(),
                              [&](const Contact& contact) { return contact.id == track.current; });
   }
-  for (const Contact& contact : state.contacts) Follow(contact, now_ns, told);
-  const char* const reason = !state.measured() || !state.has_forces() ? "not measured"
-                             : new_baseline_                          ? "new baseline"
-                                                                      : "released";
+  for (const Contact& contact : state.contacts) Follow(contact, is_certain, now_ns, told);
+  const char* const reason = new_baseline_ ? "new baseline" : "released";
   for (Track& track : tracks_) {
+    if (!is_certain) break;
     if (!track.begun || now_ns - track.strong_ns < Ns(options_.release_s)) continue;
     Tell(EventKind::kContactEnd, track, now_ns, told);
     told.back().detail.duration_s = static_cast<double>(track.strong_ns - track.begin_ns) * 1e-9;

@@ -9,7 +9,8 @@
 namespace taclink::server {
 
 /// Begins, updates and ends of one link's contacts. A contact that is gone for a moment, or comes back under
-/// another id at the same place, goes on.
+/// another id at the same place, goes on. In frames that leave it open which contacts there are, none begins
+/// or ends (AreContactsCertain).
 class ContactWatch {
  public:
   explicit ContactWatch(const EventOptions& options) : options_(options) {}
@@ -33,7 +34,7 @@ class ContactWatch {
   };
 
   Track& TrackOf(const Contact& contact);
-  void Follow(const Contact& contact, int64_t now_ns, std::vector<Told>& told);
+  void Follow(const Contact& contact, bool is_certain, int64_t now_ns, std::vector<Told>& told);
   void Tell(EventKind kind, Track& track, int64_t now_ns, std::vector<Told>& told) const;
   bool UpdateIsDue(const Track& track, int64_t now_ns) const;
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "sensing/core/geometry.h"
 #include "sensing/core/link_state.h"
@@ -37,7 +38,7 @@ struct ContactDetail {
   double normal_force_n = 0;
   double peak_n = 0;       ///< largest force until now
   double duration_s = 0;   ///< since it began
-  std::string end_reason;  ///< of an end: "released", "not measured" or "new baseline"
+  std::string end_reason;  ///< of an end: "released" or "new baseline"
 };
 
 struct ForceLevelDetail {
@@ -76,6 +77,8 @@ struct Event {
   EventKind kind = EventKind::kContactBegin;
   std::optional<size_t> link;  ///< none: the whole arm
   uint64_t frame_sequence = 0;
+  std::optional<LinkStatus> frame_status;        ///< none: no frame made it
+  std::vector<ReasonId> frame_reasons;           ///< of that frame
   int64_t exposure_utc_ns = 0, exposure_ns = 0;  ///< of the frame; 0: no frame made it
   int64_t published_ns = 0;                      ///< of the frame, monotonic; 0: likewise
   int64_t raised_ns = 0, raised_utc_ns = 0;      ///< the engine made it

@@ -55,6 +55,8 @@ Event LinkWatch::About(const LinkState& state, EventKind kind) const {
   event.exposure_utc_ns = state.times.exposure_utc_ns;
   event.exposure_ns = state.times.exposure_monotonic_ns;
   event.published_ns = state.times.published_ns;
+  event.frame_status = state.status;
+  for (const Reason& reason : state.reasons) event.frame_reasons.push_back(reason.id);
   return event;
 }
 

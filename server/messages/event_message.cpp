@@ -73,6 +73,8 @@ void Fill(const Event& event, const std::string& link, v1::Event& out) {
   out.set_kind(static_cast<v1::EventKind>(static_cast<int>(event.kind) + 1));
   out.set_link(link);
   out.set_frame_sequence(event.frame_sequence);
+  if (event.frame_status) out.set_frame_status(wire::ToWire(*event.frame_status));
+  for (const ReasonId id : event.frame_reasons) out.add_frame_reasons(wire::ToWire(id));
   v1::EventTimes& times = *out.mutable_times();
   times.set_exposure_utc_ns(event.exposure_utc_ns);
   times.set_exposure_ns(event.exposure_ns);

@@ -33,6 +33,12 @@ std::map<std::string, Expected> Kinds() {
           {"swinging, 1 kPa", {.least_right = 0.98}},
           {"rolling, 0.5 kPa", {.least_right = 0.98}},
           {"swinging, mounted 20 deg off about x", {.least_right = 0.9, .is_named = true}},
+          {"both frozen, encoded again", {.least_right = 0, .is_named = true}},
+          {"top at half the rate", {.least_right = 0.95, .is_named = true}},
+          {"swapped", {.least_right = 0, .is_named = true}},
+          {"top mirrored", {.least_right = 0, .is_named = true}},
+          {"three markers gone", {.least_right = 0.95}},
+          {"a strip of two paths gone, always", {.least_right = 0.95}},
           {"top frozen", {.least_right = 0.9, .is_named = true}},
           {"both frozen", {.least_right = 0, .is_named = true}},
           // Until the skin has moved by a tenth of a millimeter or two, no one can know.

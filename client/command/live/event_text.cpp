@@ -39,6 +39,17 @@ std::string OperationText(const v1::OperationEvent& operation) {
   return text;
 }
 
+// Of the frame, where it is not well and the event itself does not say so.
+std::string FrameStatus(const v1::Event& event) {
+  if (event.frame_status() == v1::LINK_STATUS_UNSPECIFIED || event.frame_status() == v1::LINK_STATUS_OK ||
+      event.has_link_status())
+    return "";
+  std::string text = fmt::format(" ({}", client::Name(event.frame_status()));
+  for (const int reason : event.frame_reasons())
+    text += fmt::format(" {}", client::Name(static_cast<v1::Reason>(reason)));
+  return text + ")";
+}
+
 std::string Detail(const v1::Event& event) {
   const v1::ForceLevelEvent& level = event.force_level();
   const v1::LinkStatusEvent& status = event.link_status();
@@ -124,6 +135,12 @@ std::string EventJson(const v1::Event& event, const std::string& run_id) {
                {"raised_utc_ns", event.times().raised_utc_ns()},
                {"exposure_utc_ns", event.times().exposure_utc_ns()},
                {"latency_ms", latency ? Json(*latency * 1e3) : Json(nullptr)}};
+  if (event.frame_status() != v1::LINK_STATUS_UNSPECIFIED) {
+    json["frame_status"] = client::Name(event.frame_status());
+    json["frame_reasons"] = Json::array();
+    for (const int reason : event.frame_reasons())
+      json["frame_reasons"].push_back(client::Name(static_cast<v1::Reason>(reason)));
+  }
   json.update(DetailJson(event));
   return json.dump();
 }
@@ -132,9 +149,9 @@ std::string EventText(const v1::Event& event) {
   const int64_t raised_utc_ns = event.times().raised_utc_ns();
   const auto seconds = static_cast<std::time_t>(raised_utc_ns / 1'000'000'000);
   const auto latency = client::LatencyS(event);
-  return Printable(fmt::format("{:%H:%M:%S}.{:03}  {:<14}  {:<10}  {}{}", fmt::gmtime(seconds),
+  return Printable(fmt::format("{:%H:%M:%S}.{:03}  {:<14}  {:<10}  {}{}{}", fmt::gmtime(seconds),
                                raised_utc_ns / 1'000'000 % 1000, client::Name(event.kind()),
-                               event.link().empty() ? "-" : event.link(), Detail(event),
+                               event.link().empty() ? "-" : event.link(), Detail(event), FrameStatus(event),
                                latency ? fmt::format("  [{:.0f} ms]", *latency * 1e3) : ""));
 }
 

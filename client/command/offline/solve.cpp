@@ -69,6 +69,7 @@ Json ReasonJson(const Reason& reason) {
   const char* name = unit == ReasonUnit::kMillimeters   ? "mm"
                      : unit == ReasonUnit::kMegapascals ? "kPa"
                      : unit == ReasonUnit::kSeconds     ? "s"
+                     : unit == ReasonUnit::kHertz       ? "Hz"
                                                         : "";
   return {{"id", Name(reason.id)},
           {"text", reason.text},

@@ -118,8 +118,10 @@ Result<void> PictureLabeller::CheckComplete() {
     }
     all += seen;
     if (seen < kMinOfRing * inside && IsResolved(j))
-      return Refusal("of ring " + std::to_string(model_.RingOf(MarkerAt(0, j)) + 1) +
-                     " hardly a marker is seen, the link may have fewer rings than the model");
+      return Refusal(
+          "near ring " + std::to_string(model_.RingOf(MarkerAt(0, j)) + 1) +
+          " a ring of the model hardly shows: something covers it, or the link has fewer rings than "
+          "the model");
   }
   if (all < kLeastLabelled * paths_ * rings_)
     return Refusal("only " + std::to_string(all) + " of " + std::to_string(paths_ * rings_) +

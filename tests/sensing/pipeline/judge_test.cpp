@@ -32,7 +32,9 @@ class JudgeTest : public ::testing::Test {
   std::vector<ReasonId> Reasons() {
     Judge({.model = model_,
            .camera_trouble = camera_trouble_,
+           .camera_warning = camera_warning_,
            .agreement = agreement_,
+           .diagnosis = diagnosis_,
            .motion = motion_,
            .sees_alone = sees_alone_,
            .attitude = attitude_,
@@ -56,7 +58,7 @@ class JudgeTest : public ::testing::Test {
   const LinkModel model_ = LoadLinkModel("cylinder").value();
   LinkState state_;
   SkinEstimate estimate_;
-  std::optional<Reason> camera_trouble_;
+  std::optional<Reason> camera_trouble_, camera_warning_, diagnosis_;
   CameraAgreement agreement_;
   std::optional<MotionDisagreement> motion_;
   std::optional<CameraId> sees_alone_;
@@ -292,6 +294,21 @@ TEST_F(JudgeTest, FewMarkersAreALostLink) {
   for (size_t m = 0; m < 150; ++m) state_.shape.sources[m] = MarkerSource::kInferred;
   EXPECT_THAT(Reasons(), ::testing::Contains(ReasonId::kFewMarkers));
   EXPECT_EQ(state_.status, LinkStatus::kLost);
+}
+
+TEST_F(JudgeTest, ACauseComesBeforeWhatItDoes) {
+  diagnosis_ = Reason{ReasonId::kCamerasSwapped, "exchanged; put them right"};
+  for (int ring = 0; ring < 7; ++ring)
+    for (int path = 0; path < model_.markers.paths; ++path) Lose(path, ring);
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kCamerasSwapped, ReasonId::kFewMarkers));
+  EXPECT_EQ(state_.status, LinkStatus::kLost);
+  EXPECT_EQ(state_.status_reason, "exchanged; put them right");
+}
+
+TEST_F(JudgeTest, AFrameRateThatDiffersDegrades) {
+  camera_warning_ = Reason{ReasonId::kFrameRate, "half of them; set it"};
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kFrameRate));
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
 }
 
 }  // namespace

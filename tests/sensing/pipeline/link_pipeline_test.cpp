@@ -224,6 +224,50 @@ TEST_F(LinkPipelineTest, ADeepDentIsDegraded) {
 }
 
 // A sensor's noise never repeats: what it saw before says nothing of now.
+TEST_F(LinkPipelineTest, SwappedCamerasAreRefusedAtTheStart) {
+  LinkPipeline pipeline(model_, options_);
+  for (int k = 0; k < options_.rest_frames; ++k) {
+    StereoFrame frame = Frame(k / 30.0);
+    std::swap(frame.images[0], frame.images[1]);
+    pipeline.Process(frame, state_);
+  }
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_THAT(state_.status_reason, HasSubstr("look swapped"));
+}
+
+TEST_F(LinkPipelineTest, SwappedCamerasOfAKnownLinkAreNamed) {
+  options_.rig = model_.nominal_rig;
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  for (int k = 0; k < 3; ++k) {
+    StereoFrame frame = Frame(0.5 + k / 30.0);
+    std::swap(frame.images[0], frame.images[1]);
+    pipeline.Process(frame, state_);
+    EXPECT_NE(state_.status, LinkStatus::kOk);
+  }
+  ASSERT_FALSE(state_.reasons.empty());
+  EXPECT_EQ(state_.reasons.front().id, ReasonId::kCamerasSwapped) << state_.status_reason;
+  EXPECT_FALSE(state_.measured());
+  LinkPipeline restarted(model_, options_);
+  for (int k = 0; k < options_.rest_frames; ++k) {
+    StereoFrame frame = Frame(k / 30.0);
+    std::swap(frame.images[0], frame.images[1]);
+    restarted.Process(frame, state_);
+  }
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_THAT(state_.status_reason, HasSubstr("exchange their cables"));
+}
+
+TEST_F(LinkPipelineTest, OneCameraForBothIsNamed) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  StereoFrame frame = Frame(0.5);
+  frame.images[1] = frame.images[0];
+  pipeline.Process(frame, state_);
+  EXPECT_EQ(state_.status, LinkStatus::kLost);
+  EXPECT_THAT(state_.status_reason, HasSubstr("both cameras give the same image"));
+}
+
 TEST_F(LinkPipelineTest, APictureThatRepeatsIsToldAndNotUsed) {
   LinkPipeline pipeline(model_, options_);
   TakeRest(pipeline);

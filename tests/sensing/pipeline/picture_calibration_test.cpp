@@ -166,6 +166,23 @@ TEST_F(RefusalTest, SwappedPicturesAreToldFromRightOnes) {
   EXPECT_EQ(Message(Calibrate(model_, rest_)), "accepted");
 }
 
+TEST_F(RefusalTest, MirroredAndTurnedPicturesAreNamed) {
+  const auto refused = [&](CameraId id, int flip) {
+    PicturePair pair = {rest_[0].clone(), rest_[1].clone()};
+    cv::flip(rest_[Index(id)], pair[Index(id)], flip);
+    return Message(Calibrate(model_, pair));
+  };
+  EXPECT_THAT(refused(CameraId::kTop, 0), HasSubstr("the top picture looks mirrored, upside down"));
+  EXPECT_THAT(refused(CameraId::kTop, -1), HasSubstr("the top picture looks turned by 180 degrees"));
+  EXPECT_THAT(refused(CameraId::kBottom, 1), HasSubstr("the bottom picture looks mirrored, left and right"));
+  EXPECT_THAT(refused(CameraId::kBottom, 0), HasSubstr("the bottom picture looks mirrored, upside down"));
+  EXPECT_THAT(refused(CameraId::kBottom, -1), HasSubstr("the bottom picture looks turned by 180 degrees"));
+}
+
+TEST_F(RefusalTest, OnePictureForBothCamerasIsRefused) {
+  EXPECT_THAT(Message(Calibrate(model_, {rest_[0], rest_[0]})), HasSubstr("are the same image"));
+}
+
 TEST_F(RefusalTest, TouchedSkinIsRefused) {
   const auto refused = [&](double depth_mm) {
     const auto truth = studio_.Truth("  - {at: {path: 7, ring: 5}, patch_diameter_mm: 20, depth_mm: " +

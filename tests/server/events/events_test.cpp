@@ -146,14 +146,15 @@ TEST_F(LinkWatchTest, IdsLastWhereTheFinderLosesThem) {
   EXPECT_EQ(ContactOf(far[0]).id, 10u);
 }
 
-TEST_F(LinkWatchTest, AContactEndsWhereNothingIsMeasured) {
+// Nobody has seen that what pressed has gone.
+TEST_F(LinkWatchTest, WhereNothingIsMeasuredNoContactEnds) {
   Frame({MakeContact(1, 0.2)});
-  std::vector<Event> events;
-  for (int i = 0; i < 12; ++i) {
-    for (Event& event : Frame({}, false)) events.push_back(std::move(event));
-  }
-  ASSERT_THAT(Kinds(events), ElementsAre("contact_end"));
-  EXPECT_EQ(ContactOf(events[0]).end_reason, "not measured");
+  for (int i = 0; i < 50; ++i) EXPECT_TRUE(Frame({}, false).empty());
+  const auto end = Frame({});
+  ASSERT_THAT(Kinds(end), ElementsAre("contact_end"));
+  EXPECT_EQ(ContactOf(end[0]).end_reason, "released");
+  EXPECT_EQ(end[0].frame_status, LinkStatus::kOk);
+  EXPECT_TRUE(end[0].frame_reasons.empty());
 }
 
 // A skin that is pressed too hard for an answer has not been let go.
@@ -162,13 +163,43 @@ TEST_F(LinkWatchTest, ForcesThatAreNotKnownAreNoRelease) {
   ASSERT_EQ(watch_.forces()[0].level(), ForceLevel::kAlarm);
   state_.status = LinkStatus::kDegraded;
   state_.forces.converged = false;
-  std::vector<Event> events;
-  for (int i = 0; i < 12; ++i) {
-    for (Event& event : Frame({})) events.push_back(std::move(event));
-  }
-  ASSERT_THAT(Kinds(events), ElementsAre("contact_end"));
-  EXPECT_EQ(ContactOf(events[0]).end_reason, "not measured");
+  for (int i = 0; i < 50; ++i) EXPECT_TRUE(Frame({}).empty());
   EXPECT_EQ(watch_.forces()[0].level(), ForceLevel::kAlarm);
+}
+
+// A torn image, say.
+TEST_F(LinkWatchTest, ContactsOfADoubtfulFrameNeitherBeginNorEnd) {
+  Frame({MakeContact(1, 0.2)});
+  state_.status = LinkStatus::kDegraded;
+  state_.reasons = {{ReasonId::kResidual, "off the estimated shape"}};
+  bool is_updated = false;
+  for (int i = 0; i < 50; ++i) {
+    for (const Event& event : Frame({MakeContact(1, 0.2 + 0.01 * i), MakeContact(2, 0.3, 120)})) {
+      if (event.kind == EventKind::kForceLevel) continue;
+      EXPECT_EQ(event.kind, EventKind::kContactUpdate);
+      EXPECT_EQ(event.frame_status, LinkStatus::kDegraded);
+      EXPECT_THAT(event.frame_reasons, ElementsAre(ReasonId::kResidual));
+      is_updated = true;
+    }
+  }
+  EXPECT_TRUE(is_updated);
+  for (int i = 0; i < 50; ++i) {
+    for (const Event& event : Frame({MakeContact(2, 0.3, 120)}))
+      EXPECT_EQ(event.kind, EventKind::kForceLevel) << "1 may be there, and 2 not";
+  }
+  state_.status = LinkStatus::kOk;
+  state_.reasons.clear();
+  EXPECT_THAT(Kinds(Frame({MakeContact(2, 0.3, 120)})), ElementsAre("contact_begin", "contact_end"));
+}
+
+// A link without a pressure sensor is never ok, and yet touched.
+TEST_F(LinkWatchTest, ContactsOfWhichOnlyTheForceIsInDoubtBeginAndEnd) {
+  state_.status = LinkStatus::kDegraded;
+  state_.reasons = {{ReasonId::kPressureUnknown, "nobody measures the pressure"}};
+  const auto begin = Frame({MakeContact(1, 0.2)});
+  ASSERT_THAT(Kinds(begin), ElementsAre("contact_begin"));
+  EXPECT_EQ(begin[0].frame_status, LinkStatus::kDegraded);
+  EXPECT_THAT(begin[0].frame_reasons, ElementsAre(ReasonId::kPressureUnknown));
 }
 
 TEST_F(LinkWatchTest, LevelsHaveHysteresis) {

@@ -71,8 +71,14 @@ export function statusOf(link: Link, frame: LinkFrame | undefined): { status: Li
     : { status: link.status, reason: link.statusReason };
 }
 
-/** An event in one line. */
+/** An event in one line, with its frame's status where that is not well. */
 export function eventText(event: Event): string {
+  const isTold = event.detail.case === "contact" || event.detail.case === "forceLevel";
+  const isWell = event.frameStatus === LinkStatus.UNSPECIFIED || event.frameStatus === LinkStatus.OK;
+  return isTold && !isWell ? `${detailText(event)} (${STATUS_WORDS[event.frameStatus]})` : detailText(event);
+}
+
+function detailText(event: Event): string {
   const { detail } = event;
   switch (detail.case) {
     case "contact": {

@@ -8,7 +8,7 @@ from typing import Any, Union
 
 from taclink.messages.arrays import FloatArray, alike, vector
 from taclink.messages.force_level import Thresholds, thresholds_from
-from taclink.names import EventKind, ForceLevel, LinkStatus, name_of
+from taclink.names import EventKind, ForceLevel, LinkStatus, Reason, name_of
 from taclink.v1 import events_pb2
 
 
@@ -31,7 +31,7 @@ class ContactEvent:
     normal_force_n: float  # pressing in is positive
     peak_force_n: float
     duration_s: float
-    end_reason: str  # "released", "not measured" or "new baseline"; empty: it goes on
+    end_reason: str  # "released" or "new baseline"; empty: it goes on
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, slots=True)
@@ -88,6 +88,8 @@ class Event:
     kind: EventKind
     link: str  # empty: the whole arm
     frame_sequence: int  # Frame.sequence; 0: no frame made it
+    frame_status: LinkStatus | None  # of that frame; None: no frame made it
+    frame_reasons: tuple[Reason, ...]  # what made that frame worse than it could be, the gravest first
     exposure_utc_ns: int
     exposure_ns: int
     published_ns: int
@@ -165,6 +167,8 @@ def event_from(message: events_pb2.Event, client_utc_ns: int = 0) -> Event:
         kind=name_of(EventKind, message.kind),
         link=message.link,
         frame_sequence=message.frame_sequence,
+        frame_status=name_of(LinkStatus, message.frame_status) if message.frame_status else None,
+        frame_reasons=tuple(name_of(Reason, reason) for reason in message.frame_reasons),
         exposure_utc_ns=times.exposure_utc_ns,
         exposure_ns=times.exposure_ns,
         published_ns=times.published_ns,

@@ -1,0 +1,50 @@
+#include "sensing/pipeline/camera_diagnosis.h"
+
+#include <algorithm>
+
+#include "sensing/pipeline/image_displacement.h"
+
+namespace taclink {
+namespace {
+
+constexpr int64_t kPauseNs = 500'000'000;
+
+bool MayComeOfCameras(ReasonId id) {
+  switch (id) {
+    case ReasonId::kFewMarkers:
+    case ReasonId::kCamerasDisagree:
+    case ReasonId::kCamerasMoved:
+    case ReasonId::kNotConverged:
+    case ReasonId::kImpossible:
+    case ReasonId::kResidual:
+    case ReasonId::kLabels:
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+void CameraDiagnosis::Observe(const LinkState& state, const std::array<cv::Mat, kCameraCount>& images,
+                              const StereoRig& rig, std::span<const Vec3> skin_mm) {
+  // What it told itself is no sign.
+  const auto may_come = [&](const Reason& reason) {
+    return MayComeOfCameras(reason.id) && !(reason_ && reason.text == reason_->text);
+  };
+  if (std::ranges::none_of(state.reasons, may_come)) {
+    reason_.reset();
+    next_ns_ = 0;
+    return;
+  }
+  const int64_t now_ns = state.times.exposure_monotonic_ns;
+  if (now_ns < next_ns_ && now_ns >= next_ns_ - kPauseNs) return;
+  next_ns_ = now_ns + kPauseNs;
+  for (size_t i = 0; i < kCameraCount; ++i) {
+    spots_[i].clear();
+    if (!images[i].empty()) detector_.Detect(images[i], spots_[i]);
+  }
+  reason_ = DiagnoseImages(model_, rig, skin_mm, spots_);
+}
+
+}  // namespace taclink

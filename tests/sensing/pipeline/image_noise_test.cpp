@@ -1,0 +1,129 @@
+#include "sensing/pipeline/image_noise.h"
+
+#include <gtest/gtest.h>
+
+#include "sensing/capture/decode.h"
+#include "sensing/capture/encode.h"
+#include "sensing/model/model_file.h"
+#include "sensing/simulation/renderer.h"
+#include "tests/support/studio.h"
+
+namespace taclink {
+namespace {
+
+constexpr int64_t kFrameNs = 33'000'000;
+
+class ImageRepetitionTest : public ::testing::Test {
+ protected:
+  ImageRepetitionTest() {
+    for (int i = 0; i < 10; ++i) Show(Live(), true);
+  }
+
+  cv::Mat Live() {
+    cv::Mat gray;
+    truth_.frame = frames_++;  // picks the noise
+    renderer_.Render(truth_, CameraId::kTop, gray);
+    return gray;
+  }
+  cv::Mat Compressed(const cv::Mat& gray, int quality) {
+    RawImage image;
+    image.format = PixelFormat::kMjpeg;
+    image.width_px = gray.cols;
+    image.height_px = gray.rows;
+    image.valid = encoder_.Encode(gray, quality, image.bytes).ok();
+    cv::Mat decoded;
+    EXPECT_TRUE(decoder_.Decode(image, decoded).ok());
+    return decoded;
+  }
+  void Show(const cv::Mat& gray, bool is_rest = false) {
+    now_ns_ += kFrameNs;
+    repetition_.Take(gray, before_, now_ns_, is_rest);
+    before_ = gray.clone();
+  }
+  void ShowNew(int images) {
+    for (int i = 0; i < images; ++i) {
+      Show(Live());
+      EXPECT_FALSE(repetition_.is_repeated()) << i;
+    }
+  }
+
+  const LinkModel model_ = LoadLinkModel("cylinder").value();
+  const Studio studio_{model_};
+  SkinTruth truth_ = studio_.Truth();
+  Renderer renderer_{model_, model_.nominal_rig, CameraEffects{}, 1};
+  JpegEncoder encoder_;
+  GrayDecoder decoder_;
+  uint64_t frames_ = 0;
+  int64_t now_ns_ = 0;
+  cv::Mat before_;
+  ImageRepetition repetition_;
+};
+
+TEST_F(ImageRepetitionTest, LiveImagesAreNew) {
+  ShowNew(100);
+  EXPECT_FALSE(repetition_.rates());
+}
+
+TEST_F(ImageRepetitionTest, TheSameImageIsRepeatedAtOnce) {
+  ShowNew(10);
+  const cv::Mat last = before_;
+  Show(last);
+  EXPECT_TRUE(repetition_.is_repeated());
+  EXPECT_FALSE(repetition_.rates()) << "it may hang";
+  ShowNew(3);
+}
+
+// An encoder that keeps to a rate.
+TEST_F(ImageRepetitionTest, AnImageCompressedAnewIsRepeated) {
+  ShowNew(10);
+  const cv::Mat last = before_;
+  for (int i = 0; i < 60; ++i) {
+    Show(Compressed(last, 80 + i % 10));
+    EXPECT_TRUE(repetition_.is_repeated() || i < 4) << i;
+  }
+  for (int i = 0; i < 4; ++i) Show(Live());
+  ShowNew(10);
+}
+
+TEST_F(ImageRepetitionTest, LiveCompressedImagesAreNew) {
+  for (int i = 0; i < 100; ++i) {
+    Show(Compressed(Live(), 60 + i % 30));
+    EXPECT_FALSE(repetition_.is_repeated()) << i;
+  }
+}
+
+TEST_F(ImageRepetitionTest, ASkinThatMovesIsNew) {
+  truth_ = studio_.Truth(
+      "  - {at: {path: 7, ring: 5}, patch_diameter_mm: 20, depth_mm: 5, begin_s: 0, end_s: 2}\n");
+  ShowNew(20);
+}
+
+TEST_F(ImageRepetitionTest, OfEverySecondImageTheRateIsTold) {
+  for (int i = 0; i < 40; ++i) {
+    const cv::Mat live = Live();
+    Show(live);
+    Show(live);
+    EXPECT_TRUE(repetition_.is_repeated());
+  }
+  const auto rates = repetition_.rates();
+  ASSERT_TRUE(rates);
+  EXPECT_NEAR(rates->all_hz, 1e9 / kFrameNs, 0.1);
+  EXPECT_NEAR(rates->new_hz, 0.5e9 / kFrameNs, 1);
+}
+
+TEST_F(ImageRepetitionTest, TwoCamerasHaveTheirOwnNoise) {
+  NoiseSample top, bottom;
+  cv::Mat gray;
+  renderer_.Render(truth_, CameraId::kTop, gray);
+  top.Take(gray);
+  renderer_.Render(truth_, CameraId::kBottom, gray);
+  bottom.Take(gray);
+  EXPECT_LT(std::abs(NoiseSample::Correlation(top, bottom).value()), 0.1);
+  EXPECT_DOUBLE_EQ(NoiseSample::Correlation(top, top).value(), 1);
+  NoiseSample dark;
+  dark.Take(cv::Mat::zeros(gray.size(), CV_8U));
+  EXPECT_FALSE(NoiseSample::Correlation(dark, dark)) << "without noise nothing is known";
+}
+
+}  // namespace
+}  // namespace taclink
