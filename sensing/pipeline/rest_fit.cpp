@@ -105,6 +105,8 @@ Result<RestResult> RestFit::Calibrate(const MeasuredLoads& loads) const {
 
 // What is wrong with the cameras, or with which of their images is which.
 std::string RestFit::CameraTrouble(const Result<RestResult>& result, const MeasuredLoads& loads) const {
+  // Cameras so near to the nominal ones leave no room for a better alternative.
+  if (result && result->calibration.departure_cost < kLeastDeparture) return {};
   const auto shape = ShapeAt(result ? result->loads : loads);
   if (!shape || (!result && IsRestUncertain(*shape))) return {};
   if (!rig_) return OrientationTrouble(*shape, steady_, pairs_.first, options_.domes);

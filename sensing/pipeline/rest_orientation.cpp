@@ -12,7 +12,7 @@ namespace {
 
 // By so much the alternative must be better, in markers (SettledCamera::score): four for each unit of half
 // the squared distance from the nominal cameras, in tolerances.
-constexpr double kSwapMargin = 24, kTurnMargin = 12;
+constexpr double kSwapMargin = 24, kTurnMargin = 4 * kLeastDeparture;
 // What as many markers as that count for, where the images as given show no camera at all.
 constexpr double kNoCameraShare = 0.5;
 

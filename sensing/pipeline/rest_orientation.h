@@ -10,6 +10,10 @@
 
 namespace taclink {
 
+/// Half the squared distance of the cameras from the nominal ones, in tolerances, below which no other
+/// orientation is better by OrientationTrouble's margin.
+inline constexpr double kLeastDeparture = 3;
+
 /// Whether rest images fit the model's nominal cameras clearly better when they are exchanged, or when one of
 /// them is mirrored or turned by half a turn: then they are. A marker grid looks alike either way; what tells
 /// is where the lens' principal point is, as long as the cameras are nearer to their nominal ones than the

@@ -71,10 +71,10 @@ class ArmTest : public ::testing::Test {
 };
 
 TEST_F(ArmTest, ContactsAreInTheBaseFrame) {
-  Joints({0.2, -0.4});
-  Joints({0.6, 0.4}, milliseconds(100));
-  server_->Publish(0, 5, Now() + 60 * kMs, Now() + 50 * kMs);
-  server_->Publish(1, 8, Now() + 60 * kMs, Now() + 50 * kMs);
+  Joints({0.2, -0.4}, milliseconds(-100));
+  Joints({0.6, 0.4});
+  server_->Publish(0, 5, Now() - 40 * kMs, Now() - 50 * kMs);
+  server_->Publish(1, 8, Now() - 40 * kMs, Now() - 50 * kMs);
   const auto reader = Contacts();
   const auto arm = NextOf(*reader);
   EXPECT_EQ(arm.sequence(), 1u);

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -37,16 +38,23 @@ class UpdateRegistry {
     calls_.emplace(std::move(call), party);
     return {};
   }
-  void Remove(const std::shared_ptr<UpdateCall>& call) {
+  /// The call is about to end: it counts no more, or a client that begins the next one at once would be
+  /// refused.
+  void Release(const std::shared_ptr<UpdateCall>& call) {
     const std::lock_guard lock(mutex_);
     const auto at = calls_.find(call);
     if (at == calls_.end()) return;  // was refused
-    shares_.Give(at->second);
-    calls_.erase(at);
+    if (const auto party = std::exchange(at->second, std::nullopt)) shares_.Give(*party);
+  }
+  /// gRPC is done with it.
+  void Remove(const std::shared_ptr<UpdateCall>& call) {
+    Release(call);
+    const std::lock_guard lock(mutex_);
+    calls_.erase(call);
   }
   /// Ends all and takes no more.
   void Close(const std::string& reason) {
-    std::map<std::shared_ptr<UpdateCall>, Party> calls;
+    Calls calls;
     {
       const std::lock_guard lock(mutex_);
       closed_ = true;
@@ -60,10 +68,12 @@ class UpdateRegistry {
   }
 
  private:
+  using Calls = std::map<std::shared_ptr<UpdateCall>, std::optional<Party>>;  // none: counts no more
+
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   Shares shares_;
-  std::map<std::shared_ptr<UpdateCall>, Party> calls_;
+  Calls calls_;
   bool closed_ = false;
 };
 
@@ -94,6 +104,7 @@ class UpdateStream final : public grpc::ServerReadReactor<grpc::ByteBuffer>,
       const std::lock_guard lock(mutex_);
       if (std::exchange(finished_, true)) return;
     }
+    registry_.Release(this->shared_from_this());
     this->Finish(status);
   }
 
