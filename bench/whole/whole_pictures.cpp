@@ -102,7 +102,9 @@ void WholePictures::Spoil(int frame, CameraId id, cv::Mat& gray) {
   const double time_s = frame / whole_.scene.frame_rate_hz;
   const double grown =
       fault.grows_s > 0 ? std::clamp((time_s - std::max(0.0, fault.begin_s)) / fault.grows_s, 0.0, 1.0) : 1;
-  const double amount = grown * fault.amount;
+  // Of light, the amount is what is left.
+  const double amount =
+      fault.pictures == PictureFault::kDark ? 1 - grown * (1 - fault.amount) : grown * fault.amount;
   const auto seed = static_cast<unsigned>(2 * frame + static_cast<int>(Index(id)));
   switch (fault.pictures) {
     case PictureFault::kRolled:

@@ -8,6 +8,8 @@ namespace taclink {
 namespace {
 
 constexpr int64_t kPauseNs = 500'000'000;
+constexpr int kLeastFrames = 3;  // a single bad image has no cause that lasts
+constexpr int kMostSpots = 3;    // for each marker; more are clutter, and take long
 
 bool MayComeOfCameras(ReasonId id) {
   switch (id) {
@@ -26,23 +28,28 @@ bool MayComeOfCameras(ReasonId id) {
 
 }  // namespace
 
+void CameraDiagnosis::Restart() {
+  reason_.reset();
+  suspect_frames_ = 0;
+  next_ns_ = 0;
+}
+
 void CameraDiagnosis::Observe(const LinkState& state, const std::array<cv::Mat, kCameraCount>& images,
                               const StereoRig& rig, std::span<const Vec3> skin_mm) {
-  // What it told itself is no sign.
+  // Its own reason is no evidence.
   const auto may_come = [&](const Reason& reason) {
     return MayComeOfCameras(reason.id) && !(reason_ && reason.text == reason_->text);
   };
-  if (std::ranges::none_of(state.reasons, may_come)) {
-    reason_.reset();
-    next_ns_ = 0;
-    return;
-  }
+  suspect_frames_ = std::ranges::any_of(state.reasons, may_come) ? suspect_frames_ + 1 : 0;
+  // A reason stands until a later look does not find it.
+  if (suspect_frames_ < kLeastFrames && !reason_) return;
   const int64_t now_ns = state.times.exposure_monotonic_ns;
   if (now_ns < next_ns_ && now_ns >= next_ns_ - kPauseNs) return;
   next_ns_ = now_ns + kPauseNs;
   for (size_t i = 0; i < kCameraCount; ++i) {
     spots_[i].clear();
     if (!images[i].empty()) detector_.Detect(images[i], spots_[i]);
+    if (static_cast<int>(spots_[i].size()) > kMostSpots * model_.markers.count()) spots_[i].clear();
   }
   reason_ = DiagnoseImages(model_, rig, skin_mm, spots_);
 }

@@ -20,6 +20,9 @@ class CameraDiagnosis {
  public:
   explicit CameraDiagnosis(const LinkModel& model) : model_(model) {}
 
+  /// The cameras were calibrated, or the link begins again.
+  void Restart();
+
   /// After a frame was judged. `images`: CV_8UC1; empty: none from that camera. `skin_mm`: where the
   /// untouched skin has its markers, link frame, by marker.
   void Observe(const LinkState& state, const std::array<cv::Mat, kCameraCount>& images, const StereoRig& rig,
@@ -33,7 +36,8 @@ class CameraDiagnosis {
   MarkerDetector detector_;
   std::array<Detections, kCameraCount> spots_;
   std::optional<Reason> reason_;
-  int64_t next_ns_ = 0;  // exposure; 0: at once
+  int suspect_frames_ = 0;  // in a row
+  int64_t next_ns_ = 0;     // exposure; 0: at once
 };
 
 }  // namespace taclink

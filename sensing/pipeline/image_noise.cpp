@@ -13,14 +13,18 @@ constexpr int kRowStep = 32;
 constexpr double kNoiseDeviations = 4;  // a larger difference is an edge
 constexpr double kSigmaPerMedian = 1.4826;
 constexpr int kLeastNoisy = 200;  // pixels
-constexpr size_t kMostRestCorrelations = 64;
+constexpr size_t kMostRestCorrelations = 64, kLeastLearned = 3;
 // Live simulated images correlate by 0.0, compressed ones by 0.1 (JPEG quality 80) to 0.45 (50); an image
 // that is compressed again with another quality by 0.36 to 0.97, mostly above 0.8.
+// Where live images correlate by more than kMostUsual (temporal denoising, a fixed pattern, coarse
+// compression) the noise does not distinguish images, and only identical ones are recognised.
 constexpr double kUsual = 0.2, kMostUsual = 0.8;
 constexpr int64_t kRateNs = 1'000'000'000;
 constexpr int kLeastReturns = 3;  // new images after repeated ones; a camera that hangs has one at most
 
-bool IsSameImage(const cv::Mat& now, const cv::Mat& before) {
+}  // namespace
+
+bool AreIdentical(const cv::Mat& now, const cv::Mat& before) {
   if (now.empty() || now.size() != before.size()) return false;
   // Stops at the first pixel that differs: of a sensor with noise, one of the first. Images without light
   // need not have noise.
@@ -33,8 +37,6 @@ bool IsSameImage(const cv::Mat& now, const cv::Mat& before) {
   }
   return !is_uniform;
 }
-
-}  // namespace
 
 void NoiseSample::Take(const cv::Mat& gray) {
   differences_.clear();
@@ -84,7 +86,7 @@ void ImageRepetition::Miss() {
 }
 
 bool ImageRepetition::KeepsNoise() const {
-  if (judged_ < kJudged) return false;
+  if (judged_ < kJudged || !is_noise_random_) return false;
   std::array<double, kJudged> sorted = correlations_;
   std::ranges::nth_element(sorted, sorted.begin() + kJudged / 2);
   return sorted[kJudged / 2] > 0.5 * (1 + usual_);
@@ -95,17 +97,22 @@ void ImageRepetition::Learn(double correlation) {
     rest_correlations_.erase(rest_correlations_.begin());
   rest_correlations_.push_back(correlation);
   std::vector<double> sorted = rest_correlations_;
-  usual_ = std::clamp(Median(sorted), kUsual, kMostUsual);
+  const double median = Median(sorted);
+  is_noise_random_ = sorted.size() >= kLeastLearned && median <= kMostUsual;
+  usual_ = std::max(median, kUsual);
 }
 
 void ImageRepetition::Take(const cv::Mat& gray, const cv::Mat& before, int64_t exposure_ns, bool is_rest) {
   newest_ = 1 - newest_;
   samples_[newest_].Take(gray);
-  const bool is_same = IsSameImage(gray, before);
+  const bool is_same = AreIdentical(gray, before);
   ++taken_;
   const auto correlation = taken_ > 1 ? NoiseSample::Correlation(samples_[0], samples_[1]) : std::nullopt;
   if (correlation && is_rest && !is_same) Learn(*correlation);
-  if (correlation && !is_same) correlations_[judged_++ % kJudged] = *correlation;
+  if (!correlation)
+    judged_ = 0;
+  else if (!is_same)
+    correlations_[judged_++ % kJudged] = *correlation;
   is_repeated_ = is_same || KeepsNoise();
   shown_[shown_count_++ % kShown] = {exposure_ns, !is_repeated_};
 }

@@ -24,9 +24,9 @@ class NoiseSample {
   int most_ = 0;  // above: no noise, but an edge
 };
 
-/// Above this correlation two images have the noise of one sensor at one moment. Noise of two cameras is
-/// independent.
-inline constexpr double kOneSensorsNoise = 0.5;
+/// Whether two images are identical, pixel by pixel. Uniform ones are not: images without light need not have
+/// noise.
+bool AreIdentical(const cv::Mat& one, const cv::Mat& other);
 
 /// Whether a camera gives new images. One that hangs may give the last image again and again, with times and
 /// sequence numbers that go on, or compressed anew each time: then its noise stays. One thread.
@@ -36,7 +36,8 @@ class ImageRepetition {
 
   /// An image and the one before, when it was exposed (monotonic, ns), and whether it is one of the rest
   /// images, from which the camera's usual correlation of noise is learned: sensors have a fixed pattern, and
-  /// compression takes noise away.
+  /// compression takes noise away. Before some are learned, only identical images count as
+  /// repeated.
   void Take(const cv::Mat& gray, const cv::Mat& before, int64_t exposure_ns, bool is_rest);
   /// There was no image.
   void Miss();
@@ -66,7 +67,8 @@ class ImageRepetition {
   std::array<double, kJudged> correlations_{};  // of the last images, by turns
   size_t judged_ = 0;                           // all that were taken
   std::vector<double> rest_correlations_;
-  double usual_;  // correlation of live images
+  double usual_;                  // correlation of live images
+  bool is_noise_random_ = false;  // live images are known to correlate little
   std::array<Shown, kShown> shown_{};
   size_t shown_count_ = 0;
   bool is_repeated_ = false;

@@ -266,6 +266,7 @@ struct LinkPipeline::Stages {
     skin->SetBaseline(found.markers, loads, *estimator->UntouchedAt(loads.Loads()));
     keeper.Take(rest_origin, loads.Loads(), frame.times, clock);
     attitude.Restart();
+    diagnosis.Restart();
     predicted_mm.clear();
   }
 
@@ -409,9 +410,9 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
     stage_ms = s.MsSince(start);
   };
   timed(state.stage_ms.decode, [&] {
-    const ImageRepeats repeats = s.rest                          ? ImageRepeats::kAtRest
-                                 : s.options.pictures_may_repeat ? ImageRepeats::kAllowed
-                                                                 : ImageRepeats::kFault;
+    const ImageRepeats repeats = s.options.pictures_may_repeat ? ImageRepeats::kAllowed
+                                 : s.rest                      ? ImageRepeats::kAtRest
+                                                               : ImageRepeats::kFault;
     s.camera_pictures.Take(frame, s.CurrentRig(), repeats, state);
   });
   if (s.WaitsForRest(frame.times)) return s.SkipRest(state);

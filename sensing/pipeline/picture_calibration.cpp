@@ -14,6 +14,8 @@
 namespace taclink {
 namespace {
 
+// Of one image, saved twice; images of two cameras have independent noise.
+constexpr double kSameNoise = 0.9;
 constexpr const char* kRefused = "calibration refused: ";
 Error Refusal(const std::string& what) {
   return {ErrorCode::kInvalidArgument, kRefused + what};
@@ -58,12 +60,12 @@ Result<RestResult> Calibrate(const LinkModel& model, const std::vector<Detection
 
 // Exactly, or but for compression.
 bool ShowTheSame(const cv::Mat& top, const cv::Mat& bottom) {
-  if (top.size() == bottom.size() && cv::norm(top, bottom, cv::NORM_INF) == 0) return true;
+  if (AreIdentical(top, bottom)) return true;
   NoiseSample one, other;
   one.Take(top);
   other.Take(bottom);
   const auto correlation = NoiseSample::Correlation(one, other);
-  return correlation && *correlation > kOneSensorsNoise;
+  return correlation && *correlation > kSameNoise;
 }
 
 }  // namespace

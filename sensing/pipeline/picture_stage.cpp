@@ -45,11 +45,6 @@ std::optional<Reason> PictureStage::RateReason(CameraId id) const {
       rates->new_hz, rates->all_hz};
 }
 
-bool PictureStage::ShowTheSame() const {
-  const auto correlation = NoiseSample::Correlation(repetitions_[0].noise(), repetitions_[1].noise());
-  return correlation && *correlation > kOneSensorsNoise;
-}
-
 void PictureStage::Take(const StereoFrame& frame, const StereoRig& rig, ImageRepeats repeats,
                         LinkState& state) {
   trouble_.reset();
@@ -66,7 +61,7 @@ void PictureStage::Take(const StereoFrame& frame, const StereoRig& rig, ImageRep
     else if (trouble)
       trouble_ = trouble;
   }
-  if (repeats == ImageRepeats::kAllowed || !has_[0] || !has_[1] || !ShowTheSame()) return;
+  if (repeats == ImageRepeats::kAllowed || !has_[0] || !has_[1] || !AreIdentical(gray_[0], gray_[1])) return;
   has_ = {};
   trouble_ = Reason{ReasonId::kCamera,
                     "both cameras give the same image: one device stands for both, or one sends the other's; "

@@ -37,7 +37,6 @@ class PictureStage {
   std::optional<Reason> TroubleOf(CameraId id, const RawImage& image, const CameraModel& expected,
                                   ImageRepeats repeats, int64_t exposure_ns);
   std::optional<Reason> RateReason(CameraId id) const;
-  bool ShowTheSame() const;
 
   std::array<GrayDecoder, kCameraCount> decoders_;
   std::array<ImageRepetition, kCameraCount> repetitions_;

@@ -56,7 +56,7 @@ void ContactWatch::Tell(EventKind kind, Track& track, int64_t now_ns, std::vecto
                    .end_reason = {}}});
 }
 
-void ContactWatch::Follow(const Contact& contact, bool is_certain, int64_t now_ns, std::vector<Told>& told) {
+void ContactWatch::Match(const Contact& contact, int64_t now_ns) {
   Track& track = TrackOf(contact);
   track.current = contact.id;
   track.seen = true;
@@ -65,12 +65,15 @@ void ContactWatch::Follow(const Contact& contact, bool is_certain, int64_t now_n
   const double force_n = contact.force_n.norm();
   track.peak_n = std::max(track.peak_n, force_n);
   if (force_n >= options_.end_n) track.strong_ns = now_ns;
-  if (!track.begun && is_certain && force_n >= options_.begin_n) {
-    track.begun = true;
-    track.begin_ns = now_ns;
-    Tell(EventKind::kContactBegin, track, now_ns, told);
-  } else if (track.begun && UpdateIsDue(track, now_ns)) {
-    Tell(EventKind::kContactUpdate, track, now_ns, told);
+}
+
+void ContactWatch::EndThoseGone(int64_t now_ns, std::vector<Told>& told) {
+  for (Track& track : tracks_) {
+    if (!track.begun || now_ns - track.strong_ns < Ns(options_.release_s)) continue;
+    Tell(EventKind::kContactEnd, track, now_ns, told);
+    told.back().detail.duration_s = static_cast<double>(track.strong_ns - track.begin_ns) * 1e-9;
+    told.back().detail.end_reason = new_baseline_ ? "new baseline" : "released";
+    track.begun = track.seen = false;
   }
 }
 
@@ -84,16 +87,20 @@ void ContactWatch::Take(const LinkState& state, std::vector<Told>& told) {
   for (Track& track : tracks_) {
     track.seen = std::any_of(state.contacts.begin(), state.contacts.end(),
                              [&](const Contact& contact) { return contact.id == track.current; });
+    // A link that begins again numbers its contacts again: what comes back is known by its place alone.
+    if (!track.seen && !is_certain) track.current = 0;
   }
-  for (const Contact& contact : state.contacts) Follow(contact, is_certain, now_ns, told);
-  const char* const reason = new_baseline_ ? "new baseline" : "released";
+  for (const Contact& contact : state.contacts) Match(contact, now_ns);
+  // Ends come first: what begins in the same frame may have the number of one that ends.
+  if (is_certain) EndThoseGone(now_ns, told);
   for (Track& track : tracks_) {
-    if (!is_certain) break;
-    if (!track.begun || now_ns - track.strong_ns < Ns(options_.release_s)) continue;
-    Tell(EventKind::kContactEnd, track, now_ns, told);
-    told.back().detail.duration_s = static_cast<double>(track.strong_ns - track.begin_ns) * 1e-9;
-    told.back().detail.end_reason = reason;
-    track.begun = track.seen = false;
+    if (track.begun && track.seen && UpdateIsDue(track, now_ns)) {
+      Tell(EventKind::kContactUpdate, track, now_ns, told);
+    } else if (!track.begun && track.seen && is_certain && track.contact.force_n.norm() >= options_.begin_n) {
+      track.begun = true;
+      track.begin_ns = now_ns;
+      Tell(EventKind::kContactBegin, track, now_ns, told);
+    }
   }
   std::erase_if(tracks_, [](const Track& track) { return !track.begun && !track.seen; });
   new_baseline_ = new_baseline_ && !tracks_.empty();

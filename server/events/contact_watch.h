@@ -24,7 +24,7 @@ class ContactWatch {
  private:
   struct Track {
     uint64_t id = 0;       // that clients know
-    uint64_t current = 0;  // in the newest frame that had it
+    uint64_t current = 0;  // in the newest frame that had it; 0: known by its place alone
     bool begun = false;
     bool seen = false;  // in the frame in work
     int64_t begin_ns = 0, strong_ns = 0, told_ns = 0;
@@ -34,7 +34,8 @@ class ContactWatch {
   };
 
   Track& TrackOf(const Contact& contact);
-  void Follow(const Contact& contact, bool is_certain, int64_t now_ns, std::vector<Told>& told);
+  void Match(const Contact& contact, int64_t now_ns);
+  void EndThoseGone(int64_t now_ns, std::vector<Told>& told);
   void Tell(EventKind kind, Track& track, int64_t now_ns, std::vector<Told>& told) const;
   bool UpdateIsDue(const Track& track, int64_t now_ns) const;
 

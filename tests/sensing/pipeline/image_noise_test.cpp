@@ -74,7 +74,7 @@ TEST_F(ImageRepetitionTest, TheSameImageIsRepeatedAtOnce) {
 }
 
 // An encoder that keeps to a rate.
-TEST_F(ImageRepetitionTest, AnImageCompressedAnewIsRepeated) {
+TEST_F(ImageRepetitionTest, AReencodedImageIsRepeated) {
   ShowNew(10);
   const cv::Mat last = before_;
   for (int i = 0; i < 60; ++i) {
@@ -90,6 +90,22 @@ TEST_F(ImageRepetitionTest, LiveCompressedImagesAreNew) {
     Show(Compressed(Live(), 60 + i % 30));
     EXPECT_FALSE(repetition_.is_repeated()) << i;
   }
+}
+
+// A sensor whose noise is the same in every image.
+TEST_F(ImageRepetitionTest, WhereNoiseIsAPatternOnlyIdenticalImagesAreRepeated) {
+  ImageRepetition repetition;
+  const cv::Mat pattern = Live();
+  cv::Mat before;
+  for (int i = 0; i < 60; ++i) {
+    cv::Mat gray = pattern.clone();
+    gray.at<uchar>(i, i) = static_cast<uchar>(gray.at<uchar>(i, i) + 1);
+    repetition.Take(gray, before, i * kFrameNs, i < 10);
+    EXPECT_FALSE(repetition.is_repeated()) << i;
+    before = gray;
+  }
+  repetition.Take(before.clone(), before, 60 * kFrameNs, false);
+  EXPECT_TRUE(repetition.is_repeated());
 }
 
 TEST_F(ImageRepetitionTest, ASkinThatMovesIsNew) {

@@ -193,6 +193,7 @@ TEST_F(JointIntake, BadMessagesSayWhy) {
   EXPECT_THAT(Take({{"pitch"}, {0.1}, {}, 0, -5}), HasSubstr("no time"));
   EXPECT_THAT(Take({{"pitch"}, {kNan}, {}, 0, Now()}), HasSubstr("position nan"));
   EXPECT_THAT(Take({{"pitch"}, {0.1}, {}, 0, Now() + 3'000 * kMs}), HasSubstr("3.000 s ahead"));
+  EXPECT_THAT(Take({{"pitch"}, {0.1}, {}, 0, Now() + 21 * kMs}), HasSubstr("0.021 s ahead"));
   EXPECT_THAT(Take({{"pitch"}, {0.1}, {}, clock_.UtcNs() - 20'000 * kMs, 0}), HasSubstr("20.000 s behind"));
   EXPECT_THAT(Take({{"pitch"}, {0.1}, {}, std::numeric_limits<int64_t>::max(), 0}), HasSubstr("ahead"));
   EXPECT_EQ(intake_.counts().accepted, 0u);

@@ -189,7 +189,19 @@ TEST_F(LinkWatchTest, ContactsOfADoubtfulFrameNeitherBeginNorEnd) {
   }
   state_.status = LinkStatus::kOk;
   state_.reasons.clear();
-  EXPECT_THAT(Kinds(Frame({MakeContact(2, 0.3, 120)})), ElementsAre("contact_begin", "contact_end"));
+  EXPECT_THAT(Kinds(Frame({MakeContact(2, 0.3, 120)})), ElementsAre("contact_end", "contact_begin"));
+}
+
+// Its contacts are numbered from 1 again.
+TEST_F(LinkWatchTest, ContactsOfALinkThatBeganAgainAreOthers) {
+  Frame({MakeContact(1, 0.2, 20)});
+  for (int i = 0; i < 50; ++i) Frame({}, false);
+  const auto events = Frame({MakeContact(1, 0.3, 120)});
+  ASSERT_THAT(Kinds(events), ElementsAre("contact_end", "contact_begin"));
+  EXPECT_DOUBLE_EQ(ContactOf(events[0]).center_mm.z(), 20);
+  EXPECT_DOUBLE_EQ(ContactOf(events[1]).center_mm.z(), 120);
+  for (int i = 0; i < 50; ++i) Frame({}, false);
+  EXPECT_TRUE(Frame({MakeContact(7, 0.3, 120.5)}).empty()) << "it is where it was";
 }
 
 // A link without a pressure sensor is never ok, and yet touched.
