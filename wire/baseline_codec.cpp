@@ -54,13 +54,16 @@ void Fill(const Baseline& baseline, v1::Baseline& out) {
   out.set_taken_utc_ns(baseline.taken_utc_ns);
   out.set_drift_m(baseline.drift_mm * kMetresPerMm);
   out.set_drift_state(DriftToWire(baseline.drift_state));
+  out.clear_missing_markers();
+  for (const int marker : baseline.missing_markers) out.add_missing_markers(static_cast<uint32_t>(marker));
 }
 
 Baseline FromWire(const v1::Baseline& baseline) {
   return {.origin = OriginFromWire(baseline.origin()),
           .taken_utc_ns = baseline.taken_utc_ns(),
           .drift_mm = baseline.drift_m() / kMetresPerMm,
-          .drift_state = DriftFromWire(baseline.drift_state())};
+          .drift_state = DriftFromWire(baseline.drift_state()),
+          .missing_markers = {baseline.missing_markers().begin(), baseline.missing_markers().end()}};
 }
 
 }  // namespace taclink::wire

@@ -192,7 +192,7 @@ void FillReason(const Reason& reason, v1::StatusReason& out) {
   out.set_id(Name(reason.id));
   out.set_text(reason.text);
   out.set_reason(ToWire(reason.id));
-  const ReasonUnit unit = UnitOf(reason.id);
+  const ReasonUnit unit = TraitsOf(reason.id).unit;
   if (reason.value) out.set_value(*reason.value * SiPer(unit));
   if (reason.limit) out.set_limit(*reason.limit * SiPer(unit));
   out.set_unit(SiName(unit));
@@ -203,7 +203,7 @@ std::optional<Reason> ReasonFrom(const v1::StatusReason& message) {
   const auto id = ReasonNamed(message.id());
   if (!id) return std::nullopt;
   Reason reason{*id, message.text()};
-  const double per = SiPer(UnitOf(*id));
+  const double per = SiPer(TraitsOf(*id).unit);
   if (message.has_value()) reason.value = message.value() / per;
   if (message.has_limit()) reason.limit = message.limit() / per;
   return reason;
@@ -218,10 +218,15 @@ void FillCamera(const CameraCounts& counts, const CameraTracking& tracking, v1::
   out.set_searched(static_cast<uint32_t>(tracking.searched));
   out.set_found(static_cast<uint32_t>(tracking.found));
   out.set_dropped(static_cast<uint32_t>(tracking.dropped));
+  out.clear_contrast();
+  if (counts.contrast) out.set_contrast(static_cast<float>(*counts.contrast));
 }
 
 void ReadCamera(const v1::CameraCounts& camera, CameraCounts& counts, CameraTracking& tracking) {
-  counts = {static_cast<int>(camera.detections()), static_cast<int>(camera.labelled())};
+  counts = {.detections = static_cast<int>(camera.detections()),
+            .labelled = static_cast<int>(camera.labelled()),
+            .contrast = std::nullopt};
+  if (camera.has_contrast()) counts.contrast = static_cast<double>(camera.contrast());
   tracking = {.share_read = camera.share_read(),
               .verified = static_cast<int>(camera.verified()),
               .measured = static_cast<int>(camera.measured()),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 namespace taclink {
 
@@ -24,6 +25,9 @@ struct Baseline {
   int64_t taken_utc_ns = 0;  ///< exposure of its newest picture, since 1970-01-01; 0: there is none
   double drift_mm = 0;       ///< how far it has followed the skin since: of the marker that went furthest
   DriftState drift_state = DriftState::kOff;
+  /// Markers that neither camera showed when it was taken, by index, ascending: broken off, or hidden for
+  /// good.
+  std::vector<int> missing_markers = {};
 };
 
 struct TareOptions {

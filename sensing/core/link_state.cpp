@@ -1,106 +1,56 @@
 #include "sensing/core/link_state.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "sensing/core/link_state_fields.h"
 
 namespace taclink {
 
-const char* Name(ReasonId id) {
-  switch (id) {
-    case ReasonId::kFewMarkers:
-      return "few_markers";
-    case ReasonId::kCamera:
-      return "camera";
-    case ReasonId::kNotConverged:
-      return "not_converged";
-    case ReasonId::kImpossible:
-      return "impossible";
-    case ReasonId::kNoEquilibrium:
-      return "no_equilibrium";
-    case ReasonId::kPressureUnknown:
-      return "pressure_unknown";
-    case ReasonId::kPressureMismatch:
-      return "pressure_mismatch";
-    case ReasonId::kResidual:
-      return "residual";
-    case ReasonId::kLabels:
-      return "labels";
-    case ReasonId::kTooDeep:
-      return "too_deep";
-    case ReasonId::kBeyondMarkers:
-      return "beyond_markers";
-    case ReasonId::kEncircled:
-      return "encircled";
-    case ReasonId::kSparseMarkers:
-      return "sparse_markers";
-    case ReasonId::kUnsettled:
-      return "unsettled";
-    case ReasonId::kForceModel:
-      return "force_model";
-    case ReasonId::kFrozen:
-      return "frozen";
-    case ReasonId::kLate:
-      return "late";
-    case ReasonId::kCamerasDisagree:
-      return "cameras_disagree";
-    case ReasonId::kCamerasMoved:
-      return "cameras_moved";
-    case ReasonId::kDrift:
-      return "drift";
-    case ReasonId::kForcedBaseline:
-      return "forced_baseline";
-    case ReasonId::kAttitudeUnknown:
-      return "attitude_unknown";
-    case ReasonId::kAttitudeMismatch:
-      return "attitude_mismatch";
-    case ReasonId::kCamerasSwapped:
-      return "cameras_swapped";
-    case ReasonId::kFrameRate:
-      return "frame_rate";
-    case ReasonId::kNoFrames:
-      return "no_frames";
-    case ReasonId::kWorker:
-      return "worker";
-  }
-  return "unknown";
-}
+namespace {
 
-ReasonUnit UnitOf(ReasonId id) {
-  switch (id) {
-    case ReasonId::kLate:
-      return ReasonUnit::kSeconds;
-    case ReasonId::kFrameRate:
-      return ReasonUnit::kHertz;
-    case ReasonId::kPressureMismatch:
-      return ReasonUnit::kMegapascals;
-    case ReasonId::kAttitudeUnknown:
-    case ReasonId::kTooDeep:
-    case ReasonId::kSparseMarkers:
-    case ReasonId::kUnsettled:
-    case ReasonId::kForceModel:
-    case ReasonId::kCamerasMoved:
-    case ReasonId::kDrift:
-      return ReasonUnit::kMillimeters;
-    default:
-      return ReasonUnit::kNone;
-  }
-}
+// In the order of ReasonId.
+constexpr ReasonTraits kReasonTraits[] = {
+    {.name = "few_markers", .may_come_of_cameras = true},
+    {.name = "camera"},
+    {.name = "frozen"},
+    {.name = "late", .unit = ReasonUnit::kSeconds},
+    {.name = "cameras_disagree", .may_come_of_cameras = true, .may_come_of_baseline = true},
+    {.name = "not_converged", .may_come_of_cameras = true, .may_come_of_baseline = true},
+    {.name = "impossible", .may_come_of_cameras = true, .may_come_of_baseline = true},
+    {.name = "no_equilibrium"},
+    {.name = "pressure_unknown", .doubts_contacts = false},
+    {.name = "pressure_mismatch", .unit = ReasonUnit::kMegapascals, .may_come_of_baseline = true},
+    {.name = "residual", .may_come_of_cameras = true, .may_come_of_baseline = true},
+    {.name = "labels", .may_come_of_cameras = true, .may_come_of_baseline = true},
+    {.name = "too_deep", .unit = ReasonUnit::kMillimeters, .doubts_contacts = false},
+    {.name = "beyond_markers", .doubts_contacts = false},
+    {.name = "encircled", .doubts_contacts = false},
+    {.name = "sparse_markers", .unit = ReasonUnit::kMillimeters, .doubts_contacts = false},
+    {.name = "unsettled", .unit = ReasonUnit::kMillimeters},
+    {.name = "force_model", .unit = ReasonUnit::kMillimeters, .doubts_contacts = false},
+    {.name = "cameras_moved",
+     .unit = ReasonUnit::kMillimeters,
+     .may_come_of_cameras = true,
+     .may_come_of_baseline = true},
+    {.name = "drift", .unit = ReasonUnit::kMillimeters, .doubts_contacts = false},
+    {.name = "no_frames"},
+    {.name = "worker"},
+    {.name = "forced_baseline"},
+    {.name = "attitude_unknown", .unit = ReasonUnit::kMillimeters, .doubts_contacts = false},
+    {.name = "attitude_mismatch"},
+    {.name = "cameras_swapped"},
+    {.name = "frame_rate", .unit = ReasonUnit::kHertz},
+    {.name = "image_contrast", .doubts_contacts = false},
+};
+static_assert(std::size(kReasonTraits) == kReasonCount);
 
-bool DoubtsContacts(ReasonId id) {
-  switch (id) {
-    case ReasonId::kPressureUnknown:
-    case ReasonId::kAttitudeUnknown:
-    case ReasonId::kTooDeep:
-    case ReasonId::kBeyondMarkers:
-    case ReasonId::kEncircled:
-    case ReasonId::kSparseMarkers:
-    case ReasonId::kForceModel:
-    case ReasonId::kDrift:
-      return false;
-    default:
-      return true;
-  }
+}  // namespace
+
+const ReasonTraits& TraitsOf(ReasonId id) {
+  static constexpr ReasonTraits kUnknown;
+  const auto index = static_cast<size_t>(id);
+  return index < std::size(kReasonTraits) ? kReasonTraits[index] : kUnknown;
 }
 
 std::optional<ReasonId> ReasonNamed(std::string_view name) {
@@ -112,7 +62,8 @@ std::optional<ReasonId> ReasonNamed(std::string_view name) {
 
 bool AreContactsCertain(const LinkState& state) {
   return state.measured() && state.has_forces() &&
-         std::ranges::none_of(state.reasons, [](const Reason& reason) { return DoubtsContacts(reason.id); });
+         std::ranges::none_of(state.reasons,
+                              [](const Reason& reason) { return TraitsOf(reason.id).doubts_contacts; });
 }
 
 void LinkState::ClearMeasurement() {

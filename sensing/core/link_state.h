@@ -51,19 +51,31 @@ enum class ReasonId : uint8_t {
   kAttitudeMismatch,  ///< the measured specific force does not fit the skin's shape
   kCamerasSwapped,    ///< the top camera's images are those of the bottom camera, and the other way round
   kFrameRate,         ///< a camera gives fewer new images than the link gives frames
+  kImageContrast,     ///< markers stand out less in a camera's images than when the rest shape was taken
 };
-inline constexpr int kReasonCount = static_cast<int>(ReasonId::kFrameRate) + 1;
-const char* Name(ReasonId id);
-/// Whether contacts of a frame with this reason may be invented or missing. False: they are there, and what
-/// is in doubt is only how large or accurate their forces are.
-bool DoubtsContacts(ReasonId id);
+inline constexpr int kReasonCount = static_cast<int>(ReasonId::kImageContrast) + 1;
+
+/// What a reason's number is in. kNone: a number of markers, or a ratio.
+enum class ReasonUnit : uint8_t { kNone, kMillimeters, kMegapascals, kSeconds, kHertz };
+
+/// What is known of a reason whatever the frame.
+struct ReasonTraits {
+  const char* name = "unknown";
+  ReasonUnit unit = ReasonUnit::kNone;
+  /// Contacts of a frame with this reason may be invented or missing. False: they are there, and what is in
+  /// doubt is only how large or accurate their forces are.
+  bool doubts_contacts = true;
+  /// Cameras that are turned, exchanged, moved or altered look like this.
+  bool may_come_of_cameras = false;
+  /// A load that was there when the baseline was taken, and has gone, looks like this: the skin bulges.
+  bool may_come_of_baseline = false;
+};
+const ReasonTraits& TraitsOf(ReasonId id);
+inline const char* Name(ReasonId id) {
+  return TraitsOf(id).name;
+}
 /// None: another version's.
 std::optional<ReasonId> ReasonNamed(std::string_view name);
-
-/// What a reason's number is in.
-enum class ReasonUnit : uint8_t { kNone, kMillimeters, kMegapascals, kSeconds, kHertz };
-/// kNone: a number of markers, or a ratio.
-ReasonUnit UnitOf(ReasonId id);
 
 struct Reason {
   ReasonId id = ReasonId::kFewMarkers;
@@ -96,6 +108,9 @@ struct CameraCounts {
   int detections = 0;  ///< spots in the full picture; while tracked, those of labelled markers
   int labelled = 0;
   bool bad_picture = false;  ///< there was one, but it could not be decoded or has the wrong size
+  /// How much markers stand out from the skin, by how much they did when the rest shape was taken: 1 is as
+  /// then; median of the labelled ones. None: not known.
+  std::optional<double> contrast = {};
 };
 
 /// All that one frame told about one link. Immutable once published.

@@ -86,6 +86,13 @@ auto Fields(S& reading) {
                     Field{"trouble", trouble});
 }
 
+template <Is<Baseline> S>
+auto Fields(S& baseline) {
+  auto& [origin, taken_utc_ns, drift_mm, drift_state, missing_markers] = baseline;
+  return std::tuple(Field{"origin", origin}, Field{"taken_utc_ns", taken_utc_ns}, Field{"drift_mm", drift_mm},
+                    Field{"drift_state", drift_state}, Field{"missing_markers", missing_markers});
+}
+
 template <Is<LinkState> S>
 auto Fields(S& state) {
   auto& [sequence, times, status, status_reason, reasons, pressure_mpa, pressure, pressure_estimate,

@@ -489,13 +489,13 @@ void LoadEstimator::SetData(const Linearization& skin, const MarkerObservations&
 }
 
 void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
-                        const Eigen::VectorXd* untouched_norms, LoadEstimate& estimate) {
+                        const Eigen::VectorXd* untouched_norms, bool may_be_ring, LoadEstimate& estimate) {
   SetData(skin, observed);
   Hide(observed);
   trials_ = 0;
   for (int round = 0;; ++round) {
     estimate = {};
-    estimate.converged = FitColumnsAtHand(skin, untouched_norms) && trials_ < kMostTrials;
+    estimate.converged = FitColumnsAtHand(skin, untouched_norms, may_be_ring) && trials_ < kMostTrials;
     estimate.trials = trials_;
     if (!estimate.converged) {
       fit_.hills.clear();
@@ -507,7 +507,8 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
 }
 
 // False: a solver did not come to its end.
-bool LoadEstimator::FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd* untouched_norms) {
+bool LoadEstimator::FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd* untouched_norms,
+                                     bool may_be_ring) {
   fit_.hills.clear();
   fit_.slipping.clear();
   fit_.tangential.resize(data_.size(), 0);
@@ -518,7 +519,7 @@ bool LoadEstimator::FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd*
     std::vector<Hill> found = Select(skin, untouched_norms);
     if (!is_selected_ || found.size() > kMostHills) return false;
     Eliminate(found);
-    JoinHugs(found);
+    if (may_be_ring) JoinHugs(found);
     if (found.empty() && stage > 0) {
       // Bodies that hardly press, but drag: what is left beside their pull does not tell where they are.
       loads_ = loads_before;

@@ -89,9 +89,10 @@ class LoadEstimator {
 
   /// After Prepare. The linearization may have been rebased. Covariances and what is left unexplained are not
   /// written. `untouched_norms`: FreeNorms() of the skin without loads, shown the same observations, which
-  /// stand for the norms of columns that are not made; null where all are.
+  /// stand for the norms of columns that are not made; null where all are. `may_be_ring`: several contacts
+  /// all around may be taken for one ring contact.
   void Fit(Linearization& skin, const MarkerObservations& observed, const Eigen::VectorXd* untouched_norms,
-           LoadEstimate& estimate);
+           bool may_be_ring, LoadEstimate& estimate);
   /// Writes these for what was fitted last.
   void Conclude(Linearization& skin, LoadEstimate& estimate);
 
@@ -176,7 +177,7 @@ class LoadEstimator {
   Explanation Explain(const std::vector<Hill>& hills, size_t without);
 
   void SetData(const Linearization& skin, const MarkerObservations& observed);
-  bool FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd* untouched_norms);
+  bool FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd* untouched_norms, bool may_be_ring);
   struct Solution {
     Eigen::VectorXd loads, tangential, residual;
     double chi2 = 0;

@@ -252,7 +252,8 @@ void LoadEstimator::WriteRegions() {
 }
 
 // Mahalanobis' distance of the residual over 3 x 3 markers, per number, the largest; of regions that are
-// mostly seen.
+// mostly seen. A shape that is wrong is so at several markers: the one that contributes most counts as no
+// more than twice the second, for it may be measured wrong alone.
 double LoadEstimator::WorstRegion(const Eigen::VectorXd& by_cameras_mm) {
   const Eigen::VectorXf left_mm = (whitening_.Covariance(pulls_per_mm_) - by_cameras_mm).cast<float>();
   double worst = 0;
@@ -261,7 +262,14 @@ double LoadEstimator::WorstRegion(const Eigen::VectorXd& by_cameras_mm) {
     for (const int row : region.rows) shown += is_shown_[static_cast<size_t>(row)];
     if (shown < static_cast<int>(region.rows.size()) / 3) continue;
     const Eigen::VectorXf part = region.factor.matrixL().solve(left_mm(region.rows));
-    worst = std::max(worst, static_cast<double>(part.squaredNorm()) / shown);
+    double most = 0, second = 0;
+    for (Eigen::Index row = 0; row < part.size(); row += 3) {
+      const double square = part.segment<3>(row).squaredNorm();
+      second = std::max(second, std::min(square, most));
+      most = std::max(most, square);
+    }
+    worst = std::max(worst,
+                     (static_cast<double>(part.squaredNorm()) - most + std::min(most, 2 * second)) / shown);
   }
   return worst;
 }

@@ -21,7 +21,8 @@ constexpr double kAheadShare = 0.75;     // of a tangent's reach: so far ahead o
 constexpr double kModelPressureShare = 0.01;  // of the pressure: what the model's inflation is wrong by
 constexpr double kLeastPressureSigma =
     1e-3;  // of the steps in which the skin is inflated: a prior is no certainty
-constexpr int kMostSteps = 8, kMostTangents = 3;
+constexpr int kMostSteps = 16, kMostTangents = 5;
+constexpr double kLeastStepMm = 0.3;
 constexpr int kStepsOfTangent = 3;  // the least: a new one is a disturbance where a skin may buckle
 constexpr double kShrinks = 0.5;    // steps by less: the tangent is too old
 // Between the last two steps, of the loads in any neighborhood by the largest, and of a seen marker: settled.
@@ -44,6 +45,34 @@ void Extrapolate(const ShellState& before, double times, ShellState& state) {
     tangent = (tangent - tangent.dot(director) * director).normalized();
   }
 }
+
+// Steps that do not shrink go past their end, where a skin is about to buckle; and where one ring contact and
+// several explain it alike, each step may choose the other. Then steps are halved, and stay with the
+// contacts.
+class StepDamping {
+ public:
+  StepDamping(double longest_mm, double least_mm)
+      : most_mm_(longest_mm), least_mm_(least_mm), longest_mm_(longest_mm) {}
+
+  /// A step, before it was shortened, and whether its loads include a ring contact.
+  void Observe(double step_mm, bool has_ring) {
+    changes_ += is_begun_ && has_ring != had_ring_ ? 1 : 0;
+    longest_mm_ = is_begun_ && step_mm > before_mm_
+                      ? std::clamp(std::min(step_mm, longest_mm_) / 2, least_mm_, most_mm_)
+                      : std::min(2 * longest_mm_, most_mm_);
+    before_mm_ = step_mm;
+    had_ring_ = has_ring;
+    is_begun_ = true;
+  }
+  double longest_mm() const { return longest_mm_; }
+  bool may_be_ring() const { return changes_ < 2; }
+
+ private:
+  const double most_mm_, least_mm_;
+  double longest_mm_, before_mm_ = 0;
+  int changes_ = 0;
+  bool is_begun_ = false, had_ring_ = false;
+};
 
 }  // namespace
 
@@ -165,23 +194,28 @@ void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& es
   frames_since_begun_ = 1;
 }
 
-bool SkinEstimator::StepOnce(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate,
-                             double& step_mm) {
-  return tangent.skin.Rebase(estimate.state, problem.loads) && Step(tangent, problem, estimate, step_mm);
+SkinEstimator::StepLimits SkinEstimator::UsualLimits() const {
+  return {.longest_mm = IsFirstOrder() ? kUnlimitedMm : kLongestStepMm * mechanics_.length_unit()};
 }
 
-// From where the tangent was rebased last.
-bool SkinEstimator::Step(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate,
-                         double& step_mm) {
+bool SkinEstimator::StepOnce(Tangent& tangent, const SkinProblem& problem, const StepLimits& limits,
+                             SkinEstimate& estimate, double& step_mm) {
+  return tangent.skin.Rebase(estimate.state, problem.loads) &&
+         Step(tangent, problem, limits, estimate, step_mm);
+}
+
+// From where the tangent was rebased last. `step_mm`: before it is shortened.
+bool SkinEstimator::Step(Tangent& tangent, const SkinProblem& problem, const StepLimits& limits,
+                         SkinEstimate& estimate, double& step_mm) {
   used_ = &tangent;
   ++estimate.work.steps;
   tangent.loads.Fit(tangent.skin, problem.observed,
-                    &tangent == still_.get() ? nullptr : &still_->loads.FreeNorms(), estimate.loads);
+                    &tangent == still_.get() ? nullptr : &still_->loads.FreeNorms(), limits.may_be_ring,
+                    estimate.loads);
   estimate.work.trials += estimate.loads.trials;
   if (!estimate.loads.converged) return false;
-  const double longest_mm = IsFirstOrder() ? kUnlimitedMm : kLongestStepMm * mechanics_.length_unit();
-  step_mm =
-      tangent.skin.Step(estimate.loads.at_sites, estimate.loads.known_error, longest_mm, estimate.state);
+  step_mm = tangent.skin.Step(estimate.loads.at_sites, estimate.loads.known_error, limits.longest_mm,
+                              estimate.state);
   return std::isfinite(step_mm);
 }
 
@@ -198,7 +232,7 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const SkinProblem& problem, Ski
   }
   estimate.state = about;
   double step_mm = 0;
-  if (!StepOnce(tangent, problem, estimate, step_mm)) return false;
+  if (!StepOnce(tangent, problem, UsualLimits(), estimate, step_mm)) return false;
   estimate.model = linear ? ForceModel::kLinear : ForceModel::kPressurised;
   if (IsFirstOrder()) {
     estimate.first_order_mm = LongestOff(estimate.state.mids_mm, about.mids_mm);
@@ -229,10 +263,13 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
   if (is_remade && !Remake(*touched_, problem, estimate.state, local_n, estimate)) return false;
   double before_mm = 1e9, step_mm = 0;
   bool is_seen_settled = false;
+  StepDamping damping(UsualLimits().longest_mm, kLeastStepMm * unit);
   const int most_tangents = estimate.work.tangents + kMostTangents - (is_remade ? 1 : 0);
   for (int step = 0; step < kMostSteps; ++step) {
     if (IsSpent(estimate)) return false;
-    if (!StepOnce(*touched_, problem, estimate, step_mm)) return false;
+    const StepLimits limits{.longest_mm = damping.longest_mm(), .may_be_ring = damping.may_be_ring()};
+    if (!StepOnce(*touched_, problem, limits, estimate, step_mm)) return false;
+    damping.Observe(step_mm, std::ranges::any_of(estimate.loads.loads, &EstimatedLoad::is_ring_contact));
     const Eigen::VectorXd local_before_n = local_n;
     local_n = touched_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
     is_seen_settled = SeenMotion(estimate.state, problem.observed) < kSeenSettledMm * unit &&

@@ -120,8 +120,15 @@ class SkinEstimator {
   bool IsSpent(const SkinEstimate& estimate) const { return estimate.work.Units() > options_.most_work; }
   void TakeNext(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n);
   void MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate, const Eigen::VectorXd& local_n);
-  bool StepOnce(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate, double& step_mm);
-  bool Step(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate, double& step_mm);
+  struct StepLimits {
+    double longest_mm = 0;  // a longer step is shortened to it
+    bool may_be_ring = true;
+  };
+  StepLimits UsualLimits() const;
+  bool StepOnce(Tangent& tangent, const SkinProblem& problem, const StepLimits& limits,
+                SkinEstimate& estimate, double& step_mm);
+  bool Step(Tangent& tangent, const SkinProblem& problem, const StepLimits& limits, SkinEstimate& estimate,
+            double& step_mm);
   bool SolveSmall(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate);
   bool SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
   SkinProblem MakeProblem(const SkinObservation& observation, const UntouchedSkin& untouched,

@@ -157,7 +157,7 @@ bool SkinEstimator::SolveStanding(const SkinProblem& problem, SkinEstimate& esti
   used_->skin.SetKnownLoads(problem.loads);
   estimate.model = solved_->model;
   double step_mm = 0;
-  if (!Step(*used_, problem, estimate, step_mm)) return false;
+  if (!Step(*used_, problem, UsualLimits(), estimate, step_mm)) return false;
   const std::vector<Vec3>&mids = estimate.state.mids_mm, &last = past_.last.mids_mm;
   const double most_mm = kStillReachMm * mechanics_.length_unit();
   return std::equal(mids.begin(), mids.end(), last.begin(), last.end(),

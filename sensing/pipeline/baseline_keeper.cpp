@@ -24,6 +24,18 @@ int64_t MonotonicNs(const FrameTimes& times, const Clock& clock) {
   return times.exposure_monotonic_ns != 0 ? times.exposure_monotonic_ns : clock.MonotonicNs();
 }
 
+std::vector<int> MissingFrom(const LabelledMarkers& markers, int count) {
+  std::vector<int> missing;
+  for (int m = 0; m < count; ++m) {
+    const auto marker = static_cast<size_t>(m);
+    if (std::ranges::none_of(markers.cameras, [marker](const std::vector<MarkerObservation>& camera) {
+          return marker < camera.size() && camera[marker].seen;
+        }))
+      missing.push_back(m);
+  }
+  return missing;
+}
+
 }  // namespace
 
 BaselineKeeper::BaselineKeeper(const LinkModel& model, const std::optional<DriftOptions>& drift)
@@ -31,10 +43,11 @@ BaselineKeeper::BaselineKeeper(const LinkModel& model, const std::optional<Drift
   off_mm_.reserve(static_cast<size_t>(model.markers.count()));
 }
 
-void BaselineKeeper::Take(BaselineOrigin origin, const KnownLoads& loads, const FrameTimes& times,
-                          const Clock& clock) {
+void BaselineKeeper::Take(BaselineOrigin origin, const LabelledMarkers& markers, const KnownLoads& loads,
+                          const FrameTimes& times, const Clock& clock) {
   baseline_ = {.origin = origin,
-               .taken_utc_ns = times.exposure_utc_ns != 0 ? times.exposure_utc_ns : clock.UtcNs()};
+               .taken_utc_ns = times.exposure_utc_ns != 0 ? times.exposure_utc_ns : clock.UtcNs(),
+               .missing_markers = MissingFrom(markers, model_.markers.count())};
   taken_ns_ = MonotonicNs(times, clock);
   loads_ = loads;
   follower_.Reset();
@@ -126,8 +139,8 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
     const MeasuredLoads loads = tare_->loads();
     const auto untouched = estimator.UntouchedAt(loads.Loads());
     skin.Tare(tare_->markers(), loads, untouched.value_or(estimator.estimate().baseline_mm));
-    Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare, loads.Loads(),
-         times, clock);
+    Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare,
+         tare_->markers(), loads.Loads(), times, clock);
   }
   tare_.reset();
 }

@@ -25,9 +25,10 @@ class BaselineKeeper {
  public:
   BaselineKeeper(const LinkModel& model, const std::optional<DriftOptions>& drift);
 
-  /// A baseline was taken, under this gauge pressure, the newest of its frames at `times`. Times are those of
-  /// frames, so that pictures solved again later tell the same; the clock's for frames without.
-  void Take(BaselineOrigin origin, const KnownLoads& loads, const FrameTimes& times, const Clock& clock);
+  /// A baseline was taken from these markers, under these loads, the newest of its frames at `times`. Times
+  /// are those of frames, so that pictures solved again later tell the same; the clock's for frames without.
+  void Take(BaselineOrigin origin, const LabelledMarkers& markers, const KnownLoads& loads,
+            const FrameTimes& times, const Clock& clock);
   /// How far the untouched skin has gone since, by marker; empty: that is not followed.
   std::span<const Vec3> DriftMm() const { return drift_ ? follower_.drift_mm() : std::span<const Vec3>(); }
 

@@ -11,21 +11,6 @@ constexpr int64_t kPauseNs = 500'000'000;
 constexpr int kLeastFrames = 3;  // a single bad image has no cause that lasts
 constexpr int kMostSpots = 3;    // for each marker; more are clutter, and take long
 
-bool MayComeOfCameras(ReasonId id) {
-  switch (id) {
-    case ReasonId::kFewMarkers:
-    case ReasonId::kCamerasDisagree:
-    case ReasonId::kCamerasMoved:
-    case ReasonId::kNotConverged:
-    case ReasonId::kImpossible:
-    case ReasonId::kResidual:
-    case ReasonId::kLabels:
-      return true;
-    default:
-      return false;
-  }
-}
-
 }  // namespace
 
 void CameraDiagnosis::Restart() {
@@ -36,9 +21,9 @@ void CameraDiagnosis::Restart() {
 
 void CameraDiagnosis::Observe(const LinkState& state, const std::array<cv::Mat, kCameraCount>& images,
                               const StereoRig& rig, std::span<const Vec3> skin_mm) {
-  // Its own reason is no evidence.
+  // Its own reason confirms nothing.
   const auto may_come = [&](const Reason& reason) {
-    return MayComeOfCameras(reason.id) && !(reason_ && reason.text == reason_->text);
+    return TraitsOf(reason.id).may_come_of_cameras && !(reason_ && reason.text == reason_->text);
   };
   suspect_frames_ = std::ranges::any_of(state.reasons, may_come) ? suspect_frames_ + 1 : 0;
   // A reason stands until a later look does not find it.

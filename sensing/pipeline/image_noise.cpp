@@ -1,8 +1,10 @@
 #include "sensing/pipeline/image_noise.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 
 #include "sensing/core/median.h"
 
@@ -21,6 +23,29 @@ constexpr size_t kMostRestCorrelations = 64, kLeastLearned = 3;
 constexpr double kUsual = 0.2, kMostUsual = 0.8;
 constexpr int64_t kRateNs = 1'000'000'000;
 constexpr int kLeastReturns = 3;  // new images after repeated ones; a camera that hangs has one at most
+
+// Of all pixels, eight at a time; 0: an image of one brightness, which need not have noise.
+uint64_t HashOf(const cv::Mat& gray) {
+  constexpr uint64_t kPrime = 0x9E3779B97F4A7C15U;
+  uint64_t hash = kPrime;
+  bool is_uniform = true;
+  for (int row = 0; row < gray.rows; ++row) {
+    const uchar* pixels = gray.ptr(row);
+    const uint64_t first = 0x0101010101010101U * gray.at<uchar>(0, 0);
+    int column = 0;
+    for (; column + 8 <= gray.cols; column += 8) {
+      uint64_t word = 0;
+      std::memcpy(&word, pixels + column, sizeof word);
+      is_uniform = is_uniform && word == first;
+      hash = std::rotl((hash ^ word) * kPrime, 29);
+    }
+    for (; column < gray.cols; ++column) {
+      is_uniform = is_uniform && pixels[column] == gray.at<uchar>(0, 0);
+      hash = std::rotl((hash ^ pixels[column]) * kPrime, 29);
+    }
+  }
+  return is_uniform ? 0 : std::max<uint64_t>(hash, 1);
+}
 
 }  // namespace
 
@@ -79,6 +104,13 @@ ImageRepetition::ImageRepetition() : usual_(kUsual) {
   rest_correlations_.reserve(kMostRestCorrelations);
 }
 
+// Images without noise, of a test pattern, may come again.
+bool ImageRepetition::WasShown(uint64_t hash) const {
+  if (hash == 0 || hashed_ == 0) return false;
+  return is_noise_random_ ? std::ranges::find(hashes_, hash) != hashes_.end()
+                          : hash == hashes_[(hashed_ - 1) % kRemembered];
+}
+
 void ImageRepetition::Miss() {
   taken_ = 0;
   judged_ = 0;
@@ -102,10 +134,12 @@ void ImageRepetition::Learn(double correlation) {
   usual_ = std::max(median, kUsual);
 }
 
-void ImageRepetition::Take(const cv::Mat& gray, const cv::Mat& before, int64_t exposure_ns, bool is_rest) {
+void ImageRepetition::Take(const cv::Mat& gray, int64_t exposure_ns, bool is_rest) {
   newest_ = 1 - newest_;
   samples_[newest_].Take(gray);
-  const bool is_same = AreIdentical(gray, before);
+  const uint64_t hash = HashOf(gray);
+  const bool is_same = WasShown(hash);
+  hashes_[hashed_++ % kRemembered] = hash;
   ++taken_;
   const auto correlation = taken_ > 1 ? NoiseSample::Correlation(samples_[0], samples_[1]) : std::nullopt;
   if (correlation && is_rest && !is_same) Learn(*correlation);

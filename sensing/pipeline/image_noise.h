@@ -29,20 +29,21 @@ class NoiseSample {
 bool AreIdentical(const cv::Mat& one, const cv::Mat& other);
 
 /// Whether a camera gives new images. One that hangs may give the last image again and again, with times and
-/// sequence numbers that go on, or compressed anew each time: then its noise stays. One thread.
+/// sequence numbers that go on, or encoded again each time: then its noise stays. A driver may also send its
+/// buffers by turns without filling them: then an image is identical to one of the last kRemembered. One
+/// thread.
 class ImageRepetition {
  public:
   ImageRepetition();
 
-  /// An image and the one before, when it was exposed (monotonic, ns), and whether it is one of the rest
-  /// images, from which the camera's usual correlation of noise is learned: sensors have a fixed pattern, and
-  /// compression takes noise away. Before some are learned, only identical images count as
-  /// repeated.
-  void Take(const cv::Mat& gray, const cv::Mat& before, int64_t exposure_ns, bool is_rest);
+  /// An image, when it was exposed (monotonic, ns), and whether it is one of the rest images, from which the
+  /// camera's usual correlation of noise is learned: sensors have a fixed pattern, and compression takes
+  /// noise away. Before some are learned, only identical images count as repeated.
+  void Take(const cv::Mat& gray, int64_t exposure_ns, bool is_rest);
   /// There was no image.
   void Miss();
 
-  /// The last image is the one before.
+  /// The last image is not new.
   bool is_repeated() const { return is_repeated_; }
   struct Rates {
     double new_hz = 0, all_hz = 0;
@@ -53,10 +54,11 @@ class ImageRepetition {
   const NoiseSample& noise() const { return samples_[newest_]; }
 
  private:
+  bool WasShown(uint64_t hash) const;
   bool KeepsNoise() const;
   void Learn(double correlation);
 
-  static constexpr size_t kShown = 64, kJudged = 7;
+  static constexpr size_t kShown = 64, kJudged = 7, kRemembered = 64;
   struct Shown {
     int64_t exposure_ns = 0;
     bool is_new = true;
@@ -66,6 +68,8 @@ class ImageRepetition {
   int taken_ = 0;                               // samples in a row
   std::array<double, kJudged> correlations_{};  // of the last images, by turns
   size_t judged_ = 0;                           // all that were taken
+  std::array<uint64_t, kRemembered> hashes_{};  // of the last images, by turns; 0: none, or of one brightness
+  size_t hashed_ = 0;                           // all that were taken
   std::vector<double> rest_correlations_;
   double usual_;                  // correlation of live images
   bool is_noise_random_ = false;  // live images are known to correlate little

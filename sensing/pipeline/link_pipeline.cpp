@@ -14,6 +14,7 @@
 #include "sensing/pipeline/baseline_keeper.h"
 #include "sensing/pipeline/camera_diagnosis.h"
 #include "sensing/pipeline/camera_motion.h"
+#include "sensing/pipeline/image_contrast.h"
 #include "sensing/pipeline/judge.h"
 #include "sensing/pipeline/mean_loads.h"
 #include "sensing/pipeline/picture_stage.h"
@@ -75,6 +76,7 @@ struct LinkPipeline::Stages {
   Clock& clock;
 
   PictureStage camera_pictures;
+  std::array<ImageContrast, kCameraCount> contrasts;
   MarkerDetector detector;
   std::array<Detections, kCameraCount> detections;
   std::optional<RestPose> rest;  // while rest pairs are taken
@@ -184,7 +186,10 @@ struct LinkPipeline::Stages {
     state.ClearMeasurement();
     state.baseline = {};
     state.baseline_age_s = 0;
-    for (CameraCounts& camera : state.cameras) camera.labelled = 0;
+    for (CameraCounts& camera : state.cameras) {
+      camera.labelled = 0;
+      camera.contrast.reset();
+    }
   }
 
   void SkipRest(LinkState& state) {
@@ -264,7 +269,8 @@ struct LinkPipeline::Stages {
     // Whatever it is, it stays, and is no difference to any frame.
     if (NeverMoves(frame)) loads.specific_force_covariance.setZero();
     skin->SetBaseline(found.markers, loads, *estimator->UntouchedAt(loads.Loads()));
-    keeper.Take(rest_origin, loads.Loads(), frame.times, clock);
+    for (size_t i = 0; i < kCameraCount; ++i) contrasts[i].SetRest(pictures[i], found.markers.cameras[i]);
+    keeper.Take(rest_origin, found.markers, loads.Loads(), frame.times, clock);
     attitude.Restart();
     diagnosis.Restart();
     predicted_mm.clear();
@@ -317,6 +323,7 @@ struct LinkPipeline::Stages {
       CameraCounts& counts = state.cameras[Index(id)];
       counts.labelled = tracker->seen(id);
       if (reason == AcquireReason::kNone) counts.detections = counts.labelled;
+      counts.contrast = contrasts[Index(id)].Of(pictures[Index(id)], labels.cameras[Index(id)]);
     }
   }
 };

@@ -1,7 +1,6 @@
 #include "sensing/pipeline/picture_stage.h"
 
 #include <string>
-#include <utility>
 
 #include "sensing/pipeline/reason_text.h"
 
@@ -13,9 +12,8 @@ std::optional<Reason> PictureStage::TroubleOf(CameraId id, const RawImage& image
   if (!image.valid)
     return Reason{ReasonId::kCamera, "no picture from the " + camera +
                                          (image.why_missing.empty() ? "" : ": " + image.why_missing)};
-  if (auto decoded = decoders_[i].Decode(image, before_[i]); !decoded)
+  if (auto decoded = decoders_[i].Decode(image, gray_[i]); !decoded)
     return Reason{ReasonId::kCamera, camera + ": " + decoded.error().message};
-  std::swap(gray_[i], before_[i]);
   const cv::Mat& gray = gray_[i];
   if (gray.cols != expected.width_px || gray.rows != expected.height_px)
     return Reason{ReasonId::kCamera, camera + ": the picture is " + std::to_string(gray.cols) + "x" +
@@ -23,13 +21,14 @@ std::optional<Reason> PictureStage::TroubleOf(CameraId id, const RawImage& image
                                          std::to_string(expected.width_px) + "x" +
                                          std::to_string(expected.height_px)};
   if (repeats == ImageRepeats::kAllowed) return std::nullopt;
-  repetitions_[i].Take(gray, before_[i], exposure_ns, repeats == ImageRepeats::kAtRest);
+  repetitions_[i].Take(gray, exposure_ns, repeats == ImageRepeats::kAtRest);
   if (repeats == ImageRepeats::kFault && repetitions_[i].is_repeated()) {
     if (auto rate = RateReason(id)) return rate;
-    return Reason{ReasonId::kFrozen,
-                  camera +
-                      ": the picture has the noise of the one before, which a sensor's noise never repeats: "
-                      "the camera hangs; plug it in again"};
+    return Reason{
+        ReasonId::kFrozen,
+        camera +
+            ": the image, or its noise, is that of an image before, which a sensor never repeats: the "
+            "camera or its driver hangs; plug it in again"};
   }
   return std::nullopt;
 }

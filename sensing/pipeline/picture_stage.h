@@ -40,7 +40,7 @@ class PictureStage {
 
   std::array<GrayDecoder, kCameraCount> decoders_;
   std::array<ImageRepetition, kCameraCount> repetitions_;
-  std::array<cv::Mat, kCameraCount> gray_, before_;
+  std::array<cv::Mat, kCameraCount> gray_;
   std::array<bool, kCameraCount> has_{};
   std::optional<Reason> trouble_, warning_;
 };

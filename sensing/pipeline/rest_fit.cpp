@@ -55,6 +55,17 @@ DetectionPair Steady(const std::vector<DetectionPair>& pairs) {
   return steady;
 }
 
+// Labels that are missing, of spots that are no other marker's.
+void FillIn(const std::vector<MarkerObservation>& others, std::vector<MarkerObservation>& labels) {
+  for (size_t m = 0; m < std::min(labels.size(), others.size()); ++m) {
+    if (labels[m].seen || !others[m].seen) continue;
+    if (std::ranges::none_of(labels, [&](const MarkerObservation& label) {
+          return label.seen && label.center_px == others[m].center_px;
+        }))
+      labels[m] = others[m];
+  }
+}
+
 double NoiseOf(const MarkerMean& mean, double rms_px) {
   return mean.variances_px2().empty() ? rms_px : mean.noise_px();
 }
@@ -149,21 +160,26 @@ Result<RestFit::FoundCameras> RestFit::FindCameras(const RestShape& shape) const
   return found;
 }
 
-// `first`: labels of the first pair, which of a single pair are better than the tracker's, for spots that
-// were found by looking again are among them; null: the tracker's.
-Result<MarkerMean> RestFit::Mean(const StereoRig& rig,
-                                 const std::array<RestMatch, kCameraCount>* first) const {
+// `is_fitted`: the cameras explain these very pairs, so that spots are told by where they should be. Known
+// cameras may have moved, and something may touch the skin: then spots are told by their order along the
+// paths, and only what that leaves open, as beside a marker that is missing, by where they should be.
+Result<MarkerMean> RestFit::Mean(const RestShape& shape, const StereoRig& rig, bool is_fitted) const {
   PathTracker tracker(model_, rig);
   MarkerMean mean(model_.markers.count());
   LabelledMarkers labels;
-  for (const CameraId id : kBothCameras)
-    if (first != nullptr) labels.cameras[Index(id)] = (*first)[Index(id)].markers;
   for (const DetectionPair& pair : pairs_.detections) {
-    if (first == nullptr || pairs_.detections.size() > 1) tracker.Label(pair, labels);
+    if (!is_fitted) tracker.Label(pair, labels);
     std::array<int, kCameraCount> seen{};
-    for (size_t c = 0; c < kCameraCount; ++c)
-      seen[c] = static_cast<int>(std::count_if(labels.cameras[c].begin(), labels.cameras[c].end(),
-                                               [](const MarkerObservation& one) { return one.seen; }));
+    for (const CameraId id : kBothCameras) {
+      std::vector<MarkerObservation>& of_camera = labels.cameras[Index(id)];
+      RestMatch match = MatchRestPicture(shape, rig[id], pair[Index(id)], options_.domes, is_fitted);
+      if (is_fitted)
+        of_camera = std::move(match.markers);
+      else
+        FillIn(match.markers, of_camera);
+      seen[Index(id)] =
+          static_cast<int>(std::ranges::count_if(of_camera, [](const auto& marker) { return marker.seen; }));
+    }
     if (const auto enough = CheckMarkerCount(model_, seen); !enough) return enough.error();
     mean.Add(labels);
   }
@@ -173,15 +189,15 @@ Result<MarkerMean> RestFit::Mean(const StereoRig& rig,
 }
 
 Result<RestResult> RestFit::ExplainByRig(const StereoRig& rig, const MeasuredLoads& loads) const {
-  const auto mean = Mean(rig, nullptr);
+  auto shape = ShapeAt(loads);
+  if (!shape) return shape.error();
+  const auto mean = Mean(*shape, rig, false);
   if (!mean) return mean.error();
   const double most_dent_mm = options_.max_dent_mm * LengthUnit(model_);
   const auto touched = [&](const Dent& dent) {
     return Error{ErrorCode::kFailedPrecondition,
                  Describe(model_, dent) + "; if nothing is there, a camera has moved: calibrate again"};
   };
-  auto shape = ShapeAt(loads);
-  if (!shape) return shape.error();
   RestResult result{.calibration = {}, .markers = mean->markers(), .loads = loads};
   CalibrationSummary seen = ResidualsOf(*shape, rig, mean->markers());
   const auto dent = FindDent(*shape, seen, most_dent_mm);
@@ -206,7 +222,7 @@ Result<RestResult> RestFit::CalibrateAt(const RestShape& shape, const MeasuredLo
                                         const CalibrationOptions& options) const {
   const auto found = FindCameras(shape);
   if (!found) return found.error();
-  const auto mean = Mean(found->rig, &found->matches);
+  const auto mean = Mean(shape, found->rig, true);
   if (!mean) return mean.error();
   auto calibrated = CalibrateFromRest(shape, mean->markers(), options);
   if (!calibrated) return calibrated.error();

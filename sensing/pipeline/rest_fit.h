@@ -58,7 +58,7 @@ class RestFit {
   std::string CameraTrouble(const Result<RestResult>& result, const MeasuredLoads& loads) const;
   Result<RestShape> ShapeAt(const MeasuredLoads& loads) const;
   Result<FoundCameras> FindCameras(const RestShape& shape) const;
-  Result<MarkerMean> Mean(const StereoRig& rig, const std::array<RestMatch, kCameraCount>* first) const;
+  Result<MarkerMean> Mean(const RestShape& shape, const StereoRig& rig, bool is_fitted) const;
   Result<RestResult> ExplainByRig(const StereoRig& rig, const MeasuredLoads& loads) const;
   Result<RestResult> Calibrate(const MeasuredLoads& loads) const;
   Result<RestResult> CalibrateAt(const RestShape& shape, const MeasuredLoads& loads,

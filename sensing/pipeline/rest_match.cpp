@@ -122,7 +122,7 @@ std::optional<SettledCamera> SettleFrom(const RestShape& shape, CameraId id,
 }  // namespace
 
 RestMatch MatchRestPicture(const RestShape& shape, const CameraModel& camera, const Detections& detections,
-                           bool domes) {
+                           bool domes, bool with_moved) {
   const LinkModel& model = shape.model();
   RestMatch match;
   match.markers.resize(static_cast<size_t>(model.markers.count()));
@@ -143,7 +143,7 @@ RestMatch MatchRestPicture(const RestShape& shape, const CameraModel& camera, co
       taken[k] = true;
     }
   }
-  MatchMoved(detections, expected, taken, match.markers);
+  if (with_moved) MatchMoved(detections, expected, taken, match.markers);
   std::vector<double> radii;
   for (size_t k = 0; k < detections.size(); ++k) {
     if (!taken[k] && !detections[k].clipped)

@@ -20,9 +20,10 @@ struct RestMatch {
 };
 
 /// A spot is a marker's if each is the other's nearest and the spot is closer than a third of the way to the
-/// marker's nearest neighbour in the picture. What is left is matched alike, up to that neighbour.
+/// marker's nearest neighbour in the picture. `with_moved`: what is left is matched alike, up to that
+/// neighbour.
 RestMatch MatchRestPicture(const RestShape& shape, const CameraModel& camera, const Detections& detections,
-                           bool domes);
+                           bool domes, bool with_moved = true);
 
 /// The camera that a rest picture shows, and the labels by it. Fits the camera to labels and the labels to
 /// the camera, by turns, until they stay: a tilted or shifted camera sees no even star, so that the first

@@ -6,6 +6,7 @@
 
 #include "sensing/contact/contact_writer.h"
 #include "sensing/core/median.h"
+#include "sensing/pipeline/encirclement.h"
 #include "sensing/pipeline/rest_loads.h"
 
 namespace taclink {
@@ -233,6 +234,7 @@ void StateEstimator::FindContacts(ContactFinder& finder, const SkinShape& shape,
     finder.FindIslands(shape.positions_mm, forces, contacts);
   else
     finder.Find(skin_, estimate_, contacts);
+  AddEncirclementVariance(model_, forces.limit_around_n, contacts);
 }
 
 std::unique_ptr<StateEstimator> MakeStateEstimator(const LinkModel& model, const ForceOptions& options) {

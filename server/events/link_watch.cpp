@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sensing/core/marker_text.h"
+
 namespace taclink::server {
 namespace {
 
@@ -34,7 +36,7 @@ int Rank(LinkStatus status) {
 }  // namespace
 
 LinkWatch::LinkWatch(size_t link, const LinkRules& rules, const MarkerGrid& grid, const EventOptions& options)
-    : link_(link), options_(options), contacts_(options) {
+    : link_(link), paths_(grid.paths), options_(options), contacts_(options) {
   forces_.emplace_back("", rules.thresholds);
   for (const Region& region : rules.regions)
     forces_.emplace_back(region.name, region.thresholds, MarkersOf(region, grid));
@@ -102,9 +104,12 @@ void LinkWatch::TakeBaseline(const LinkState& state, std::vector<Event>& events)
     drift_mm_ = 0;
     // Those that were asked for are told by who carried them out.
     if (baseline.origin == BaselineOrigin::kStart) {
+      std::string outcome = "rest shape taken from the first pictures";
+      if (const std::vector<int>& missing = baseline.missing_markers; !missing.empty())
+        outcome += "; no camera shows the markers on " + MarkerText(missing, paths_) +
+                   ": forces near them are less accurate";
       events.push_back(About(state, EventKind::kBaseline));
-      events.back().detail =
-          Operation{.who = "server", .outcome = "rest shape taken from the first pictures", .values = {}};
+      events.back().detail = Operation{.who = "server", .outcome = std::move(outcome), .values = {}};
     }
   }
   const double step_mm = baseline.drift_mm - drift_mm_;

@@ -30,6 +30,7 @@ class LinkWatch {
   void TakeBaseline(const LinkState& state, std::vector<Event>& events);
 
   const size_t link_;
+  const int paths_;  // of markers
   const EventOptions options_;
   ContactWatch contacts_;
   std::vector<ForceWatch> forces_;

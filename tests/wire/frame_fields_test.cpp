@@ -64,7 +64,8 @@ struct Setter {
   void operator()(const std::string&, RejectedMarker& value) const { value.marker = 1; }
   void operator()(const std::string&, std::array<CameraCounts, kCameraCount>& cameras) const {
     for (CameraCounts& camera : cameras) {
-      auto& [detections, labelled, bad_picture] = camera;
+      auto& [detections, labelled, bad_picture, contrast] = camera;
+      contrast = 0.5;
       detections = static_cast<int>(Number());
       labelled = static_cast<int>(Number());
     }
@@ -86,13 +87,6 @@ struct Setter {
          {&exposure_monotonic_ns, &exposure_utc_ns, &received_ns, &tracked_ns, &solved_ns, &published_ns})
       *time_ns = static_cast<int64_t>(Number());
   }
-  void operator()(const std::string&, Baseline& value) const {
-    auto& [origin, taken_utc_ns, drift_mm, drift_state] = value;
-    origin = BaselineOrigin::kTare;
-    taken_utc_ns = static_cast<int64_t>(Number());
-    drift_mm = Number();
-    drift_state = DriftState::kHeld;
-  }
   void operator()(const std::string&, StageTimes& value) const {
     auto& [decode, detect, register_, reconstruct, force] = value;
     for (double* ms : {&decode, &detect, &register_, &reconstruct, &force}) *ms = Number();
@@ -101,6 +95,8 @@ struct Setter {
   void operator()(const std::string&, LinkStatus& value) const { value = LinkStatus::kDegraded; }
   void operator()(const std::string&, ReasonId& value) const { value = ReasonId::kWorker; }
   void operator()(const std::string&, PressureOrigin& value) const { value = PressureOrigin::kSerial; }
+  void operator()(const std::string&, BaselineOrigin& value) const { value = BaselineOrigin::kTare; }
+  void operator()(const std::string&, DriftState& value) const { value = DriftState::kHeld; }
   void operator()(const std::string&, MarkerSource& value) const { value = MarkerSource::kBottom; }
   void operator()(const std::string&, ForceModel& value) const { value = ForceModel::kNonlinear; }
 };
@@ -147,7 +143,7 @@ struct Printer {
   static std::string Text(const std::array<CameraCounts, kCameraCount>& cameras) {
     std::string text;
     for (const CameraCounts& camera : cameras)
-      text += Text(camera.detections) + " " + Text(camera.labelled) + " ";
+      text += Text(camera.detections) + " " + Text(camera.labelled) + " " + Text(camera.contrast) + " ";
     return text;
   }
   static std::string Text(const TrackingReport& value) {
@@ -166,10 +162,6 @@ struct Printer {
                                   t.solved_ns, t.published_ns})
       text += Text(time_ns) + " ";
     return text;
-  }
-  static std::string Text(const Baseline& value) {
-    return Text(value.origin) + " " + Text(value.taken_utc_ns) + " " + Text(value.drift_mm) + " " +
-           Text(value.drift_state);
   }
   static std::string Text(const StageTimes& ms) {
     std::string text;
@@ -202,6 +194,7 @@ LinkState FilledState() {
   VisitFields(state.shape, one);
   VisitFields(state.forces, one);
   VisitFields(state.contacts[0], one);
+  VisitFields(state.baseline, one);
   int next = 0;
   VisitLeaves("", state, Setter{&next});
   return state;

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <vector>
 
 #include "client/command/cli/commands.h"
 #include "client/command/cli/json.h"
 #include "client/command/live/connect.h"
 #include "client/cpp/taclink/client.h"
+#include "sensing/core/marker_text.h"
 #include "sensing/core/printable.h"
 
 namespace taclink::command {
@@ -57,6 +59,17 @@ void PrintCameras(const v1::Arm& arm) {
   }
 }
 
+// What is gone for good, once a link.
+void PrintMissingMarkers(const v1::Arm& arm) {
+  for (const auto& link : arm.links()) {
+    const auto& missing = link.baseline().missing_markers();
+    if (missing.empty() || link.model().markers().paths() == 0) continue;
+    const std::vector<int> markers(missing.begin(), missing.end());
+    fmt::print("\n{}: no camera shows the markers on {}; forces near them are less accurate\n",
+               Printable(link.name()), MarkerText(markers, static_cast<int>(link.model().markers().paths())));
+  }
+}
+
 Json CameraJson(const v1::Camera& camera) {
   Json out = {{"camera", camera.name()},       {"configured", camera.configured()},
               {"device", camera.device()},     {"format", camera.format()},
@@ -93,6 +106,8 @@ Json ListedLinkJson(const v1::Link& link) {
           {"workers_abandoned", statistics.workers_abandoned()},
           {"last_failure", statistics.last_failure()},
           {"pairs_skipped", statistics.pairs_skipped()},
+          {"missing_markers", std::vector<uint32_t>(link.baseline().missing_markers().begin(),
+                                                    link.baseline().missing_markers().end())},
           {"cameras", std::move(cameras)}};
 }
 
@@ -114,6 +129,7 @@ Result<void> RunList(const ListOptions& options) {
   } else {
     PrintTable(*arm);
     PrintCameras(*arm);
+    PrintMissingMarkers(*arm);
   }
   return {};
 }

@@ -64,7 +64,7 @@ bool IsInvalid(const LinkState& state) {
 
 // In this command's units.
 Json ReasonJson(const Reason& reason) {
-  const ReasonUnit unit = UnitOf(reason.id);
+  const ReasonUnit unit = TraitsOf(reason.id).unit;
   const double kpa = unit == ReasonUnit::kMegapascals ? 1e3 : 1;
   const char* name = unit == ReasonUnit::kMillimeters   ? "mm"
                      : unit == ReasonUnit::kMegapascals ? "kPa"

@@ -37,7 +37,7 @@ class ImageRepetitionTest : public ::testing::Test {
   }
   void Show(const cv::Mat& gray, bool is_rest = false) {
     now_ns_ += kFrameNs;
-    repetition_.Take(gray, before_, now_ns_, is_rest);
+    repetition_.Take(gray, now_ns_, is_rest);
     before_ = gray.clone();
   }
   void ShowNew(int images) {
@@ -73,6 +73,21 @@ TEST_F(ImageRepetitionTest, TheSameImageIsRepeatedAtOnce) {
   ShowNew(3);
 }
 
+// A driver that sends its buffers by turns without filling them.
+TEST_F(ImageRepetitionTest, ImagesThatComeByTurnsAreRepeated) {
+  std::vector<cv::Mat> buffers;
+  for (int i = 0; i < 8; ++i) {
+    buffers.push_back(Live());
+    Show(buffers.back());
+    EXPECT_FALSE(repetition_.is_repeated());
+  }
+  for (size_t i = 0; i < 24; ++i) {
+    Show(buffers[i % buffers.size()]);
+    EXPECT_TRUE(repetition_.is_repeated()) << i;
+  }
+  ShowNew(3);
+}
+
 // An encoder that keeps to a rate.
 TEST_F(ImageRepetitionTest, AReencodedImageIsRepeated) {
   ShowNew(10);
@@ -96,15 +111,14 @@ TEST_F(ImageRepetitionTest, LiveCompressedImagesAreNew) {
 TEST_F(ImageRepetitionTest, WhereNoiseIsAPatternOnlyIdenticalImagesAreRepeated) {
   ImageRepetition repetition;
   const cv::Mat pattern = Live();
-  cv::Mat before;
+  cv::Mat gray;
   for (int i = 0; i < 60; ++i) {
-    cv::Mat gray = pattern.clone();
+    gray = pattern.clone();
     gray.at<uchar>(i, i) = static_cast<uchar>(gray.at<uchar>(i, i) + 1);
-    repetition.Take(gray, before, i * kFrameNs, i < 10);
+    repetition.Take(gray, i * kFrameNs, i < 10);
     EXPECT_FALSE(repetition.is_repeated()) << i;
-    before = gray;
   }
-  repetition.Take(before.clone(), before, 60 * kFrameNs, false);
+  repetition.Take(gray, 60 * kFrameNs, false);
   EXPECT_TRUE(repetition.is_repeated());
 }
 

@@ -15,6 +15,7 @@ class JudgeTest : public ::testing::Test {
   JudgeTest() {
     const auto markers = static_cast<size_t>(model_.markers.count());
     state_.shape.sources.assign(markers, MarkerSource::kBoth);
+    state_.shape.positions_mm = model_.RestMarkers();
     state_.forces.converged = true;
     estimate_.displacements_mm = estimate_.untouched_mm =
         Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(markers));
@@ -128,7 +129,7 @@ TEST_F(JudgeTest, APressureThatNobodyTellsIsTold) {
   EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("pressure_kpa"));
 }
 
-TEST_F(JudgeTest, AHugIsToldWhereItIsHardlySeen) {
+TEST_F(JudgeTest, ARingContactNearItsLimitIsDoubted) {
   Touch(0, 95);
   state_.contacts[0].is_ring_contact = true;
   state_.contacts[0].normal_force_n = 1;
@@ -138,8 +139,14 @@ TEST_F(JudgeTest, AHugIsToldWhereItIsHardlySeen) {
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kEncircled));
 }
 
-TEST_F(JudgeTest, BodiesAllAroundAreTold) {
-  for (int body = 0; body < 6; ++body) Touch(60 * body - 170, body % 2 == 0 ? 85 : 105);
+TEST_F(JudgeTest, ContactsAllAroundNearTheirLimitAreDoubted) {
+  for (int body = 0; body < 6; ++body) {
+    Touch(60 * body - 170, body % 2 == 0 ? 85 : 105);
+    state_.contacts.back().normal_force_n = 0.2;
+  }
+  state_.forces.limit_around_n = 0.29;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  state_.forces.limit_around_n = 0.31;
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kEncircled));
   EXPECT_EQ(state_.status, LinkStatus::kDegraded);
   // A gap.
@@ -160,6 +167,17 @@ TEST_F(JudgeTest, AContactThatMayBeBesideTheMarkersIsTold) {
   state_.contacts[0].center_covariance_mm2 = Mat3(2.5 * 2.5 * Mat3::Identity());
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kBeyondMarkers));
   state_.contacts[0].center_mm.z() = first_mm + 6;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+}
+
+// Half of a plate that reaches the last ring may press where there are no markers.
+TEST_F(JudgeTest, AWideContactThatReachesTheLastRingIsDoubted) {
+  const double last_mm = model_.markers.rings_z_mm.back();
+  Touch(20, last_mm - 18);
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  state_.contacts[0].major_axis_mm = 17 * Vec3::UnitZ();
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kBeyondMarkers));
+  state_.contacts[0].center_mm.z() = last_mm - 22;
   EXPECT_THAT(Reasons(), ::testing::IsEmpty());
 }
 
@@ -303,6 +321,14 @@ TEST_F(JudgeTest, ACauseComesBeforeWhatItDoes) {
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kCamerasSwapped, ReasonId::kFewMarkers));
   EXPECT_EQ(state_.status, LinkStatus::kLost);
   EXPECT_EQ(state_.status_reason, "exchanged; put them right");
+}
+
+TEST_F(JudgeTest, LostContrastIsNamed) {
+  state_.cameras[Index(CameraId::kBottom)].contrast = 0.5;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  state_.cameras[Index(CameraId::kBottom)].contrast = 0.3;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kImageContrast));
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr("bottom camera's images markers have 30 %"));
 }
 
 TEST_F(JudgeTest, AFrameRateThatDiffersDegrades) {

@@ -31,6 +31,8 @@ class LinkPipelineTest : public ::testing::Test {
     StereoFrame frame;
     skin_->Evaluate(time_s, truth_);
     const uint64_t frame_of_scene = std::exchange(truth_.frame, frames_made_++);  // a noise of its own
+    truth_.marker_is_lost.assign(lost_markers_.empty() ? 0 : truth_.marker_mm.size(), false);
+    for (const int marker : lost_markers_) truth_.marker_is_lost[static_cast<size_t>(marker)] = true;
     for (const CameraId id : kBothCameras) {
       renderer_.Render(truth_, id, gray_);
       PackYuyv(gray_, renderer_.chroma(id), frame.images[Index(id)]);
@@ -50,6 +52,7 @@ class LinkPipelineTest : public ::testing::Test {
   Renderer renderer_{model_, model_.nominal_rig, scene_.camera, 1};
   SkinTruth truth_;
   uint64_t frames_made_ = 0;
+  std::vector<int> lost_markers_;  // broken off, ascending
   cv::Mat gray_;
   PipelineOptions options_;
   LinkState state_;
@@ -204,11 +207,11 @@ TEST_F(LinkPipelineTest, WithOneCameraThePositionsAreKnownWorseAndTheReasonIsPas
   EXPECT_LT(mean_variance_mm2(), 1.1 * both_mm2);
 }
 
-// Deeper than forces were ever compared with the truth.
+// Deeper than forces are right.
 TEST_F(LinkPipelineTest, ADeepDentIsDegraded) {
   Scene scene = LoadScene("press").value();
   scene.contacts[0].force_n.reset();
-  scene.contacts[0].depth_mm = 19;
+  scene.contacts[0].depth_mm = 23;
   skin_ = SimulatedSkin::Make(model_, scene).value();
   LinkPipeline pipeline(model_, options_);
   TakeRest(pipeline);
@@ -219,7 +222,7 @@ TEST_F(LinkPipelineTest, ADeepDentIsDegraded) {
   }
   EXPECT_TRUE(was_ok);
   EXPECT_EQ(state_.status, LinkStatus::kDegraded);
-  EXPECT_THAT(state_.status_reason, HasSubstr("forces were not compared with the truth"));
+  EXPECT_THAT(state_.status_reason, HasSubstr("beyond 20 mm forces come out too small"));
   EXPECT_TRUE(state_.measured());
 }
 
@@ -265,6 +268,16 @@ TEST_F(LinkPipelineTest, OneCameraForBothIsNamed) {
   pipeline.Process(frame, state_);
   EXPECT_EQ(state_.status, LinkStatus::kLost);
   EXPECT_THAT(state_.status_reason, HasSubstr("both cameras give the same image"));
+}
+
+TEST_F(LinkPipelineTest, MarkersThatAreGoneForGoodAreListedAndDegradeNothing) {
+  lost_markers_ = {model_.MarkerIndex(2, 1), model_.MarkerIndex(7, 4), model_.MarkerIndex(7, 5)};
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+  EXPECT_EQ(state_.contacts.size(), 1u);
+  EXPECT_EQ(state_.baseline.missing_markers, lost_markers_);
 }
 
 // A sensor's noise never repeats: what it saw before says nothing of now.

@@ -288,6 +288,14 @@ TEST_F(LinkWatchTest, BaselineAndDriftAreTold) {
   EXPECT_TRUE(Frame({}).empty()) << "who asked for it tells it";
 }
 
+TEST_F(LinkWatchTest, MissingMarkersAreListedOnceWithTheBaseline) {
+  state_.baseline = {.origin = BaselineOrigin::kStart, .taken_utc_ns = 5, .missing_markers = {1, 5}};
+  const std::vector<Event> events = Frame({});
+  ASSERT_THAT(Kinds(events), ElementsAre("baseline"));
+  EXPECT_THAT(std::get<Operation>(events[0].detail).outcome, HasSubstr("path 2, rings 1 to 2"));
+  EXPECT_TRUE(Frame({}).empty());
+}
+
 Event Numbered(EventKind kind, std::optional<size_t> link = {}) {
   Event event;
   event.kind = kind;

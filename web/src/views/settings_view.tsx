@@ -61,7 +61,7 @@ function Baseline({ link }: { link: Link }) {
       <legend>Baseline</legend>
       <p class="small numbers">
         {baseline && baseline.origin
-          ? `Taken ${duration(Date.now() / 1e3 - Number(baseline.takenUtcNs / 1_000_000n) / 1e3)} ago, drift ${fixed(baseline.driftM * 1e3, 2)} mm.`
+          ? `Taken ${duration(Date.now() / 1e3 - Number(baseline.takenUtcNs / 1_000_000n) / 1e3)} ago, drift ${fixed(baseline.driftM * 1e3, 2)} mm.${missing(baseline.missingMarkers.length)}`
           : "There is none yet."}
       </p>
       <div class="row">
@@ -341,4 +341,9 @@ function Worker({ link }: { link: Link }) {
       <OperatorButton onClick={() => void restart()}>Restart the link</OperatorButton>
     </fieldset>
   );
+}
+
+function missing(markers: number): string {
+  if (markers === 0) return "";
+  return ` No camera shows ${markers === 1 ? "one marker" : `${markers} markers`}: forces near them are less accurate.`;
 }

@@ -15,6 +15,7 @@ class Baseline:
     taken_utc_ns: int  # since 1970-01-01; 0: there is none
     drift_m: float  # how far it has followed the skin since, of the marker that went furthest
     drift_state: DriftState
+    missing_markers: tuple[int, ...]  # shown by neither camera when it was taken; indices from 0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, slots=True)
@@ -49,6 +50,7 @@ def baseline_from(message: tare_pb2.Baseline) -> Baseline:
         message,
         origin=name_of(BaselineOrigin, message.origin),
         drift_state=name_of(DriftState, message.drift_state),
+        missing_markers=tuple(message.missing_markers),
     )
 
 

@@ -119,6 +119,7 @@ class CameraCounts:
     searched: int
     found: int
     dropped: int
+    contrast: float | None  # of the markers, by what it was in the rest images; None: not known
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -304,7 +305,9 @@ def frame_from(message: frame_pb2.LinkFrame, client_utc_ns: int = 0, gap: int | 
         force_model=name_of(ForceModel, message.force_model),
         baseline=baseline_from(message.baseline),
         stage_times=alike(StageTimes, message.stage_times),
-        cameras=tuple(alike(CameraCounts, camera) for camera in message.cameras),
+        cameras=tuple(
+            alike(CameraCounts, camera, contrast=optional(camera, "contrast")) for camera in message.cameras
+        ),
         tracking_mode=name_of(TrackingMode, message.tracking_mode),
         acquire_reason=name_of(AcquireReason, message.acquire_reason),
         detection_limit_n=optional(message, "detection_limit_n"),
