@@ -154,6 +154,93 @@ TEST_F(RealPictureLabels, OtherLight) {
   }
 }
 
+cv::Mat Warped(const cv::Mat& picture, double degrees, double scale, std::vector<TrueMarker>& truth) {
+  const cv::Point2f hub(static_cast<float>(kHub.x()), static_cast<float>(kHub.y()));
+  const cv::Mat by = cv::getRotationMatrix2D(hub, degrees, scale);
+  cv::Mat warped;
+  cv::warpAffine(picture, warped, by, picture.size(), cv::INTER_CUBIC);
+  for (TrueMarker& t : truth) {
+    const Vec2 p = t.center_px;
+    t.center_px = IsCut(p)
+                      ? kNowhere
+                      : Vec2(by.at<double>(0, 0) * p.x() + by.at<double>(0, 1) * p.y() + by.at<double>(0, 2),
+                             by.at<double>(1, 0) * p.x() + by.at<double>(1, 1) * p.y() + by.at<double>(1, 2));
+  }
+  return warped;
+}
+
+// From the hub to the rim. A spot that its edge cuts has its center elsewhere.
+cv::Mat WithStrip(const cv::Mat& picture, double degrees, int width_px, int level,
+                  std::vector<TrueMarker>& truth) {
+  constexpr double kLargestSpotPx = 36;
+  cv::Mat covered = picture.clone();
+  const Vec2 along(std::cos(RadFromDeg(degrees)), std::sin(RadFromDeg(degrees)));
+  for (TrueMarker& t : truth) {
+    const Vec2 at = t.center_px - kHub;
+    const double across = std::abs(at.x() * along.y() - at.y() * along.x());
+    if (at.dot(along) > 0 && across < 0.5 * (width_px + kLargestSpotPx)) t.center_px = kNowhere;
+  }
+  const Vec2 end = kHub + 500 * along;
+  cv::line(covered, cv::Point(cvRound(kHub.x()), cvRound(kHub.y())),
+           cv::Point(cvRound(end.x()), cvRound(end.y())), cv::Scalar(level), width_px);
+  return covered;
+}
+
+// Whatever happens to a real image: what is labeled is labeled rightly, or nothing is.
+TEST_F(RealPictureLabels, DisturbedCopiesAreRightOrRefused) {
+  int copies = 0, refused = 0;
+  const auto check = [&](const std::string& what, const cv::Mat& gray, const std::vector<TrueMarker>& truth) {
+    SCOPED_TRACE(what);
+    ++copies;
+    const auto labels = Label(gray);
+    if (!labels) {
+      ++refused;
+      return;
+    }
+    const Verdict verdict = Judge(truth, *labels, gray.size());
+    EXPECT_EQ(verdict.wrong, 0) << verdict.which;
+  };
+  for (const double scale : {0.8, 0.9, 0.98, 1.02, 1.1, 1.25}) {
+    std::vector<TrueMarker> truth = truth_;
+    const cv::Mat warped = Warped(picture_, 0, scale, truth);
+    check("scaled by " + std::to_string(scale), warped, truth);
+  }
+  for (const double degrees : {-8.0, -3.0, 2.0, 5.0}) {
+    std::vector<TrueMarker> truth = truth_;
+    const cv::Mat warped = Warped(picture_, degrees, 1, truth);
+    check("rolled by " + std::to_string(degrees), warped, truth);
+  }
+  for (const int level : {0, 255}) {
+    for (const double degrees : {0.0, 80.0, 200.0}) {
+      for (const int width_px : {20, 60}) {
+        std::vector<TrueMarker> truth = truth_;
+        const cv::Mat covered = WithStrip(picture_, degrees, width_px, level, truth);
+        check("strip " + std::to_string(level) + " at " + std::to_string(degrees), covered, truth);
+      }
+    }
+  }
+  cv::Mat gray;
+  for (const double blur : {1.5, 2.0, 3.0}) {
+    cv::GaussianBlur(picture_, gray, {}, blur);
+    check("blurred by " + std::to_string(blur), gray, truth_);
+  }
+  for (const double sigma : {12.0, 20.0, 40.0}) {
+    cv::Mat noise(picture_.size(), CV_16S), noisy;
+    cv::theRNG().state = 7;
+    cv::randn(noise, 0, sigma);
+    picture_.convertTo(noisy, CV_16S);
+    cv::Mat(noisy + noise).convertTo(gray, CV_8U);
+    check("noise of " + std::to_string(sigma), gray, truth_);
+  }
+  picture_.convertTo(gray, CV_8U, 0.3, 120);
+  check("hazed", gray, truth_);
+  gray = picture_.clone();
+  gray.colRange(0, gray.cols / 2) = 0;
+  check("half covered", gray, truth_);
+  std::printf("%d of %d disturbed copies are refused\n", refused, copies);
+  EXPECT_LT(refused, copies / 2);
+}
+
 /// A dent as it looks: points move towards the hub, most in its middle.
 struct PictureDent {
   double angle = 0, log_radius = 0, depth = 0;  // of log radius
