@@ -160,9 +160,9 @@ Result<RestFit::FoundCameras> RestFit::FindCameras(const RestShape& shape) const
   return found;
 }
 
-// `is_fitted`: the cameras explain these very pairs, so that spots are told by where they should be. Known
-// cameras may have moved, and something may touch the skin: then spots are told by their order along the
-// paths, and only what that leaves open, as beside a marker that is missing, by where they should be.
+// `is_fitted`: the cameras were fitted to these pairs, so that each spot is labeled by the nearest projected
+// marker. Cameras of a saved calibration may have moved, and the skin may be touched: spots are then labeled
+// by their order along the paths, and only those left, as beside a missing marker, by the nearest projection.
 Result<MarkerMean> RestFit::Mean(const RestShape& shape, const StereoRig& rig, bool is_fitted) const {
   PathTracker tracker(model_, rig);
   MarkerMean mean(model_.markers.count());
