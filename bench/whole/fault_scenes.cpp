@@ -11,17 +11,17 @@ void SceneMaker::Pressures() {
   using enum ReasonId;
   for (const double off_pa : {-100.0, 100.0}) {
     WholeScene& whole =
-        Touched(off_pa < 0 ? "pressure told 100 Pa too low" : "pressure told 100 Pa too high", 1);
-    whole.fault.pressure_off_mpa = 1e-6 * off_pa;
+        Touched(off_pa < 0 ? "pressure reported 100 Pa too low" : "pressure reported 100 Pa too high", 1);
+    whole.fault.pressure_error_mpa = 1e-6 * off_pa;
   }
-  WholeScene& wrong = Touched("pressure told 400 Pa too high", 1);
-  wrong.fault.pressure_off_mpa = 4e-4;
+  WholeScene& wrong = Touched("pressure reported 400 Pa too high", 1);
+  wrong.fault.pressure_error_mpa = 4e-4;
   wrong.named_by = {kPressureMismatch};
   for (const double kpa : {0.1, 0.5, 1.0}) {
     char kind[40];
     std::snprintf(kind, sizeof kind, "no pressure source, %.1f kPa", kpa);
     WholeScene& whole = Touched(kind, kpa);
-    whole.fault.is_pressure_told = false;
+    whole.fault.is_pressure_reported = false;
     whole.named_by = {kPressureUnknown};
   }
   for (const double kpa : {0.1, 0.5, 1.0}) {
@@ -29,11 +29,11 @@ void SceneMaker::Pressures() {
     std::snprintf(kind, sizeof kind, "no pressure source, inflated to %.1f kPa before", kpa);
     WholeScene& whole = Touched(kind, kpa);
     whole.scene.pressure = {{0, kpa}};
-    whole.fault.is_pressure_told = false;
+    whole.fault.is_pressure_reported = false;
     whole.named_by = {kPressureUnknown};
   }
-  Touched("E told 10 % too high, 0.5 kPa", kUsualKpa).fault.modulus_factor = 1.1;
-  Touched("E told 10 % too low, 1 kPa", 1).fault.modulus_factor = 0.9;
+  Touched("E configured 10 % too high, 0.5 kPa", kUsualKpa).fault.modulus_factor = 1.1;
+  Touched("E configured 10 % too low, 1 kPa", 1).fault.modulus_factor = 0.9;
 }
 
 // From the beginning, which calibration may take up, and within the run.
@@ -100,7 +100,7 @@ void SceneMaker::Cameras() {
   other.fault.calibration_off = {.shift_mm = {0.7, -0.5, 0.6}, .turn_rad = {0.01, -0.008, 0.02}};
   other.named_by = moved;
   WholeScene& wrong = Touched("wrong model", kUsualKpa);
-  wrong.fault.told_model = model_.name == "cylinder" ? "barrel" : "cylinder";
+  wrong.fault.configured_model = model_.name == "cylinder" ? "barrel" : "cylinder";
   wrong.named_by = {kResidual};
 }
 
@@ -239,7 +239,7 @@ void SceneMaker::Aging() {
   Touched("10 K warmer, 0.5 kPa", kUsualKpa).fault.aging = kWarmer;
   WholeScene& unknown = Touched("10 K warmer, no pressure source");
   unknown.fault.aging = kWarmer;
-  unknown.fault.is_pressure_told = false;
+  unknown.fault.is_pressure_reported = false;
   unknown.named_by = {ReasonId::kPressureUnknown};
 }
 

@@ -192,7 +192,8 @@ WholeOutcome Play(const std::vector<LinkModel>& models, const WholeScene& scene,
                   SimulatedSkin& skin, SimulatedSkin* other) {
   const LinkModel& model = Named(models, scene.model);
   WholePictures pictures(model, scene, skin, other);
-  LinkModel known = scene.fault.told_model.empty() ? model : Named(models, scene.fault.told_model);
+  LinkModel known =
+      scene.fault.configured_model.empty() ? model : Named(models, scene.fault.configured_model);
   known.material.youngs_modulus_mpa *= scene.fault.modulus_factor;
   LinkPipeline link(known, OptionsFor(model, scene, method), ThreadCpuClock());
   StereoFrame frame;

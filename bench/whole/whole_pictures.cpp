@@ -257,9 +257,9 @@ void WholePictures::Take(int frame, StereoFrame& pictures, SkinTruth& truth) {
   pictures.specific_force = MeasuredSpecificForce(truth);
   pictures.pressure_mpa.reset();
   pictures.pressure.origin = PressureOrigin::kNone;
-  if (!fault.is_pressure_told) return;
+  if (!fault.is_pressure_reported) return;
   pictures.pressure.origin = PressureOrigin::kSerial;
-  pictures.pressure_mpa = ExactInPascals(truth.pressure_mpa + fault.pressure_off_mpa);
+  pictures.pressure_mpa = ExactInPascals(truth.pressure_mpa + fault.pressure_error_mpa);
 }
 
 }  // namespace taclink

@@ -208,10 +208,10 @@ std::string SkinKey(const WholeScene& whole) {
 
 bool IsFault(const WholeScene& scene) {
   const LinkFault& fault = scene.fault;
-  return fault.pictures != PictureFault::kNone || fault.pressure_off_mpa != 0 || !fault.is_pressure_told ||
-         !fault.is_attitude_known || !fault.mount_off_rad.isZero(0) || fault.modulus_factor != 1 ||
-         !fault.told_model.empty() || fault.calibration_off.any() || fault.tare_s >= 0 ||
-         fault.follows_drift || fault.aging.any() || !fault.lost_markers.empty() ||
+  return fault.pictures != PictureFault::kNone || fault.pressure_error_mpa != 0 ||
+         !fault.is_pressure_reported || !fault.is_attitude_known || !fault.mount_off_rad.isZero(0) ||
+         fault.modulus_factor != 1 || !fault.configured_model.empty() || fault.calibration_off.any() ||
+         fault.tare_s >= 0 || fault.follows_drift || fault.aging.any() || !fault.lost_markers.empty() ||
          scene.kind.starts_with("started while touched");
 }
 

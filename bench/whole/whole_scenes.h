@@ -50,12 +50,12 @@ struct LinkFault {
   double grows_s = 0;             ///< from nothing to `amount` within that time; of light and lens alone
   std::vector<int> lost_markers;  ///< break off at `lost_s`, one after the other within `grows_s`
   double lost_s = -1;             ///< before 0: they were never there
-  double pressure_off_mpa = 0;    ///< told less true
-  bool is_pressure_told = true;
+  double pressure_error_mpa = 0;  ///< reported less true
+  bool is_pressure_reported = true;
   bool is_attitude_known = true;      ///< of a scene with motion
   Vec3 mount_off_rad = Vec3::Zero();  ///< rotation vector by which the measured attitude is wrong, link frame
-  double modulus_factor = 1;          ///< of the material that the link is told, by the true one
-  std::string told_model;             ///< another than the skin's; empty: the skin's
+  double modulus_factor = 1;          ///< configured, by the true one
+  std::string configured_model;       ///< another than the skin's; empty: the skin's
   bool is_calibrated = false;         ///< the cameras are known beforehand
   MountError calibration_off;         ///< and where they are not, the top one
   double tare_s = -1;                 ///< a tare is asked for then; before 0: none
@@ -78,7 +78,7 @@ struct WholeScene {
 /// Scenes that have the same move the same skin alike.
 std::string SkinKey(const WholeScene& scene);
 
-/// Something is wrong with the link that must be told, or be taken up.
+/// A fault of the link that must be reported by its reason, or compensated.
 bool IsFault(const WholeScene& scene);
 
 /// Undisturbed and disturbed scenes of a skin; `model` is the shipped cylinder, or one of about its size.

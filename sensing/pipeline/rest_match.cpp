@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kGate = 1.0 / 3;  // of the way to the nearest neighbour
 constexpr double kMovedGate = 1;   // the same, for what is left
+// Nearer spots that fail the gate are badly seen ones of the far ring, whose neighbors are 3 px apart.
+constexpr double kLeastMovedPx = 2;
 constexpr int kMaxTurns = 5;
 // So many markers more must be explained by a camera that is off the nominal one by sqrt(2) tolerances more.
 constexpr double kMarkersPerDeparture = 4;
@@ -50,7 +52,7 @@ void MatchMoved(const Detections& detections, std::vector<std::optional<Vec2>> e
     const auto [marker, distance] = Nearest(expected, *spot);
     if (marker < 0) continue;
     const Vec2 place = expected[static_cast<size_t>(marker)].value_or(*spot);
-    if (distance > kMovedGate * Nearest(all, place, marker).second) continue;
+    if (distance < kLeastMovedPx || distance > kMovedGate * Nearest(all, place, marker).second) continue;
     if (Nearest(spots, place).first != static_cast<int>(k)) continue;
     markers[static_cast<size_t>(marker)] = {true, detections[k].center_px, detections[k].covariance_px2};
     taken[k] = true;

@@ -21,7 +21,7 @@ struct RestMatch {
 
 /// A spot is a marker's if each is the other's nearest and the spot is closer than a third of the way to the
 /// marker's nearest neighbour in the picture. `with_moved`: what is left is matched alike, up to that
-/// neighbour.
+/// neighbour, unless it is within 2 px, which no touch is but a spot that is badly seen.
 RestMatch MatchRestPicture(const RestShape& shape, const CameraModel& camera, const Detections& detections,
                            bool domes, bool with_moved = true);
 
