@@ -67,26 +67,27 @@ folder(wire/log sensing/core mcap wire)
 folder(server/config sensing/core sensing/yaml sensing/pipeline sensing/simulation mcap wire)
 folder(server/process sensing/core server/config)
 folder(server/hub sensing/core wire)
+folder(server/simulation sensing/core sensing/simulation)
 folder(server/pressure sensing/core server/config server/process)
 folder(server/attitude sensing/core)
 folder(server/link sensing/core sensing/capture server/config server/process server/hub server/pressure server/attitude)
 folder(server/events sensing/core server/config server/process server/hub)
 folder(server/security sensing/core server/config server/process)
 folder(server/arm sensing/core sensing/capture server/config server/hub server/pressure server/attitude server/link
-       server/events)
+       server/events server/simulation)
 folder(server/messages wire server/events server/arm)
 folder(server/recording sensing/core mcap wire/log server/config server/process server/hub server/arm server/messages)
 folder(server/replay sensing/core sensing/capture mcap wire wire/log server/process server/link server/arm)
 folder(server/rpc/requests sensing/core server/config server/security)
 folder(server/rpc/streams sensing/core sensing/capture mcap wire wire/log server/hub server/link server/events server/security
        server/arm server/messages server/replay server/rpc/requests)
-folder(server/rpc/services sensing/core wire server/link server/events server/security server/arm server/messages
-       server/recording server/replay server/rpc/requests server/rpc/streams)
+folder(server/rpc/services sensing/core sensing/simulation wire server/link server/events server/simulation server/security
+       server/arm server/messages server/recording server/replay server/rpc/requests server/rpc/streams)
 folder(server/rpc sensing/core server/process server/security server/arm server/rpc/requests server/rpc/services)
 folder(server/publish sensing/core wire server/config server/process server/security server/arm server/messages)
 folder(server/gateway sensing/core server/config server/process server/link server/security server/arm server/rpc server/publish)
 folder(server/assembly sensing/core sensing/yaml sensing/model sensing/camera sensing/capture sensing/pipeline sensing/simulation mcap
-       wire/log server/config server/process server/hub server/pressure server/attitude server/link server/security server/arm
+       wire/log server/config server/process server/hub server/pressure server/attitude server/simulation server/link server/security server/arm
        server/recording server/replay)
 folder(server sensing/core server/config server/process server/security server/recording server/rpc server/publish
        server/gateway server/assembly)

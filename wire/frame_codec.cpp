@@ -258,6 +258,29 @@ SpecificForceReading SpecificForceFrom(const v1::SpecificForceReport& message) {
   return reading;
 }
 
+void FillSimulation(const SimulationReport& simulation, v1::SimulationReport& out) {
+  out.set_trouble(simulation.trouble);
+  for (const AppliedContact& contact : simulation.contacts) {
+    v1::AppliedContact& message = *out.add_contacts();
+    message.set_body_id(contact.body_id);
+    Fill(contact.center_mm, kMetresPerMm, *message.mutable_center_m());
+    Fill(contact.normal, 1, *message.mutable_normal());
+    Fill(contact.force_n, 1, *message.mutable_force_n());
+    message.set_depth_m(contact.depth_mm * kMetresPerMm);
+  }
+}
+
+SimulationReport SimulationFrom(const v1::SimulationReport& message) {
+  SimulationReport simulation{.contacts = {}, .trouble = message.trouble()};
+  for (const v1::AppliedContact& contact : message.contacts())
+    simulation.contacts.push_back({.body_id = contact.body_id(),
+                                   .center_mm = FromWire(contact.center_m(), 1 / kMetresPerMm),
+                                   .normal = FromWire(contact.normal(), 1),
+                                   .force_n = FromWire(contact.force_n(), 1),
+                                   .depth_mm = contact.depth_m() / kMetresPerMm});
+  return simulation;
+}
+
 }  // namespace
 
 void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFrame& out) {
@@ -295,6 +318,7 @@ void Fill(const LinkId& link, const LinkState& state, Detail detail, v1::LinkFra
     FillCovariance(estimate->covariance, 1,
                    *out.mutable_specific_force_estimate()->mutable_covariance_m2_s4());
   }
+  if (state.simulation) FillSimulation(*state.simulation, *out.mutable_simulation());
   out.set_force_model(ToWire(state.forces.model));
   out.set_baseline_age_s(state.baseline_age_s);
   Fill(state.baseline, *out.mutable_baseline());
@@ -366,6 +390,7 @@ Result<DecodedFrame> FromWire(const v1::LinkFrame& frame) {
     state.specific_force_estimate = {FromWire(estimate.specific_force_mps2(), 1),
                                      CovarianceFrom(estimate.covariance_m2_s4(), 1).value_or(Mat3::Zero())};
   }
+  if (frame.has_simulation()) state.simulation = SimulationFrom(frame.simulation());
   state.total_force_n = FromWire(frame.total_force_n(), 1);
   state.forces.model = FromWire(frame.force_model());
   state.forces.residual = frame.force_residual();

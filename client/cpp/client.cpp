@@ -8,6 +8,7 @@
 #include "client/cpp/patience.h"
 #include "client/cpp/stream_call.h"
 #include "taclink/v1/operations.grpc.pb.h"
+#include "taclink/v1/simulation.grpc.pb.h"
 #include "taclink/v1/tactile.grpc.pb.h"
 
 namespace taclink::client {
@@ -155,6 +156,33 @@ Result<void> Client::RestartLink(const std::string& link, milliseconds timeout) 
   request.set_link(link);
   return WithoutValue(
       Ask(*operations, &v1::OperationsService::Stub::RestartLink, request, timeout, connection_->address));
+}
+
+Result<void> Client::Press(const v1::PressRequest& request, milliseconds timeout) {
+  const auto simulation = v1::SimulationService::NewStub(connection_->channel);
+  return WithoutValue(
+      Ask(*simulation, &v1::SimulationService::Stub::Press, request, timeout, connection_->address));
+}
+
+Result<void> Client::Release(const std::string& link, uint64_t body_id, milliseconds timeout) {
+  const auto simulation = v1::SimulationService::NewStub(connection_->channel);
+  v1::ReleaseRequest request;
+  request.set_link(link);
+  request.set_body_id(body_id);
+  return WithoutValue(
+      Ask(*simulation, &v1::SimulationService::Stub::Release, request, timeout, connection_->address));
+}
+
+Result<void> Client::SetScenePressure(const v1::SetScenePressureRequest& request, milliseconds timeout) {
+  const auto simulation = v1::SimulationService::NewStub(connection_->channel);
+  return WithoutValue(Ask(*simulation, &v1::SimulationService::Stub::SetScenePressure, request, timeout,
+                          connection_->address));
+}
+
+Result<void> Client::MoveSceneJoint(const v1::MoveSceneJointRequest& request, milliseconds timeout) {
+  const auto simulation = v1::SimulationService::NewStub(connection_->channel);
+  return WithoutValue(
+      Ask(*simulation, &v1::SimulationService::Stub::MoveSceneJoint, request, timeout, connection_->address));
 }
 
 Result<void> Client::SetCamera(const v1::SetCameraRequest& request, milliseconds timeout) {

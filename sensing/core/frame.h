@@ -10,6 +10,7 @@
 
 #include "sensing/core/camera_model.h"
 #include "sensing/core/geometry.h"
+#include "sensing/core/simulation_report.h"
 
 namespace taclink {
 
@@ -101,7 +102,8 @@ struct StereoFrame {
   PressureReport pressure;
   /// None: the link never moves, so that its weight is the same in all frames.
   std::optional<SpecificForceReading> specific_force;
-  std::optional<SimulatedJoint> joint = {};  ///< none: it is not simulated, or rests
+  std::optional<SimulationReport> simulation = {};  ///< none: it is not simulated
+  std::optional<SimulatedJoint> joint = {};         ///< none: it is not simulated, or rests
   /// From a log: what was found then, in place of pictures; null: from cameras.
   std::shared_ptr<const LinkState> recorded = nullptr;
 };

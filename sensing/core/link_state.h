@@ -136,6 +136,8 @@ struct LinkState {
   double baseline_age_s = 0;          ///< from when the baseline was taken to the exposure
   Baseline baseline;
   StageTimes stage_ms;
+  std::optional<SimulationReport>
+      simulation;         ///< what is true of a simulated link; none: it is not simulated
   bool replayed = false;  ///< from a log: the UTC times are those of then
 
   bool measured() const { return !shape.positions_mm.empty(); }

@@ -86,6 +86,19 @@ auto Fields(S& reading) {
                     Field{"trouble", trouble});
 }
 
+template <Is<AppliedContact> S>
+auto Fields(S& contact) {
+  auto& [body_id, center_mm, normal, force_n, depth_mm] = contact;
+  return std::tuple(Field{"body_id", body_id}, Field{"center_mm", center_mm}, Field{"normal", normal},
+                    Field{"force_n", force_n}, Field{"depth_mm", depth_mm});
+}
+
+template <Is<SimulationReport> S>
+auto Fields(S& simulation) {
+  auto& [contacts, trouble] = simulation;
+  return std::tuple(Field{"contacts", contacts}, Field{"trouble", trouble});
+}
+
 template <Is<Baseline> S>
 auto Fields(S& baseline) {
   auto& [origin, taken_utc_ns, drift_mm, drift_state, missing_markers] = baseline;
@@ -97,16 +110,16 @@ template <Is<LinkState> S>
 auto Fields(S& state) {
   auto& [sequence, times, status, status_reason, reasons, pressure_mpa, pressure, pressure_estimate,
          specific_force, specific_force_estimate, cameras, tracking, shape, forces, contacts, total_force_n,
-         baseline_age_s, baseline, stage_ms, replayed] = state;
-  return std::tuple(Field{"sequence", sequence}, Field{"times", times}, Field{"status", status},
-                    Field{"status_reason", status_reason}, Field{"reasons", reasons},
-                    Field{"pressure_mpa", pressure_mpa}, Field{"pressure", pressure},
-                    Measured("pressure_estimate", pressure_estimate), Field{"specific_force", specific_force},
-                    Measured("specific_force_estimate", specific_force_estimate), Field{"cameras", cameras},
-                    Field{"tracking", tracking}, Measured("shape", shape), Measured("forces", forces),
-                    Measured("contacts", contacts), Measured("total_force_n", total_force_n),
-                    Field{"baseline_age_s", baseline_age_s}, Field{"baseline", baseline},
-                    Field{"stage_ms", stage_ms}, Field{"replayed", replayed});
+         baseline_age_s, baseline, stage_ms, simulation, replayed] = state;
+  return std::tuple(
+      Field{"sequence", sequence}, Field{"times", times}, Field{"status", status},
+      Field{"status_reason", status_reason}, Field{"reasons", reasons}, Field{"pressure_mpa", pressure_mpa},
+      Field{"pressure", pressure}, Measured("pressure_estimate", pressure_estimate),
+      Field{"specific_force", specific_force}, Measured("specific_force_estimate", specific_force_estimate),
+      Field{"cameras", cameras}, Field{"tracking", tracking}, Measured("shape", shape),
+      Measured("forces", forces), Measured("contacts", contacts), Measured("total_force_n", total_force_n),
+      Field{"baseline_age_s", baseline_age_s}, Field{"baseline", baseline}, Field{"stage_ms", stage_ms},
+      Field{"simulation", simulation}, Field{"replayed", replayed});
 }
 
 template <typename T>

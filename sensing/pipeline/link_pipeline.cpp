@@ -404,6 +404,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.pressure_mpa = frame.pressure_mpa;
   state.pressure = frame.pressure;
   state.specific_force = frame.specific_force;
+  state.simulation = frame.simulation;
   state.stage_ms = {};
   const bool stale = frame.pressure.stale;
   const MeasuredLoads measured = s.MeasuredAt(frame);

@@ -49,8 +49,7 @@ struct DiscSkin::Factor {
   bool good = false;
 };
 
-DiscSkin::DiscSkin(const LinkModel& model, const std::vector<double>& disc_diameters_mm,
-                   const PressedSkinOptions& options)
+DiscSkin::DiscSkin(const LinkModel& model, size_t disc_count, const PressedSkinOptions& options)
     : model_(model),
       options_(options),
       mesh_(MakeShellMesh(model, options.refinement)),
@@ -68,10 +67,7 @@ DiscSkin::DiscSkin(const LinkModel& model, const std::vector<double>& disc_diame
     tube_ = std::make_unique<RigidContact>(of_nothing);
     tube_->SetBody(RigidBar{Vec3::Zero(), Vec3::UnitZ(), model.tube_outer_radius_mm});
   }
-  for (const double diameter : disc_diameters_mm) {
-    radii_mm_.push_back(std::max(diameter / 2, kRimMm));
-    discs_.emplace_back(of_nothing);
-  }
+  for (size_t i = 0; i < disc_count; ++i) discs_.emplace_back(of_nothing);
 }
 
 DiscSkin::~DiscSkin() = default;
@@ -80,9 +76,25 @@ SkinBalance DiscSkin::Rest() const {
   return {shell_.Rest(), std::vector<double>(discs_.size(), 0.0), std::vector<bool>(discs_.size(), false)};
 }
 
-RigidBody DiscSkin::BodyOf(size_t disc, const SkinDisc& place, double depth_mm) const {
-  return RigidStamp{model_.PointAtDepth(place.angle_rad, place.z_mm, depth_mm),
-                    -model_.OutwardNormal(place.angle_rad, place.z_mm), radii_mm_[disc], kRimMm};
+SkinBalance DiscSkin::NearTo(std::span<const Vec3> mids_mm, std::span<const Vec3> directors) const {
+  SkinBalance balance = Rest();
+  for (size_t i = 0; i < mids_mm.size(); ++i) {
+    Vec3& d = balance.state.directors[i];
+    Vec3& t = balance.state.tangents[i];
+    balance.state.mids_mm[i] = mids_mm[i];
+    d = directors[i].normalized();
+    t = (t - t.dot(d) * d).normalized();
+  }
+  std::ranges::fill(balance.depth_mm, kOffMm);
+  return balance;
+}
+
+RigidBody DiscSkin::BodyOf(const SkinDisc& disc, double depth_mm) const {
+  const Vec3 foremost = model_.PointAtDepth(disc.angle_rad, disc.z_mm, depth_mm);
+  const Vec3 outward = model_.OutwardNormal(disc.angle_rad, disc.z_mm);
+  const double radius = std::max(disc.diameter_mm / 2, kRimMm);
+  if (disc.is_sphere) return RigidSphere{foremost + radius * outward, radius};
+  return RigidStamp{foremost, -outward, radius, kRimMm};
 }
 
 void DiscSkin::Apply(const SkinLoad& load, const SkinBalance& balance) {
@@ -98,7 +110,7 @@ void DiscSkin::Apply(const SkinLoad& load, const SkinBalance& balance) {
     const SkinDisc& disc = load.discs[i];
     if (!disc.on) continue;
     const bool searched = disc.force_n && !balance.limited[i];
-    discs_[i].SetBody(BodyOf(i, disc, searched ? balance.depth_mm[i] : disc.depth_mm));
+    discs_[i].SetBody(BodyOf(disc, searched ? balance.depth_mm[i] : disc.depth_mm));
     loads_.push_back(&discs_[i]);
     if (searched) searched_.push_back(i);
   }
@@ -135,7 +147,7 @@ Eigen::VectorXd DiscSkin::DepthGradient(size_t disc, const SkinDisc& place, doub
   Eigen::VectorXd change = Eigen::VectorXd::Zero(shell_.dof_count());
   const auto& elements = shell_.surface().elements;
   for (const double side : {1.0, -1.0}) {
-    discs_[disc].SetBody(BodyOf(disc, place, depth_mm + side * kProbeMm));
+    discs_[disc].SetBody(BodyOf(place, depth_mm + side * kProbeMm));
     for (size_t e = 0; e < elements.size(); ++e) {
       ElementResponse response;
       discs_[disc].Add(DerivativeOrder::kGradient, static_cast<int>(e),
@@ -151,7 +163,7 @@ Eigen::VectorXd DiscSkin::DepthGradient(size_t disc, const SkinDisc& place, doub
       }
     }
   }
-  discs_[disc].SetBody(BodyOf(disc, place, depth_mm));
+  discs_[disc].SetBody(BodyOf(place, depth_mm));
   return change;
 }
 

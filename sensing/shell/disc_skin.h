@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "sensing/core/link_model.h"
@@ -13,11 +14,15 @@
 
 namespace taclink {
 
-/// A flat round disc that presses along a link's inward normal; the skin slides on it without friction.
+/// A rigid body that presses along a link's inward normal: a flat round disc, or a sphere. The skin slides on
+/// it without friction.
 struct SkinDisc {
   bool on = false;                 ///< otherwise it is not there
   double angle_rad = 0, z_mm = 0;  ///< where on the link's profile
-  /// Of its face, from the undeformed outer surface; of one with a force: the most.
+  double diameter_mm = 0;
+  bool is_sphere = false;
+  /// Of its face, or the sphere's foremost point, from the undeformed outer surface; of one with a force: the
+  /// most.
   double depth_mm = 0;
   std::optional<double> force_n;  ///< along its axis, positive; its depth is found
 };
@@ -66,11 +71,13 @@ struct BalanceSummary {
 /// holds where a force alone would let it snap. No line search: a guess that is too far fails. One thread.
 class DiscSkin {
  public:
-  DiscSkin(const LinkModel& model, const std::vector<double>& disc_diameters_mm,
-           const PressedSkinOptions& options);
+  /// `disc_count`: how many discs every SkinLoad has.
+  DiscSkin(const LinkModel& model, size_t disc_count, const PressedSkinOptions& options);
   ~DiscSkin();
 
   SkinBalance Rest() const;
+  /// A guess with the nodes there, by node; directors need not be unit. No disc is on.
+  SkinBalance NearTo(std::span<const Vec3> mids_mm, std::span<const Vec3> directors) const;
 
   /// From a guess to the equilibrium, which is stable if it was found; `balance` is spoilt if not.
   BalanceSummary Balance(const SkinLoad& load, SkinBalance& balance);
@@ -90,7 +97,7 @@ class DiscSkin {
  private:
   struct Factor;
 
-  RigidBody BodyOf(size_t disc, const SkinDisc& place, double depth_mm) const;
+  RigidBody BodyOf(const SkinDisc& disc, double depth_mm) const;
   void Apply(const SkinLoad& load, const SkinBalance& balance);
   double Misfit(const SkinLoad& load, const SkinBalance& balance);
   bool Factorize(const ShellState& state);
@@ -111,7 +118,6 @@ class DiscSkin {
   BodyForce body_;
   std::unique_ptr<RigidContact> tube_;
   std::deque<RigidContact> discs_;
-  std::vector<double> radii_mm_;
   std::vector<const ElementLoad*> loads_;
   std::unique_ptr<Factor> factor_;
   int factorizations_ = 0;

@@ -6,6 +6,13 @@
 #include <utility>
 
 namespace taclink {
+namespace {
+
+KeyContact::Numbers NumbersAt(const SkinKey& from, const SkinKey& to, size_t contact, double time_s) {
+  return &from == &to ? from.contacts[contact].value : ContactAt(from, to, contact, time_s);
+}
+
+}  // namespace
 
 Result<std::unique_ptr<SimulatedSkin>> NonlinearSkin::Make(const LinkModel& model, const Scene& scene) {
   auto plans = PlanContacts(model, scene);
@@ -13,17 +20,18 @@ Result<std::unique_ptr<SimulatedSkin>> NonlinearSkin::Make(const LinkModel& mode
   SceneSolver solver(model, scene, *plans);
   auto solved = solver.Solve();
   if (!solved) return solved.error();
-  return std::unique_ptr<SimulatedSkin>(
-      new NonlinearSkin(model, scene, std::move(*plans), solver.mesh(), std::move(*solved)));
+  return std::unique_ptr<SimulatedSkin>(new NonlinearSkin(model, scene, std::move(*plans), solver.mesh(),
+                                                          std::move(*solved), solver.loads().free_skins()));
 }
 
 NonlinearSkin::NonlinearSkin(const LinkModel& model, const Scene& scene, std::vector<ContactPlan> plans,
-                             ShellMesh mesh, SolvedScene solved)
+                             ShellMesh mesh, SolvedScene solved, std::vector<ShellState> free_skins)
     : model_(model),
       scene_(scene),
       plans_(std::move(plans)),
       mesh_(std::move(mesh)),
       parts_(std::move(solved.parts)),
+      free_skins_(std::move(free_skins)),
       writer_(model_, mesh_),
       finder_(model_, mesh_),
       nodes_{mesh_.mid_mm, mesh_.normals} {
@@ -37,6 +45,31 @@ NonlinearSkin::NonlinearSkin(const LinkModel& model, const Scene& scene, std::ve
 void NonlinearSkin::Evaluate(double time_s, SkinTruth& truth) {
   const double t = StartTruth(scene_, time_s, truth);
   truth.specific_force_mps2 = scene_.SpecificForceOf(model_.length_mm, t);
+  if (scene_.motion && scene_.motion->swing) truth.joint = scene_.motion->swing->At(t);
+  if (!EvaluateLive(time_s, truth)) Play(t, truth);
+  truth.trouble = trouble_;
+  writer_.Write(nodes_, truth);
+}
+
+// False: nobody handles the skin.
+bool NonlinearSkin::EvaluateLive(double time_s, SkinTruth& truth) {
+  if (!is_live_ && !handling_.any()) return false;
+  if (!is_live_) {
+    trouble_.clear();
+    if (!live_) live_ = std::make_unique<LiveSkin>(model_, scene_, plans_, free_skins_);
+    Play(scene_.SceneTime(time_s), truth);
+    is_live_ = live_->Begin(time_s, nodes_, pressing_);
+    if (!is_live_) trouble_ = "the skin can't be handled at this moment of its scene";
+  }
+  if (is_live_) {
+    is_live_ = live_->Evaluate(time_s, handling_, nodes_, truth);
+    trouble_ = live_->trouble();
+  }
+  return is_live_;
+}
+
+void NonlinearSkin::Play(double scene_time_s, SkinTruth& truth) {
+  const double t = scene_time_s;
   const auto part = std::find_if(parts_.begin(), parts_.end() - 1,
                                  [&](const PlayedPart& played) { return t < played.part.end_s; });
   const std::vector<SkinKey>& keys = part->keys;
@@ -53,18 +86,18 @@ void NonlinearSkin::Evaluate(double time_s, SkinTruth& truth) {
     nodes_.mids_mm[i] = mesh_.mid_mm[i] + place_.segment<3>(at).cast<double>();
     nodes_.directors[i] = mesh_.normals[i] + place_.segment<3>(at + 3).cast<double>();
   }
-  writer_.Write(nodes_, truth);
   truth.contacts.clear();
   truth.total_force_n.setZero();
+  pressing_ = from.contacts;
   for (size_t i = 0; i < plans_.size(); ++i) {
+    pressing_[i].value = NumbersAt(from, to, i, t);
     if (part->part.pressing[i] && plans_[i].Level(t) > 0) WriteContact(i, t, from, to, truth);
   }
 }
 
 void NonlinearSkin::WriteContact(size_t index, double time_s, const SkinKey& from, const SkinKey& to,
                                  SkinTruth& truth) {
-  const KeyContact::Numbers numbers =
-      &from == &to ? from.contacts[index].value : ContactAt(from, to, index, time_s);
+  const KeyContact::Numbers numbers = NumbersAt(from, to, index, time_s);
   TrueContact contact;
   contact.index = static_cast<int>(index);
   contact.force_n = numbers.head<3>().cast<double>();

@@ -82,7 +82,12 @@ double SceneLoads::FreeDepth(size_t contact, const SkinSpot& spot, double pressu
   return depth;
 }
 
-double SceneLoads::TouchingDepth(size_t contact, const SkinSpot& spot, const ShellState& state) const {
+const ScenePart& SceneLoads::PartAt(double time_s) const {
+  return *std::find_if(parts_.begin(), parts_.end() - 1,
+                       [&](const ScenePart& part) { return time_s < part.end_s; });
+}
+
+double SceneLoads::TouchingDepth(double diameter_mm, const SkinSpot& spot, const ShellState& state) const {
   const Vec3 origin = model_.PointAtDepth(spot.angle_rad, spot.z_mm, 0);
   const Vec3 normal = model_.OutwardNormal(spot.angle_rad, spot.z_mm);
   const ShellState& now = state;
@@ -94,7 +99,7 @@ double SceneLoads::TouchingDepth(size_t contact, const SkinSpot& spot, const She
     return sum;
   };
   constexpr int kAround = 12, kRings = 2;
-  const double radius = scene_.contacts[contact].patch_diameter_mm / 2;
+  const double radius = diameter_mm / 2;
   const double skin_radius = origin.head<2>().norm();
   double highest = height(spot.angle_rad, spot.z_mm);
   for (int i = 0; i < kAround * kRings; ++i) {
@@ -118,6 +123,7 @@ SkinLoad SceneLoads::At(const ScenePart& part, double time_s, double on_at_s) co
     const SkinSpot spot = plan.SpotAt(time_s);
     disc.angle_rad = spot.angle_rad;
     disc.z_mm = spot.z_mm;
+    disc.diameter_mm = contact.patch_diameter_mm;
     disc.depth_mm = MostDepth(model_, spot);
     if (contact.force_n) {
       disc.force_n = level * *contact.force_n;

@@ -37,10 +37,16 @@ class SceneLoads {
   /// Pressures at which to give the skin without contacts, for where contacts of a given depth begin; none if
   /// there are none of those, or no pressure.
   std::vector<double> FreePressures() const;
+  const std::vector<ShellState>& free_skins() const { return free_skins_; }
   void SetFreeSkins(std::vector<ShellState> states) { free_skins_ = std::move(states); }
 
-  /// How deep the face of a contact's disc is that just touches a skin in this state; negative: outside.
-  double TouchingDepth(size_t contact, const SkinSpot& spot, const ShellState& state) const;
+  /// How deep the face of a disc is that just touches a skin in this state; negative: outside.
+  double TouchingDepth(double diameter_mm, const SkinSpot& spot, const ShellState& state) const;
+  double TouchingDepth(size_t contact, const SkinSpot& spot, const ShellState& state) const {
+    return TouchingDepth(scene_.contacts[contact].patch_diameter_mm, spot, state);
+  }
+  /// The part at a time of the scene.
+  const ScenePart& PartAt(double time_s) const;
 
  private:
   void FindParts();

@@ -8,6 +8,11 @@
 
 namespace taclink {
 
+/// Of a joint: angle, and its first and second derivatives by time.
+struct JointMotion {
+  double rad = 0, radps = 0, radps2 = 0;
+};
+
 /// A swing about an axis that is fixed in the room and in the link: the angle at time t is
 /// mean - amplitude cos(2 pi t / period), so that it begins and ends at rest.
 struct Swing {
@@ -18,9 +23,7 @@ struct Swing {
   double period_s = 1;
   std::string joint = {};  ///< of the arm's URDF, which turns by that angle; may be empty
 
-  double AngleRad(double time_s) const;
-  double RateRadps(double time_s) const;
-  double AccelerationRadps2(double time_s) const;
+  JointMotion At(double time_s) const;
 };
 
 /// How a simulated link is held in gravity, and how it moves.
@@ -30,6 +33,8 @@ struct SceneMotion {
 
   /// Gravity less the acceleration of a point of the link, m/s^2, link frame.
   Vec3 SpecificForce(double time_s, const Vec3& point_mm) const;
+  /// The same, with the swing's joint moving like this.
+  Vec3 SpecificForce(const JointMotion& joint, const Vec3& point_mm) const;
   /// The largest norm of it over a period, at the link's origin.
   double MostMps2() const;
 };

@@ -20,12 +20,6 @@ constexpr double kWeakShare = 0.1;     // of its greatest, below which a force i
 constexpr double kForceStride = 0.4;  // of what is asked
 constexpr double kDepthStrideMm = 4, kSpotStrideMm = 6, kSpecificForceStrideMps2 = 3;
 
-std::vector<double> Diameters(const Scene& scene) {
-  std::vector<double> diameters;
-  for (const SceneContact& contact : scene.contacts) diameters.push_back(contact.patch_diameter_mm);
-  return diameters;
-}
-
 // The finer the contact's points, the smoother a slide; many discs would take much memory.
 double SpacingMm(const Scene& scene) {
   constexpr size_t kFew = 4;
@@ -76,7 +70,7 @@ SceneSolver::SceneSolver(const LinkModel& model, const Scene& scene, std::vector
     : model_(model),
       scene_(scene),
       tolerance_(tolerance),
-      skin_(model, Diameters(scene), {.refinement = scene.refinement, .spacing_mm = SpacingMm(scene)}),
+      skin_(model, scene.contacts.size(), {.refinement = scene.refinement, .spacing_mm = SpacingMm(scene)}),
       loads_(model, scene, std::move(plans), skin_.mesh()),
       rest_(skin_.Rest().state),
       greatest_n_(scene.contacts.size(), 0) {}

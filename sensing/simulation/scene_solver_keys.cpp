@@ -77,16 +77,13 @@ void SceneSolver::WriteContacts(const SkinLoad& load, const SkinBalance& balance
 }
 
 SkinBalance SceneSolver::FromPlace(const Eigen::VectorXf& place) const {
-  SkinBalance balance = skin_.Rest();
-  for (size_t i = 0; i < rest_.mids_mm.size(); ++i) {
+  std::vector<Vec3> mids_mm = rest_.mids_mm, directors = rest_.directors;
+  for (size_t i = 0; i < mids_mm.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(6 * i);
-    Vec3& d = balance.state.directors[i];
-    Vec3& t = balance.state.tangents[i];
-    balance.state.mids_mm[i] += place.segment<3>(at).cast<double>();
-    d = (d + place.segment<3>(at + 3).cast<double>()).normalized();
-    t = (t - t.dot(d) * d).normalized();
+    mids_mm[i] += place.segment<3>(at).cast<double>();
+    directors[i] += place.segment<3>(at + 3).cast<double>();
   }
-  return balance;
+  return skin_.NearTo(mids_mm, directors);
 }
 
 SkinBalance SceneSolver::BalanceOf(const SkinKey& key, double after_s) const {

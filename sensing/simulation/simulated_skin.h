@@ -5,6 +5,7 @@
 
 #include "sensing/core/link_model.h"
 #include "sensing/core/result.h"
+#include "sensing/simulation/handling.h"
 #include "sensing/simulation/scene.h"
 #include "sensing/simulation/skin_truth.h"
 
@@ -23,6 +24,10 @@ class SimulatedSkin {
   /// The truth at a time since the scene's start, which goes on for ever if the scene loops and stands still
   /// after its end if not. Reuses the truth's buffers.
   virtual void Evaluate(double time_s, SkinTruth& truth) = 0;
+
+  /// What a user does to the skin from the next moment on, over what the scene does; see CheckHandling. A
+  /// skin that can't be handled goes on as its scene does.
+  virtual void Handle(const Handling&) {}
 
   /// What was solved beforehand, in words; empty: nothing worth telling.
   virtual std::string Preparation() const { return {}; }

@@ -22,20 +22,23 @@ double Brightness(const CameraSettings& settings) {
 }  // namespace
 
 Result<std::unique_ptr<SimulatedSource>> SimulatedSource::Make(const LinkModel& model, const Scene& scene,
-                                                               Clock& clock, ScenePace pace) {
+                                                               Clock& clock, ScenePace pace,
+                                                               HandlingNow handling) {
   const int64_t start_ns = clock.MonotonicNs();
   auto skin = SimulatedSkin::Make(model, scene);
   if (!skin) return skin.error();
   const double took_s = 1e-9 * static_cast<double>(clock.MonotonicNs() - start_ns);
   return std::unique_ptr<SimulatedSource>(
-      new SimulatedSource(model, scene, clock, std::move(*skin), took_s, pace));
+      new SimulatedSource(model, scene, clock, std::move(*skin), took_s, pace, std::move(handling)));
 }
 
 SimulatedSource::SimulatedSource(const LinkModel& model, Scene scene, Clock& clock,
-                                 std::unique_ptr<SimulatedSkin> skin, double took_s, ScenePace pace)
+                                 std::unique_ptr<SimulatedSkin> skin, double took_s, ScenePace pace,
+                                 HandlingNow handling)
     : scene_(std::move(scene)),
       clock_(clock),
       pace_(pace),
+      handling_(std::move(handling)),
       skin_(std::move(skin)),
       renderer_(model, MountedRig(model.nominal_rig, scene_.camera), scene_.camera, scene_.seed) {
   const CameraModel& camera = model.nominal_rig[CameraId::kTop];
@@ -112,6 +115,7 @@ Result<void> SimulatedSource::Next(StereoFrame& frame, std::chrono::milliseconds
 }
 
 void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
+  if (handling_) skin_->Handle(handling_());
   skin_->Evaluate(static_cast<double>(frame_number) / scene_.frame_rate_hz, truth_);
   for (const CameraId id : kBothCameras) {
     renderer_.Render(truth_, id, gray_);
@@ -121,6 +125,7 @@ void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
   }
   frame.sequence = sequence_offset_ + frame_number;
   frame.pressure_mpa = truth_.pressure_mpa;
+  Report(frame);
   frame.specific_force.reset();
   frame.joint.reset();
   if (scene_.motion) {
@@ -130,11 +135,9 @@ void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
         .origin = AttitudeOrigin::kSimulated};
   }
   if (scene_.motion && scene_.motion->swing && !scene_.motion->swing->joint.empty()) {
-    const Swing& swing = *scene_.motion->swing;
-    const double time_s = scene_.SceneTime(truth_.time_s);
-    frame.joint = {.name = swing.joint,
-                   .position_rad = swing.AngleRad(time_s),
-                   .velocity_radps = swing.RateRadps(time_s)};
+    frame.joint = {.name = scene_.motion->swing->joint,
+                   .position_rad = truth_.joint.rad,
+                   .velocity_radps = truth_.joint.radps};
   }
   frame.times = {};
   frame.times.exposure_monotonic_ns = ExposureNs(frame_number);
@@ -143,9 +146,21 @@ void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
   frame.times.received_ns = now;
 }
 
+void SimulatedSource::Report(StereoFrame& frame) const {
+  if (!frame.simulation) frame.simulation.emplace();
+  frame.simulation->trouble = truth_.trouble;
+  frame.simulation->contacts.clear();
+  for (const TrueContact& contact : truth_.contacts)
+    frame.simulation->contacts.push_back({.body_id = contact.body_id,
+                                          .center_mm = contact.center_mm,
+                                          .normal = contact.normal,
+                                          .force_n = contact.force_n,
+                                          .depth_mm = contact.depth_mm});
+}
+
 Result<std::unique_ptr<FrameSource>> MakeSimulatedSource(const LinkModel& model, const Scene& scene,
-                                                         Clock& clock, ScenePace pace) {
-  auto source = SimulatedSource::Make(model, scene, clock, pace);
+                                                         Clock& clock, ScenePace pace, HandlingNow handling) {
+  auto source = SimulatedSource::Make(model, scene, clock, pace, std::move(handling));
   if (!source) return source.error();
   return std::unique_ptr<FrameSource>(std::move(*source));
 }

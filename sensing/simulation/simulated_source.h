@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
@@ -16,6 +17,9 @@
 
 namespace taclink {
 
+/// What a user does to the skin now; asked for once a frame.
+using HandlingNow = std::function<Handling()>;
+
 /// Plays a scene as a pair of cameras would deliver it: YUYV, at the scene's rate at most. Frame k of the
 /// scene has the sequence number k, whatever was skipped; another Start counts on.
 class SimulatedSource final : public FrameSource {
@@ -23,7 +27,8 @@ class SimulatedSource final : public FrameSource {
   /// The cameras are the model's nominal ones, mounted as the scene says. Errors: kInvalidArgument (the scene
   /// does not fit the model).
   static Result<std::unique_ptr<SimulatedSource>> Make(const LinkModel& model, const Scene& scene,
-                                                       Clock& clock, ScenePace pace = ScenePace::kClock);
+                                                       Clock& clock, ScenePace pace = ScenePace::kClock,
+                                                       HandlingNow handling = nullptr);
 
   Result<void> Start() override;  ///< from the scene's beginning
   Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override;
@@ -40,15 +45,17 @@ class SimulatedSource final : public FrameSource {
 
  private:
   SimulatedSource(const LinkModel& model, Scene scene, Clock& clock, std::unique_ptr<SimulatedSkin> skin,
-                  double took_s, ScenePace pace);
+                  double took_s, ScenePace pace, HandlingNow handling);
   int64_t ExposureNs(uint64_t frame) const;
   uint64_t NextDue(int64_t now_ns);
+  void Report(StereoFrame& frame) const;
   void Take(uint64_t frame_number, StereoFrame& frame);
 
   // Constant after construction.
   Scene scene_;
   Clock& clock_;
   const ScenePace pace_;
+  const HandlingNow handling_;
   std::unique_ptr<SimulatedSkin> skin_;
   Renderer renderer_;
   std::string name_;  // for messages
@@ -64,6 +71,7 @@ class SimulatedSource final : public FrameSource {
 };
 
 Result<std::unique_ptr<FrameSource>> MakeSimulatedSource(const LinkModel& model, const Scene& scene,
-                                                         Clock& clock, ScenePace pace);
+                                                         Clock& clock, ScenePace pace,
+                                                         HandlingNow handling = nullptr);
 
 }  // namespace taclink

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "sensing/core/geometry.h"
+#include "sensing/simulation/scene_motion.h"
 
 namespace taclink {
 
@@ -19,7 +21,8 @@ struct RadiusGrid {
 
 /// One thing that pushes on the skin. Link frame.
 struct TrueContact {
-  int index = 0;                  ///< in the scene's list, from 0
+  int index = 0;                  ///< in the scene's list, from 0; of a user's body behind those, by part
+  uint64_t body_id = 0;           ///< of a body that a user presses; 0: the scene's
   Vec3 center_mm = Vec3::Zero();  ///< on the deformed outer surface
   Vec3 normal = Vec3::Zero();     ///< unit, of the deformed skin there, away from the axis
   Vec3 force_n = Vec3::Zero();    ///< what the world exerts on the skin
@@ -34,10 +37,12 @@ struct SkinTruth {
   double time_s = 0;   ///< since the scene's start, not wrapped
   double pressure_mpa = 0;
   Vec3 specific_force_mps2 = Vec3::Zero();  ///< link frame; zero: a skin without weight
-  std::vector<Vec3> marker_mm;              ///< centres (see MarkerGrid::center_depth_mm), by marker index
-  std::vector<Vec3> marker_wall_mm;         ///< feet of the domes on the inner wall
-  std::vector<Vec3> marker_normal;          ///< of the skin there, unit, away from the axis
-  std::vector<bool> marker_is_lost;         ///< broken off the skin; empty: none is
+  JointMotion joint;                        ///< of the scene's swing, if it has one
+  std::string trouble;               ///< why a user's bodies do not go on or were taken off; empty: nothing
+  std::vector<Vec3> marker_mm;       ///< centres (see MarkerGrid::center_depth_mm), by marker index
+  std::vector<Vec3> marker_wall_mm;  ///< feet of the domes on the inner wall
+  std::vector<Vec3> marker_normal;   ///< of the skin there, unit, away from the axis
+  std::vector<bool> marker_is_lost;  ///< broken off the skin; empty: none is
   RadiusGrid inner_wall;
   std::vector<TrueContact> contacts;  ///< those that push now
   Vec3 total_force_n = Vec3::Zero();  ///< their sum

@@ -27,6 +27,7 @@ Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, C
     watched.push_back({links_.back().name, links_.back().rules, links_.back().model.markers});
     pressures_.push_back(parts.pressure ? std::move(parts.pressure) : MakeAssumedPressure(std::nullopt));
     attitudes_.push_back(parts.attitude ? std::move(parts.attitude) : MakeSourceAttitude());
+    simulations_.push_back(std::move(parts.simulation));
     LinkWorkerOptions worker = options.worker;
     worker.realtime = parts.realtime;
     worker.pressure = pressures_.back();
@@ -42,6 +43,12 @@ std::vector<std::string> Arm::link_names() const {
   std::vector<std::string> names;
   for (const LinkDescription& link : links_) names.push_back(link.name);
   return names;
+}
+
+Result<std::shared_ptr<SimulationDesk>> Arm::simulation(size_t link) const {
+  if (simulations_[link] != nullptr) return simulations_[link];
+  return Error{ErrorCode::kFailedPrecondition,
+               "link '" + links_[link].name + "' is not simulated: only simulated links can be handled"};
 }
 
 Result<size_t> Arm::FindLink(const std::string& name) const {

@@ -16,6 +16,7 @@
 #include "server/link/link_worker.h"
 #include "server/link/watchdog.h"
 #include "server/pressure/pressure_source.h"
+#include "server/simulation/simulation_desk.h"
 
 namespace taclink::server {
 
@@ -38,7 +39,8 @@ struct LinkParts {
   std::unique_ptr<LinkProcessor> processor;
   std::shared_ptr<PressureSource> pressure =
       nullptr;  ///< null: not known where the source does not measure it
-  std::shared_ptr<AttitudeSource> attitude = nullptr;  ///< null: as the source has it
+  std::shared_ptr<AttitudeSource> attitude = nullptr;    ///< null: as the source has it
+  std::shared_ptr<SimulationDesk> simulation = nullptr;  ///< null: not simulated
   LinkFactories factories = {};  ///< of the next source and processor; none: a link that dies stays so
   RealtimeOptions realtime = {};
 };
@@ -69,6 +71,8 @@ class Arm {
   const LinkSupervisor& worker(size_t link) const { return *workers_[link]; }
   Watchdog& watchdog() { return watchdog_; }
   PressureSource& pressure(size_t link) { return *pressures_[link]; }
+  /// Errors: kFailedPrecondition (the link is not simulated).
+  Result<std::shared_ptr<SimulationDesk>> simulation(size_t link) const;
   AttitudeSource& attitude(size_t link) { return *attitudes_[link]; }
   /// The index of a link. Errors: kNotFound, with the links there are.
   Result<size_t> FindLink(const std::string& name) const;
@@ -90,9 +94,10 @@ class Arm {
   std::unique_ptr<ArmContacts> contacts_;
   Hub hub_;
   std::unique_ptr<EventEngine> events_;
-  std::vector<std::shared_ptr<PressureSource>> pressures_;  // by link
-  std::vector<std::shared_ptr<AttitudeSource>> attitudes_;  // by link
-  std::vector<std::unique_ptr<LinkSupervisor>> workers_;    // by link
+  std::vector<std::shared_ptr<PressureSource>> pressures_;    // by link
+  std::vector<std::shared_ptr<AttitudeSource>> attitudes_;    // by link
+  std::vector<std::shared_ptr<SimulationDesk>> simulations_;  // by link; null: not simulated
+  std::vector<std::unique_ptr<LinkSupervisor>> workers_;      // by link
   Watchdog watchdog_;
 };
 

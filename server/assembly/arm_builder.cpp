@@ -41,6 +41,16 @@ class ChosenForceModel {
   std::optional<ForceModel> model_;  // guarded by mutex_; none: by tolerance, frame by frame
 };
 
+// Null: the link is not simulated.
+Result<std::shared_ptr<SimulationDesk>> MakeDesk(const LinkConfig& link, const LinkModel& model,
+                                                 Clock& clock) {
+  const auto* simulated = std::get_if<SimulatedSourceConfig>(&link.source);
+  if (simulated == nullptr) return std::shared_ptr<SimulationDesk>();
+  auto scene = LoadScene(simulated->scene);
+  if (!scene) return scene.error();
+  return std::make_shared<SimulationDesk>(model, *std::move(scene), clock);
+}
+
 Result<bool> IsInflatedByScene(const LinkConfig& link) {
   const auto* simulated = std::get_if<SimulatedSourceConfig>(&link.source);
   if (simulated == nullptr) return false;
@@ -85,8 +95,12 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock, const Backgrou
   if (const auto good = CheckForceModel(link, *inflated); !good)
     return Error{good.error().code, "force_model " + good.error().message};
   const auto chosen = std::make_shared<ChosenForceModel>(link.force_model);
+  const auto desk = MakeDesk(link, *model, clock);
+  if (!desk) return desk.error();
+  HandlingNow handling;
+  if (*desk != nullptr) handling = [shared = *desk] { return shared->Now(); };
   const LinkFactories factories = {
-      .source = [link, model = *model, &clock] { return MakeSource(link, model, clock); },
+      .source = [link, model = *model, &clock, handling] { return MakeSource(link, model, clock, handling); },
       .processor = [link, model = *model, chosen,
                     background] { return MakeProcessor(chosen->In(link), model, background); },
       .estimator = [link, model = *model, background, is_inflated = *inflated](
@@ -113,6 +127,7 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock, const Backgrou
                    .source = std::move(*source),
                    .processor = std::move(*processor),
                    .pressure = MakePressure(link, clock),
+                   .simulation = *desk,
                    .factories = factories,
                    .realtime = link.realtime};
 }

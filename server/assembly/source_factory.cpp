@@ -3,7 +3,6 @@
 #include "sensing/capture/file_source.h"
 #include "sensing/capture/v4l2_source.h"
 #include "sensing/simulation/scene.h"
-#include "sensing/simulation/simulated_source.h"
 
 namespace taclink::server {
 namespace {
@@ -13,6 +12,7 @@ using SourceResult = Result<std::unique_ptr<FrameSource>>;
 struct SourceMaker {
   const LinkModel& model;
   Clock& clock;
+  const HandlingNow& handling;
 
   SourceResult operator()(const V4l2SourceConfig& config) const {
     return MakeV4l2Source({.devices = config.devices,
@@ -39,14 +39,14 @@ struct SourceMaker {
   SourceResult operator()(const SimulatedSourceConfig& config) const {
     const auto scene = LoadScene(config.scene);
     if (!scene) return scene.error();
-    return MakeSimulatedSource(model, *scene, clock, config.pace);
+    return MakeSimulatedSource(model, *scene, clock, config.pace, handling);
   }
 };
 
 }  // namespace
 
-SourceResult MakeSource(const LinkConfig& link, const LinkModel& model, Clock& clock) {
-  return std::visit(SourceMaker{model, clock}, link.source);
+SourceResult MakeSource(const LinkConfig& link, const LinkModel& model, Clock& clock, HandlingNow handling) {
+  return std::visit(SourceMaker{model, clock, handling}, link.source);
 }
 
 }  // namespace taclink::server

@@ -47,7 +47,8 @@ RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const
                      Recorder* recorder)
     : senders_(std::make_shared<boost::asio::thread_pool>(1)),
       service_(arm, limits, senders_, security),
-      operations_(arm, security) {
+      operations_(arm, security),
+      simulations_(arm) {
   if (recorder != nullptr)
     recordings_ = std::make_unique<RecordingService>(*recorder, service_.registry(), senders_, security);
 }
@@ -66,6 +67,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
   builder.AddListeningPort(listen, MakeCredentials(listen, security), &port);
   builder.RegisterService(&out->service_);
   builder.RegisterService(&out->operations_);
+  builder.RegisterService(&out->simulations_);
   if (recorder != nullptr) builder.RegisterService(out->recordings_.get());
   out->server_ = builder.BuildAndStart();
   if (!out->server_ || port == 0) {
@@ -75,6 +77,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
   out->address_ = WithPort(listen, port);
   out->server_->GetHealthCheckService()->SetServingStatus(v1::TactileService::service_full_name(), true);
   out->server_->GetHealthCheckService()->SetServingStatus(v1::OperationsService::service_full_name(), true);
+  out->server_->GetHealthCheckService()->SetServingStatus(v1::SimulationService::service_full_name(), true);
   if (recorder != nullptr)
     out->server_->GetHealthCheckService()->SetServingStatus(v1::RecordingService::service_full_name(), true);
   return out;

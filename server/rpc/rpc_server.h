@@ -11,6 +11,7 @@
 #include "server/arm/arm.h"
 #include "server/rpc/services/operations_service.h"
 #include "server/rpc/services/recording_service.h"
+#include "server/rpc/services/simulation_service.h"
 #include "server/rpc/services/tactile_service.h"
 #include "server/security/security.h"
 
@@ -47,6 +48,7 @@ class RpcServer {
   const std::shared_ptr<boost::asio::thread_pool> senders_;
   TactileService service_;
   OperationsService operations_;
+  SimulationService simulations_;
   std::unique_ptr<RecordingService> recordings_;  // null: none
   std::unique_ptr<grpc::Server> server_;
   std::string address_;

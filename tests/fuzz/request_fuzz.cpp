@@ -7,6 +7,7 @@
 #include "server/rpc/streams/replay_request.h"
 #include "taclink/v1/operations.pb.h"
 #include "taclink/v1/recording.pb.h"
+#include "taclink/v1/simulation.pb.h"
 #include "taclink/v1/tactile.pb.h"
 
 using namespace taclink;
@@ -39,7 +40,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       &Parse<v1::StartRecordingRequest>,    &Parse<v1::DownloadLogRequest>,
       &Parse<v1::ControlReplayRequest>,     &Parse<v1::GetReplayPicturesRequest>,
       &Parse<v1::UpdateJointStatesRequest>, &Parse<v1::UpdatePressureRequest>,
-      &Parse<v1::UpdateAttitudeRequest>};
+      &Parse<v1::UpdateAttitudeRequest>,    &Parse<v1::PressRequest>,
+      &Parse<v1::SetScenePressureRequest>};
   constexpr size_t kCount = std::size(kParsers);
   const size_t call = data[0] % (kCount + 2);
   if (call < kCount) {

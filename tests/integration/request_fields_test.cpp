@@ -11,6 +11,7 @@
 
 #include "taclink/v1/operations.grpc.pb.h"
 #include "taclink/v1/recording.grpc.pb.h"
+#include "taclink/v1/simulation.grpc.pb.h"
 #include "taclink/v1/tactile.grpc.pb.h"
 #include "tests/integration/support.h"
 
@@ -32,10 +33,14 @@ const std::set<std::string> kMayBeNegative = {
     "Vector3.x",
     "Vector3.y",
     "Vector3.z",
+    "PressRequest.angle_rad",
+    "MoveSceneJointRequest.position_rad",
     "SetCameraRequest.gain",  // in units of the camera, which knows its range
 };
 const std::set<std::string> kMayBeHuge = {
     "SetCameraRequest.gain",
+    "PressRequest.body_id",  // chosen by the caller
+    "ReleaseRequest.body_id",
     "DownloadLogRequest.offset",           // past a log's end is OUT_OF_RANGE
     "StreamEventsRequest.after_sequence",  // has not happened, or belongs to another run
     "ReplayRequest.from_utc_ns",
@@ -200,7 +205,8 @@ class RequestFieldsTest : public ::testing::Test {
     for (const auto* service :
          {v1::GetArmRequest::descriptor()->file()->FindServiceByName("TactileService"),
           v1::StartRecordingRequest::descriptor()->file()->FindServiceByName("RecordingService"),
-          v1::RestartLinkRequest::descriptor()->file()->FindServiceByName("OperationsService")}) {
+          v1::RestartLinkRequest::descriptor()->file()->FindServiceByName("OperationsService"),
+          v1::PressRequest::descriptor()->file()->FindServiceByName("SimulationService")}) {
       EXPECT_NE(service, nullptr);
       for (int i = 0; service != nullptr && i < service->method_count(); ++i)
         out.push_back(service->method(i));

@@ -60,6 +60,14 @@ struct Setter {
     value.origin = AttitudeOrigin::kClient;
     (*this)(path, value.trouble);
   }
+  void operator()(const std::string& path, SimulationReport& value) const {
+    auto& [contacts, trouble] = value;
+    (*this)(path, trouble);
+    auto& [body_id, center_mm, normal, force_n, depth_mm] = contacts.emplace_back();
+    (*this)(path, body_id);
+    for (Vec3* vector : {&center_mm, &normal, &force_n}) (*this)(path, *vector);
+    (*this)(path, depth_mm);
+  }
   void operator()(const std::string&, MeasuredDisplacement& value) const { value.displacement_mm.setOnes(); }
   void operator()(const std::string&, RejectedMarker& value) const { value.marker = 1; }
   void operator()(const std::string&, std::array<CameraCounts, kCameraCount>& cameras) const {
@@ -133,6 +141,13 @@ struct Printer {
   }
   static std::string Text(const PressureEstimate& value) {
     return Text(value.mpa) + " " + Text(value.sigma_mpa);
+  }
+  static std::string Text(const SimulationReport& value) {
+    std::string text = value.trouble;
+    for (const AppliedContact& contact : value.contacts)
+      text += " " + Text(contact.body_id) + " " + Text(contact.center_mm) + Text(contact.normal) +
+              Text(contact.force_n) + Text(contact.depth_mm);
+    return text;
   }
   static std::string Text(const SpecificForceEstimate& value) {
     return Text(value.mps2) + " " + Text(value.covariance);

@@ -48,7 +48,7 @@ describe("the arm", () => {
     await page.getByRole("button", { name: /^Focus/ }).click();
     await visit.drawn();
     await visit.picture("live");
-    await page.locator(".legend select").nth(1).selectOption("inferno");
+    await page.locator(".legend select").nth(2).selectOption("inferno");
     await visit.drawn();
     const touched = await visit.shareOfPixels(isLoaded);
     await visit.row("still").click();
@@ -76,13 +76,13 @@ describe("the arm", () => {
     await visit.page.locator(".label.force").first().waitFor();
     const box = (await map.boundingBox())!;
     await visit.page.mouse.move(box.x + (6.5 / 24) * box.width, box.y + (1 - 4.5 / 10) * box.height);
-    await expect.poll(() => readout.innerText()).toMatch(/path 6, ring 4: [1-9]/);
+    await expect.poll(() => readout.innerText()).toMatch(/path 7, ring 5: [1-9]/);
     const pressure = Number(/: ([\d.]+) kPa/.exec(await readout.innerText())![1]);
     expect(pressure).toBeGreaterThan(1);
     await map.focus();
     await visit.page.keyboard.press("ArrowRight");
     await visit.page.keyboard.press("ArrowUp");
-    await expect.poll(() => readout.innerText()).toContain("path 7, ring 5");
+    await expect.poll(() => readout.innerText()).toContain("path 8, ring 6");
     await visit.picture("map");
     await visit.close();
   });

@@ -73,7 +73,7 @@ export class Visit {
   /** Share of the scene's pixels that `is` holds for; r, g, b: 0 to 255. Only the canvas counts, no text over it. */
   async shareOfPixels(is: (r: number, g: number, b: number) => boolean): Promise<number> {
     const style = await this.page.addStyleTag({
-      content: ".labels, .legend, .tools { visibility: hidden !important; }",
+      content: ".labels, .legend, .poke, .tools { visibility: hidden !important; }",
     });
     const png = await this.page.locator(".scene canvas").screenshot();
     await style.evaluate((element) => (element as Element).remove());

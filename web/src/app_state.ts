@@ -7,6 +7,7 @@ import { ArmStore } from "./model/arm_store";
 import type { Feed } from "./model/feed";
 import { keepCurves, restoreCurves } from "./model/kept_curves";
 import { LiveFeed } from "./model/live_feed";
+import { Poker } from "./model/poker";
 import { ReplayFeed } from "./model/replay_feed";
 import { COLOUR_MAPS, type ColourMapName } from "./skin/colour_map";
 import type { Quantity } from "./skin/fields";
@@ -18,6 +19,8 @@ const prefersLight = matchMedia("(prefers-color-scheme: light)");
 /** All that the views share. */
 export class AppState {
   readonly session = new Session();
+  /** The finger of this page on simulated links. */
+  readonly poker = new Poker(this.session, (text) => this.tell(text, true));
   /** Of the live arm; of a log while one is played. */
   readonly store: Signal<ArmStore>;
   readonly feed: Signal<Feed>;
@@ -26,7 +29,9 @@ export class AppState {
   readonly link = signal("");
   readonly log = signal("");
   readonly quantity = signal<Quantity>("pressure");
-  readonly colourMap = signal<ColourMapName>("cividis");
+  readonly colourMap = signal<ColourMapName>("skin");
+  /** How many times as deep as they are dents are drawn. */
+  readonly depthScale = signal(1);
   readonly theme = signal<Theme>("system");
   /** For people, at the foot of the page for a while. */
   readonly notice = signal<{ text: string; bad: boolean } | undefined>(undefined);

@@ -15,6 +15,7 @@ using Selected = std::function<Result<void>()>;
 void AddCameras(const Arguments& app, Selected& selected);
 void AddList(const Arguments& app, Selected& selected);
 void AddLog(const Arguments& app, Selected& selected);
+void AddPoke(const Arguments& app, Selected& selected);
 void AddRecord(const Arguments& app, Selected& selected);
 void AddRestart(const Arguments& app, Selected& selected);
 void AddWatch(const Arguments& app, Selected& selected);

@@ -11,6 +11,7 @@ void AddCommands(const taclink::command::Arguments& app, taclink::command::Selec
   AddCameras(app, selected);
   AddList(app, selected);
   AddLog(app, selected);
+  AddPoke(app, selected);
   AddRecord(app, selected);
   AddRestart(app, selected);
   AddWatch(app, selected);

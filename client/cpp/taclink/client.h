@@ -9,6 +9,7 @@
 #include "taclink/result.h"
 #include "taclink/v1/arm.pb.h"
 #include "taclink/v1/frame.pb.h"
+#include "taclink/v1/simulation.pb.h"
 #include "taclink/v1/tactile.pb.h"
 #include "taclink/v1/tare.pb.h"
 #include "taclink/values.h"
@@ -92,6 +93,19 @@ class Client {
   /// accepted the order; GetArm shows its progress. Errors: kNotFound, kUnavailable.
   Result<void> RestartLink(const std::string& link,
                            std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
+
+  /// Handles a simulated link: presses a body on it (and moves one that is there), takes bodies off (0: all),
+  /// sets the pressure inside its skin, moves the joint of its scene; see simulation.proto. Frames then tell
+  /// what is true (LinkFrame.simulation). Errors: kNotFound, kInvalidArgument (what is possible is in the
+  /// message), kFailedPrecondition (the link is not simulated).
+  Result<void> Press(const v1::PressRequest& request,
+                     std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
+  Result<void> Release(const std::string& link, uint64_t body_id = 0,
+                       std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
+  Result<void> SetScenePressure(const v1::SetScenePressureRequest& request,
+                                std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
+  Result<void> MoveSceneJoint(const v1::MoveSceneJointRequest& request,
+                              std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
 
   /// Sets exposure and gain; absent fields stay as they are. The settings hold until the server ends. Errors:
   /// kNotFound, kInvalidArgument (with the range of the camera), kUnsupported (nothing to set), kUnavailable

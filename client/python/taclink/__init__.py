@@ -45,12 +45,14 @@ from taclink.messages.events import (
 )
 from taclink.messages.force_level import ForceLevelState, MarkerRange, Thresholds
 from taclink.messages.frame import (
+    AppliedContact,
     CameraCounts,
     Contact,
     Frame,
     FrameTimes,
     PressureEstimate,
     PressureReport,
+    SimulationReport,
     SpecificForceEstimate,
     SpecificForceReport,
     StageTimes,
@@ -80,6 +82,7 @@ from taclink.names import (
     AcquireReason,
     AttitudeOrigin,
     BaselineOrigin,
+    BodyShape,
     Detail,
     DriftState,
     EventKind,
@@ -114,6 +117,7 @@ Compression = LogCompression  # deprecated: use LogCompression
 
 __all__ = [
     "AcquireReason",
+    "AppliedContact",
     "Arm",
     "ArmContact",
     "ArmContacts",
@@ -122,6 +126,7 @@ __all__ = [
     "AttitudeWriter",
     "Baseline",
     "BaselineOrigin",
+    "BodyShape",
     "CalibrationResult",
     "Caller",
     "Camera",
@@ -196,6 +201,7 @@ __all__ = [
     "ReplayStatus",
     "ResourceExhausted",
     "Role",
+    "SimulationReport",
     "Source",
     "SourceKind",
     "SpecificForceEstimate",

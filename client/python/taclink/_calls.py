@@ -20,15 +20,15 @@ from taclink.messages.recording import (
     logs_from,
     recorder_from,
 )
-from taclink.names import ForceModel, LogCompression, number_of
-from taclink.v1 import events_pb2, operations_pb2, recording_pb2, tactile_pb2, tare_pb2
+from taclink.names import BodyShape, ForceModel, LogCompression, number_of
+from taclink.v1 import events_pb2, operations_pb2, recording_pb2, simulation_pb2, tactile_pb2, tare_pb2
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Call(Generic[T]):
-    """`method` of `service` (tactile, operations or recording), and what its answer means."""
+    """`method` of `service` (tactile, operations, recording or simulation), and what its answer means."""
 
     service: str
     method: str
@@ -56,6 +56,48 @@ def caller() -> Call[Caller]:
 
 def restart_link(link: str) -> Call[None]:
     return Call("operations", "RestartLink", operations_pb2.RestartLinkRequest(link=link), _nothing)
+
+
+def press(
+    link: str,
+    angle_rad: float,
+    z_m: float,
+    depth_m: float | None,
+    force_n: float | None,
+    shape: str,
+    diameter_m: float,
+    body_id: int,
+    hold_s: float,
+) -> Call[None]:
+    if (depth_m is None) == (force_n is None):
+        raise InvalidArgument("a body needs a depth or a force, and not both")
+    request = simulation_pb2.PressRequest(
+        link=link,
+        body_id=body_id,
+        shape=number_of(BodyShape, shape, "shape"),
+        diameter_m=diameter_m,
+        angle_rad=angle_rad,
+        z_m=z_m,
+        depth_m=depth_m,
+        force_n=force_n,
+        hold_s=hold_s,
+    )
+    return Call("simulation", "Press", request, _nothing)
+
+
+def release(link: str, body_id: int) -> Call[None]:
+    request = simulation_pb2.ReleaseRequest(link=link, body_id=body_id)
+    return Call("simulation", "Release", request, _nothing)
+
+
+def set_scene_pressure(link: str, pressure_pa: float | None) -> Call[None]:
+    request = simulation_pb2.SetScenePressureRequest(link=link, pressure_pa=pressure_pa)
+    return Call("simulation", "SetScenePressure", request, _nothing)
+
+
+def move_scene_joint(link: str, position_rad: float | None) -> Call[None]:
+    request = simulation_pb2.MoveSceneJointRequest(link=link, position_rad=position_rad)
+    return Call("simulation", "MoveSceneJoint", request, _nothing)
 
 
 def tare(

@@ -12,7 +12,7 @@ import grpc
 
 from taclink._patience import patience_s
 from taclink.errors import InvalidArgument, NotFound
-from taclink.v1 import operations_pb2_grpc, recording_pb2_grpc, tactile_pb2_grpc
+from taclink.v1 import operations_pb2_grpc, recording_pb2_grpc, simulation_pb2_grpc, tactile_pb2_grpc
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
 FilePath = Union[str, "os.PathLike[str]"]
@@ -52,6 +52,7 @@ def stubs(channel: Any) -> dict[str, Any]:
         "tactile": tactile_pb2_grpc.TactileServiceStub(channel),
         "operations": operations_pb2_grpc.OperationsServiceStub(channel),
         "recording": recording_pb2_grpc.RecordingServiceStub(channel),
+        "simulation": simulation_pb2_grpc.SimulationServiceStub(channel),
     }
 
 

@@ -256,6 +256,41 @@ class Client:
         """A fresh source and processor for a link; arm() tells how it goes. Errors: NotFound (no such link)."""
         self._connection.ask(_calls.restart_link(link))
 
+    def press(
+        self,
+        link: str,
+        angle_rad: float,
+        z_m: float,
+        *,
+        depth_m: float | None = None,
+        force_n: float | None = None,
+        shape: str = "finger",
+        diameter_m: float = 0,
+        body_id: int = 1,
+        hold_s: float = 0,
+    ) -> None:
+        """Presses a rigid body on a simulated link, or moves one that is there; frames then tell what is true.
+
+        angle_rad, z_m: where on the undeformed skin. depth_m (from where it first touches) or force_n. diameter_m: of
+        "sphere" and "disc". hold_s: taken off when no other press() of it comes for so long; 0: it stays. Errors:
+        NotFound, InvalidArgument (what is possible is in the message), Refused (the link is not simulated).
+        """
+        self._connection.ask(
+            _calls.press(link, angle_rad, z_m, depth_m, force_n, shape, diameter_m, body_id, hold_s)
+        )
+
+    def release(self, link: str, body_id: int = 0) -> None:
+        """Takes a body off a simulated link; 0: all. Errors: as press()."""
+        self._connection.ask(_calls.release(link, body_id))
+
+    def set_scene_pressure(self, link: str, pressure_pa: float | None) -> None:
+        """The gauge pressure inside a simulated skin, 0 to 3000 Pa; None: the scene's. Errors: as press()."""
+        self._connection.ask(_calls.set_scene_pressure(link, pressure_pa))
+
+    def move_scene_joint(self, link: str, position_rad: float | None) -> None:
+        """Moves the joint of a simulated link's scene; None: as the scene swings it. Errors: as press()."""
+        self._connection.ask(_calls.move_scene_joint(link, position_rad))
+
     def update_joint_states(self) -> JointStateWriter:
         """Begins to tell the server where the arm's joints are."""
         return JointStateWriter(self._connection)

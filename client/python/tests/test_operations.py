@@ -166,3 +166,26 @@ def test_pressures_are_refused_with_the_reason(client: taclink.Client) -> None:
     with pytest.raises(ZeroDivisionError):
         with client.update_pressure():
             raise ZeroDivisionError
+
+
+def test_a_simulated_skin_is_pressed_and_released(client: taclink.Client, measuring: None) -> None:
+    with pytest.raises(taclink.InvalidArgument, match="depth or a force"):
+        client.press("idle", 0, 0.08)
+    with pytest.raises(taclink.InvalidArgument, match="between the clamped ends"):
+        client.press("idle", 0, 8, depth_m=0.005)
+    with pytest.raises(taclink.InvalidArgument, match="shape must be one of finger"):
+        client.press("idle", 0, 0.08, depth_m=0.005, shape="foot")
+
+    def pressing(frame: taclink.Frame) -> list[taclink.AppliedContact]:
+        assert frame.simulation is not None and frame.simulation.trouble == ""
+        return [each for each in frame.simulation.contacts if each.body_id == 3]
+
+    client.press("idle", 0.7, 0.08, depth_m=0.006, body_id=3)
+    deep = next(frame for frame in client.frames("idle") if any(each.depth_m > 0.0055 for each in pressing(frame)))
+    (body,) = pressing(deep)
+    assert body.force_n.shape == body.center_m.shape == (3,) and body.force_n @ body.normal < 0
+    client.set_scene_pressure("idle", None)
+    client.release("idle", 3)
+    with pytest.raises(taclink.NotFound, match="no body 3"):
+        client.release("idle", 3)
+    assert any(not pressing(frame) for frame in client.frames("idle"))

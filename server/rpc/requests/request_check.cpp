@@ -23,6 +23,7 @@ constexpr double kMostPairs = 300;  // 10 s at 30 Hz
 constexpr double kMostPosition = 1e6;
 constexpr double kMostVacuumPa = 2e5, kMostPressurePa = 1e7;
 constexpr double kMostSpecificForce = 100;  // m/s^2
+constexpr double kMostHoldS = 3600;
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 struct Bounds {
@@ -58,6 +59,14 @@ constexpr std::array kBounds = {
     Bounds{"UpdatePressureRequest.pressure_pa", -kMostVacuumPa, kMostPressurePa, "Pa above the surroundings"},
     Bounds{"UpdatePressureRequest.utc_ns", 0, kNoLimit, "ns since 1970"},
     Bounds{"UpdatePressureRequest.monotonic_ns", 0, kNoLimit, "ns of the server's clock"},
+    Bounds{"PressRequest.diameter_m", 0, kMostLengthM, "m; 0: 0.011"},
+    Bounds{"PressRequest.angle_rad", -kMostPosition, kMostPosition, "rad"},
+    Bounds{"PressRequest.z_m", 0, kMostLengthM, "m"},
+    Bounds{"PressRequest.depth_m", 0, kMostLengthM, "m"},
+    Bounds{"PressRequest.force_n", 0, kMostForceN, "N"},
+    Bounds{"SetScenePressureRequest.pressure_pa", 0, kMostPressurePa, "Pa above the surroundings"},
+    Bounds{"MoveSceneJointRequest.position_rad", -kMostPosition, kMostPosition, "rad"},
+    Bounds{"PressRequest.hold_s", 0, kMostHoldS, "s; 0: until Release"},
     Bounds{"Vector3.x", -kMostSpecificForce, kMostSpecificForce, "m/s^2"},
     Bounds{"Vector3.y", -kMostSpecificForce, kMostSpecificForce, "m/s^2"},
     Bounds{"Vector3.z", -kMostSpecificForce, kMostSpecificForce, "m/s^2"},

@@ -60,8 +60,8 @@ TEST(Scene, ReadsMotion) {
   const Swing& swing = *scene->motion->swing;
   EXPECT_EQ(swing.axis, Vec3::UnitZ());
   EXPECT_EQ(swing.pivot_mm, Vec3(1, 2, 3));
-  EXPECT_NEAR(swing.AngleRad(0), RadFromDeg(15), 1e-12);
-  EXPECT_NEAR(swing.AngleRad(2), RadFromDeg(75), 1e-12);
+  EXPECT_NEAR(swing.At(0).rad, RadFromDeg(15), 1e-12);
+  EXPECT_NEAR(swing.At(2).rad, RadFromDeg(75), 1e-12);
   EXPECT_FALSE(ParseScene("s.yaml", "taclink_scene: 1\nname: s\nduration_s: 4\n")->motion);
 }
 
@@ -91,7 +91,7 @@ TEST(SceneMotion, SpecificForceIsGravityLessAcceleration) {
   const Vec3 point_mm(5, 10, 95);
   for (const double t : {0.0, 0.4, 1.1, 1.5, 2.9}) {
     SCOPED_TRACE(t);
-    const auto rotation = [&](double s) { return Mat3(Eigen::AngleAxisd(swing.AngleRad(s), swing.axis)); };
+    const auto rotation = [&](double s) { return Mat3(Eigen::AngleAxisd(swing.At(s).rad, swing.axis)); };
     const auto place_m = [&](double s) { return Vec3(1e-3 * (rotation(s) * (point_mm - swing.pivot_mm))); };
     constexpr double kStepS = 1e-4;
     const Vec3 acceleration =

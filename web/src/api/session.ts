@@ -3,6 +3,7 @@ import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { computed, signal } from "@preact/signals";
 import { OperationsService, Role, type GetCallerResponse } from "./gen/taclink/v1/operations_pb";
 import { RecordingService } from "./gen/taclink/v1/recording_pb";
+import { SimulationService } from "./gen/taclink/v1/simulation_pb";
 import { TactileService } from "./gen/taclink/v1/tactile_pb";
 
 const TOKEN_KEY = "taclink.token";
@@ -12,6 +13,7 @@ export class Session {
   readonly tactile: Client<typeof TactileService>;
   readonly recording: Client<typeof RecordingService>;
   readonly operations: Client<typeof OperationsService>;
+  readonly simulation: Client<typeof SimulationService>;
 
   /** As the server sees the user; undefined: not asked yet. */
   readonly caller = signal<GetCallerResponse | undefined>(undefined);
@@ -31,6 +33,7 @@ export class Session {
     this.tactile = createClient(TactileService, transport);
     this.recording = createClient(RecordingService, transport);
     this.operations = createClient(OperationsService, transport);
+    this.simulation = createClient(SimulationService, transport);
   }
 
   /** Asks the server who the user is. Throws what the call throws. */

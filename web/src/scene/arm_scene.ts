@@ -6,19 +6,25 @@ import { lengthOf } from "../model/vectors";
 import { colourTable, StickyRange, type ColourMapName } from "../skin/colour_map";
 import { QUANTITIES, type Quantity } from "../skin/fields";
 import { sameShape } from "../skin/same_shape";
+import type { SkinPlace } from "../model/poker";
+import { Bones } from "./bones";
 import { ForceArrows, type ForceArrow } from "./force_arrows";
+import { fitView } from "./fit_view";
 import { Labels, type Label } from "./labels";
 import { LinkObject } from "./link_object";
+import { SkinPointer } from "./skin_pointer";
 
-const LONGEST_ARROW_M = 0.1;
-const FIRST_ARROW_RANGE_N = 2;
+const LONGEST_ARROW = 1 / 3; // of a link's length
+const FIRST_ARROW_RANGE_N = 0.5;
+const CLAMP_M = 0.004; // nothing presses nearer to a clamped end
 const DRAG_PX = 4;
+const FOOT_M = 0.06; // of the floor below the lowest link
 
 /** What the legend tells. */
 export interface Scales {
   /** Top of the colour scale, in the unit of the quantity. */
   top: number;
-  /** Force of an arrow of LONGEST_ARROW_M, N. */
+  /** Force of an arrow of arrowM, N. */
   arrowN: number;
   arrowM: number;
 }
@@ -27,6 +33,11 @@ export interface Scales {
 export class ArmScene {
   onPick: (link: string) => void = () => undefined;
   onScales: (scales: Scales) => void = () => undefined;
+  /** A skin that may be pressed. */
+  mayPress: (link: string) => boolean = () => false;
+  onPress: (place: SkinPlace) => void = () => undefined;
+  onDeepen: (byM: number) => void = () => undefined;
+  onLetGo: () => void = () => undefined;
 
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
@@ -40,9 +51,13 @@ export class ArmScene {
   private readonly resizes: ResizeObserver;
   private readonly endListening: () => void;
   private drawing = 0;
-  private fitted = false;
+  private readonly bones = new Bones();
+  private readonly seen = new THREE.Box3(); // where links have been
+  private followsArm = true; // the view, until somebody turns it
 
+  private readonly pointer: SkinPointer;
   private quantity: Quantity = "pressure";
+  private depthScale = 1;
   private table = new Float32Array(768);
   private ranges: Record<Quantity, StickyRange>;
   private arrowRange = new StickyRange(FIRST_ARROW_RANGE_N);
@@ -61,6 +76,7 @@ export class ArmScene {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
     this.controls.addEventListener("change", () => this.requestDraw());
+    this.controls.addEventListener("start", () => (this.followsArm = false));
     this.labels = new Labels(labelHost);
     this.ranges = {
       pressure: new StickyRange(QUANTITIES.pressure.range),
@@ -69,12 +85,22 @@ export class ArmScene {
     this.floor.rotation.x = Math.PI / 2;
     this.floor.material.transparent = true;
     this.floor.material.opacity = 0.25;
-    const sun = new THREE.DirectionalLight(0xffffff, 1.1);
-    sun.position.set(0.3, 0.6, 1);
+    // From the upper left of whoever looks, so that dents have a lit and a dark side.
+    const sun = new THREE.DirectionalLight(0xffffff, 2.3);
+    sun.position.set(-0.8, 0.9, 0.7);
     this.camera.add(sun);
-    this.scene.add(new THREE.AmbientLight(0xffffff, 2.2), this.camera, this.floor, this.arrows.group);
+    const sky = new THREE.HemisphereLight(0xffffff, 0x707883, 1.15);
+    sky.position.set(0, 0, 1);
+    this.scene.add(sky, this.camera, this.floor, this.bones.group, this.arrows.group);
     this.resizes = new ResizeObserver(() => this.resize());
     this.resizes.observe(canvas.parentElement!);
+    this.pointer = new SkinPointer(canvas.parentElement!, {
+      placeAt: (x, y, link) => this.placeAt(x, y, link),
+      press: (place) => this.onPress(place),
+      deepen: (byM) => this.onDeepen(byM),
+      letGo: () => this.onLetGo(),
+      allowTurning: (allowed) => (this.controls.enabled = allowed),
+    });
     canvas.addEventListener("pointerdown", this.press);
     canvas.addEventListener("click", this.pick);
     canvas.addEventListener("keydown", this.steer);
@@ -82,7 +108,7 @@ export class ArmScene {
       this.changed.add(link);
       this.requestDraw();
     });
-    this.setColours("pressure", "cividis");
+    this.setColours("pressure", "skin");
     this.resize();
   }
 
@@ -91,6 +117,7 @@ export class ArmScene {
     this.drawing = -1;
     this.endListening();
     this.resizes.disconnect();
+    this.pointer.dispose();
     this.canvas.removeEventListener("pointerdown", this.press);
     this.canvas.removeEventListener("click", this.pick);
     this.canvas.removeEventListener("keydown", this.steer);
@@ -98,6 +125,7 @@ export class ArmScene {
     for (const link of this.links.values()) link.dispose();
     this.labels.dispose();
     this.arrows.dispose();
+    this.bones.dispose();
     this.floor.dispose();
     this.renderer.dispose();
   }
@@ -112,6 +140,11 @@ export class ArmScene {
     }
     this.redrawAll();
     this.tellScales();
+  }
+
+  setDepthScale(scale: number): void {
+    this.depthScale = scale;
+    this.redrawAll();
   }
 
   resetScales(): void {
@@ -132,6 +165,7 @@ export class ArmScene {
   focus(name: string): void {
     const link = this.links.get(name);
     if (!link) return;
+    this.followsArm = false;
     const box = new THREE.Box3().setFromObject(link.group);
     const normal = this.strongestNormal(name)?.transformDirection(link.group.matrix);
     if (normal) {
@@ -141,14 +175,22 @@ export class ArmScene {
     this.lookAt(box);
   }
 
-  /** Looks at the whole arm, from the side and a little above. */
+  /** Looks at the whole arm, from the side and a little above, wherever its links have been. */
   reset(): void {
-    const box = new THREE.Box3();
-    for (const link of this.links.values()) box.expandByObject(link.group);
+    this.followsArm = true;
+    const box = this.seen;
     if (box.isEmpty()) return;
-    this.camera.position.copy(box.getCenter(new THREE.Vector3())).add(new THREE.Vector3(1.2, -1.6, 0.7));
+    this.camera.position.copy(box.getCenter(new THREE.Vector3())).add(new THREE.Vector3(1.2, -1.6, 0.5));
     this.lookAt(box);
-    this.floor.position.z = Math.min(0, box.min.z);
+  }
+
+  // While nobody has turned the view it takes in all places where the links have been.
+  private follow(outline: readonly THREE.Vector3[]): void {
+    const before = this.seen.clone();
+    for (const point of outline) this.seen.expandByPoint(point);
+    if (this.seen.equals(before)) return;
+    this.floor.position.z = Math.min(0, this.seen.min.z - FOOT_M);
+    if (this.followsArm) this.reset();
   }
 
   private strongestNormal(name: string): THREE.Vector3 | undefined {
@@ -158,23 +200,9 @@ export class ArmScene {
     return normal && new THREE.Vector3(normal.x, normal.y, normal.z);
   }
 
-  // As near as the box just fits, from the side where the camera is.
   private lookAt(box: THREE.Box3): void {
-    const center = box.getCenter(new THREE.Vector3());
-    const back = this.camera.position.clone().sub(center).normalize();
-    const right = new THREE.Vector3().crossVectors(this.camera.up, back).normalize();
-    const up = new THREE.Vector3().crossVectors(back, right);
-    const tan = Math.tan(THREE.MathUtils.degToRad(this.camera.fov / 2));
-    let distance = 0;
-    for (let corner = 0; corner < 8; ++corner) {
-      const at = (axis: "x" | "y" | "z", bit: number) => (corner & bit ? box.max[axis] : box.min[axis]);
-      const p = new THREE.Vector3(at("x", 1), at("y", 2), at("z", 4)).sub(center);
-      const high = Math.abs(p.dot(up)) / tan;
-      const wide = Math.abs(p.dot(right)) / (tan * this.camera.aspect);
-      distance = Math.max(distance, Math.max(high, wide) + p.dot(back));
-    }
-    this.controls.target.copy(center);
-    this.camera.position.copy(center).addScaledVector(back, 1.12 * distance);
+    this.controls.target.copy(box.getCenter(new THREE.Vector3()));
+    fitView(this.camera, box);
     this.controls.update();
     this.requestDraw();
   }
@@ -206,37 +234,36 @@ export class ArmScene {
     this.changed.clear();
     for (const name of changed) this.updateLink(arm, name);
     const arrows = this.findArrows(arm);
-    const metresPerNewton = LONGEST_ARROW_M / this.arrowRange.top;
+    const metresPerNewton = this.longestArrowM() / this.arrowRange.top;
     this.arrows.show(arrows, metresPerNewton);
-    if (!this.fitted) {
-      this.fitted = true;
-      this.reset();
-    }
+    const outline = [...this.links.values()].flatMap((link) => link.surroundings());
+    this.follow(outline);
+    const inOrder = arm.links.flatMap((link) => this.links.get(link.name) ?? []);
+    this.bones.show(inOrder, this.floor.position.z);
     this.renderer.render(this.scene, this.camera);
     const texts: Label[] = arrows.map((arrow) => ({
-      place: ForceArrows.tail(arrow, metresPerNewton),
+      place: arrow.tip,
       text: arrow.text,
       kind: "force",
     }));
     for (const link of this.links.values())
       texts.push({
-        place: this.nameplate(link),
+        place: link.center(),
         text: link.name,
         kind: "link",
         marked: link.name === this.selected,
       });
-    this.labels.show(texts, this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    this.labels.show(texts, outline, this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
     this.canvas.dataset.frames = String(Number(this.canvas.dataset.frames ?? 0) + 1);
   }
 
-  private nameplate(link: LinkObject): THREE.Vector3 {
-    const side = new THREE.Vector3(1, 0, 0).applyQuaternion(this.camera.quaternion);
-    return link.center().addScaledVector(side, -1.4 * Math.max(...link.model.profileRadiusM) - 0.04);
+  private longestArrowM(): number {
+    const lengths = [...this.links.values()].map((link) => link.model.lengthM);
+    return LONGEST_ARROW * Math.max(...lengths, 0.1);
   }
 
   // Links come and go with a configuration.
   private followArm(arm: Arm): void {
-    const names = new Set(arm.links.map((link) => link.name));
     for (const [name, object] of this.links) {
       const link = arm.links.find((each) => each.name === name);
       if (link?.model && sameShape(link.model, object.model)) continue;
@@ -251,7 +278,6 @@ export class ArmScene {
       this.links.set(link.name, object);
       this.scene.add(object.group);
       this.changed.add(link.name);
-      this.fitted = this.fitted && names.size === this.links.size;
     }
   }
 
@@ -262,7 +288,12 @@ export class ArmScene {
     object.place(record.pose ?? arm.links.find((link) => link.name === name)?.baseFromLink);
     const { scale } = QUANTITIES[this.quantity];
     const range = this.ranges[this.quantity];
-    object.update(record.shape, { quantity: this.quantity, table: this.table, range: range.top * scale });
+    object.update(record.shape, {
+      quantity: this.quantity,
+      table: this.table,
+      range: range.top * scale,
+      depthScale: this.depthScale,
+    });
     if (range.include(object.largest / scale)) {
       this.redrawAll();
       this.tellScales();
@@ -274,22 +305,19 @@ export class ArmScene {
     for (const link of arm.links) {
       const object = this.links.get(link.name);
       const frame = this.store.link(link.name).newest;
-      if (!object) continue;
-      if (!frame) {
-        object.outline([]);
-        continue;
-      }
-      object.outline(frame.contacts.map((contact) => contact.outlineM));
+      if (!object || !frame) continue;
       for (const contact of frame.contacts) {
-        const { centerM, forceN } = contact;
-        if (!centerM || !forceN) continue;
+        const { centerM, forceN, normal } = contact;
+        if (!centerM || !forceN || !normal) continue;
         const newtons = lengthOf(forceN);
         if (this.arrowRange.include(newtons)) this.tellScales();
         const rotation = new THREE.Matrix3().setFromMatrix4(object.group.matrix);
         out.push({
           tip: new THREE.Vector3(centerM.x, centerM.y, centerM.z).applyMatrix4(object.group.matrix),
+          normal: new THREE.Vector3(normal.x, normal.y, normal.z).applyMatrix3(rotation),
+          radiusM: Math.sqrt(contact.areaM2 / Math.PI),
           force: new THREE.Vector3(forceN.x, forceN.y, forceN.z).applyMatrix3(rotation),
-          text: `${(contact.isRingContact ? contact.normalForceN : newtons).toFixed(2)} N  #${contact.id}`,
+          text: `${(contact.isRingContact ? contact.normalForceN : newtons).toFixed(2)} N`,
         });
       }
     }
@@ -300,7 +328,7 @@ export class ArmScene {
     this.onScales({
       top: this.ranges[this.quantity].top,
       arrowN: this.arrowRange.top,
-      arrowM: LONGEST_ARROW_M,
+      arrowM: this.longestArrowM(),
     });
   }
 
@@ -311,16 +339,30 @@ export class ArmScene {
   // A drag turns the view and ends with a click as well.
   private readonly pick = (event: MouseEvent): void => {
     if (Math.hypot(event.clientX - this.pressedAt[0], event.clientY - this.pressedAt[1]) > DRAG_PX) return;
+    const hit = this.hitAt(event.clientX, event.clientY, [...this.links.values()]);
+    if (hit) this.onPick(String(hit.object.userData.link));
+  };
+
+  private hitAt(clientX: number, clientY: number, links: LinkObject[]): THREE.Intersection | undefined {
     const box = this.canvas.getBoundingClientRect();
     const at = new THREE.Vector2(
-      ((event.clientX - box.left) / box.width) * 2 - 1,
-      1 - ((event.clientY - box.top) / box.height) * 2,
+      ((clientX - box.left) / box.width) * 2 - 1,
+      1 - ((clientY - box.top) / box.height) * 2,
     );
     const ray = new THREE.Raycaster();
     ray.setFromCamera(at, this.camera);
-    const hit = ray.intersectObjects([...this.links.values()].map((link) => link.group))[0];
-    if (hit) this.onPick(String(hit.object.userData.link));
-  };
+    return ray.intersectObjects(links.map((link) => link.group))[0];
+  }
+
+  private placeAt(clientX: number, clientY: number, name?: string): SkinPlace | undefined {
+    const links = [...this.links.values()].filter((link) => name === undefined || link.name === name);
+    const hit = this.hitAt(clientX, clientY, links);
+    const link = this.links.get(String(hit?.object.userData.link));
+    if (!hit || !link || hit.object !== link.skin || !this.mayPress(link.name)) return undefined;
+    const p = hit.point.clone().applyMatrix4(link.group.matrix.clone().invert());
+    const zM = Math.min(link.model.lengthM - CLAMP_M, Math.max(CLAMP_M, p.z));
+    return { link: link.name, angleRad: Math.atan2(p.y, p.x), zM };
+  }
 
   private readonly steer = (event: KeyboardEvent): void => {
     const turn = 0.1;

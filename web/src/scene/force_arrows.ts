@@ -5,15 +5,25 @@ const HEAD = 0.012;
 const HEAD_RADIUS = 0.005;
 const SHAFT_RADIUS = 0.0018;
 
+const HALO_ABOVE_M = 0.0015; // the skin
+const HALO_LEAST_M = 0.006;
+
 export interface ForceArrow {
   /** Where it points to, base frame, m. */
   tip: THREE.Vector3;
+  /** Of the skin there, unit, base frame. */
+  normal: THREE.Vector3;
+  /** Radius of the loaded region, m. */
+  radiusM: number;
   /** Base frame, N. */
   force: THREE.Vector3;
   text: string;
 }
 
-/** Arrows that point at where something pushes, as long as it pushes hard. Behind a skin they shine through. */
+/**
+ * An arrow that points at where something pushes, the longer the harder, and a ring around the spot. Behind a skin they
+ * shine through.
+ */
 export class ForceArrows {
   readonly group = new THREE.Group();
   private readonly material = new THREE.MeshBasicMaterial({ color: COLOUR });
@@ -24,6 +34,7 @@ export class ForceArrows {
     depthTest: false,
   });
   private readonly shaft = new THREE.CylinderGeometry(SHAFT_RADIUS, SHAFT_RADIUS, 1, 12).translate(0, 0.5, 0);
+  private readonly halo = new THREE.TorusGeometry(1, 0.07, 8, 40);
   private readonly head = new THREE.ConeGeometry(HEAD_RADIUS, HEAD, 20).translate(0, -HEAD / 2, 0);
 
   /** `metresPerNewton`: length of an arrow. */
@@ -39,11 +50,19 @@ export class ForceArrows {
     const arrow = new THREE.Group();
     for (const material of [this.material, this.ghost])
       arrow.add(new THREE.Mesh(this.shaft, material), new THREE.Mesh(this.head, material));
-    return arrow;
+    const halos = [this.material, this.ghost].map((material) => new THREE.Mesh(this.halo, material));
+    return new THREE.Group().add(arrow, ...halos);
   }
 
   // +y of an arrow is its direction; its tip is its origin.
-  private lay(arrow: THREE.Object3D, { tip, force }: ForceArrow, metresPerNewton: number): void {
+  private lay(group: THREE.Object3D, contact: ForceArrow, metresPerNewton: number): void {
+    const { tip, force, normal, radiusM } = contact;
+    const [arrow, ...halos] = group.children;
+    for (const halo of halos) {
+      halo.scale.setScalar(Math.max(radiusM, HALO_LEAST_M));
+      halo.position.copy(tip).addScaledVector(normal, HALO_ABOVE_M);
+      halo.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), normal);
+    }
     const length = Math.max(force.length() * metresPerNewton, 1.5 * HEAD);
     for (const shaft of [arrow.children[0], arrow.children[2]]) {
       shaft.position.y = -length;
@@ -54,12 +73,6 @@ export class ForceArrows {
   }
 
   dispose(): void {
-    for (const each of [this.material, this.ghost, this.shaft, this.head]) each.dispose();
-  }
-
-  /** Where an arrow begins: its label's place. */
-  static tail({ tip, force }: ForceArrow, metresPerNewton: number): THREE.Vector3 {
-    const length = Math.max(force.length() * metresPerNewton, 1.5 * HEAD);
-    return tip.clone().addScaledVector(force.clone().normalize(), -length - 0.006);
+    for (const each of [this.material, this.ghost, this.shaft, this.head, this.halo]) each.dispose();
   }
 }

@@ -6,12 +6,11 @@ import { colourIndex } from "../skin/colour_map";
 import { isKnown, MarkerFields, type Quantity } from "../skin/fields";
 import { SkinSurface } from "../skin/surface";
 
-const CAP_LENGTH_M = 0.012;
-const CAP_COLOUR = 0x3a4048;
-const CAP_SELECTED = 0x2f81f7;
-const UNMEASURED = 0x808890;
-const OUTLINE = 0xffffff;
-const OUTLINE_ABOVE_M = 0.0008; // the skin, so that it is not hidden between the vertices that are drawn
+const FLANGE_LENGTH_M = 0.014;
+const FLANGE_COLOUR = 0x4a525c;
+const FLANGE_SELECTED = 0x2f81f7;
+const UNMEASURED = 0x9aa1a8;
+const NOISE_SHARE = 0.03; // of the scale, below which a value is drawn as none
 
 /** How scalar values become colours. */
 export interface Colouring {
@@ -20,23 +19,21 @@ export interface Colouring {
   table: Float32Array;
   /** Value of the last colour, SI. */
   range: number;
+  /** Of the displacements that are drawn. */
+  depthScale: number;
 }
 
 /** One link in the scene: its skin as it is deformed now, between the rings that clamp it. */
 export class LinkObject {
   readonly group = new THREE.Group();
-  readonly skin: THREE.Mesh<THREE.BufferGeometry, THREE.MeshLambertMaterial>;
+  readonly skin: THREE.Mesh<THREE.BufferGeometry, THREE.MeshPhongMaterial>;
   /** The largest value drawn last, SI. */
   largest = 0;
 
   private readonly surface: SkinSurface;
   private readonly fields: MarkerFields;
   private readonly colours: THREE.BufferAttribute;
-  private readonly caps: THREE.MeshLambertMaterial;
-  private readonly outlines = new THREE.LineSegments(
-    new THREE.BufferGeometry(),
-    new THREE.LineBasicMaterial({ color: OUTLINE }),
-  );
+  private readonly flanges = new THREE.MeshPhongMaterial({ color: FLANGE_COLOUR, shininess: 60 });
 
   constructor(
     readonly name: string,
@@ -52,13 +49,15 @@ export class LinkObject {
     geometry.setIndex(new THREE.BufferAttribute(this.surface.indices, 1));
     this.skin = new THREE.Mesh(
       geometry,
-      new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide }),
+      new THREE.MeshPhongMaterial({
+        vertexColors: true,
+        side: THREE.DoubleSide,
+        shininess: 22,
+        specular: 0x2a2a2a,
+      }),
     );
     this.skin.userData.link = name;
-    this.caps = new THREE.MeshLambertMaterial({ color: CAP_COLOUR });
-    this.outlines.frustumCulled = false;
-    this.outlines.userData.link = name;
-    this.group.add(this.skin, this.outlines, this.cap(0), this.cap(model.lengthM));
+    this.group.add(this.skin, this.flange(0), this.flange(model.lengthM));
     // A skin dents by less than its radius.
     const radius = Math.max(...model.profileRadiusM, 0.01);
     geometry.boundingSphere = new THREE.Sphere(
@@ -68,14 +67,25 @@ export class LinkObject {
     this.group.matrixAutoUpdate = false;
   }
 
-  private cap(z: number): THREE.Mesh {
+  // What clamps the skin's end: a ring with a rounded edge and a neck.
+  private flange(z: number): THREE.Mesh {
     const at = z === 0 ? 0 : this.model.profileRadiusM.length - 1;
-    const radius = (this.model.profileRadiusM[at] ?? 0.02) * 1.04;
-    const cap = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, CAP_LENGTH_M, 48), this.caps);
-    cap.rotation.x = Math.PI / 2;
-    cap.position.z = z === 0 ? -CAP_LENGTH_M / 2 : z + CAP_LENGTH_M / 2;
-    cap.userData.link = this.name;
-    return cap;
+    const radius = this.model.profileRadiusM[at] ?? 0.02;
+    const profile = [
+      [0.02, 0],
+      [1.04, 0],
+      [1.08, 0.12],
+      [1.08, 0.45],
+      [1.02, 0.6],
+      [0.72, 0.68],
+      [0.7, 1],
+      [0.02, 1],
+    ].map(([share, along]) => new THREE.Vector2(share * radius, along * FLANGE_LENGTH_M));
+    const flange = new THREE.Mesh(new THREE.LatheGeometry(profile, 48), this.flanges);
+    flange.rotation.x = z === 0 ? -Math.PI / 2 : Math.PI / 2;
+    flange.position.z = z;
+    flange.userData.link = this.name;
+    return flange;
   }
 
   place(pose: Pose | undefined): void {
@@ -90,14 +100,18 @@ export class LinkObject {
   }
 
   select(selected: boolean): void {
-    this.caps.color.set(selected ? CAP_SELECTED : CAP_COLOUR);
+    this.flanges.color.set(selected ? FLANGE_SELECTED : FLANGE_COLOUR);
   }
 
   /** Without a frame nothing is measured, and it shows; so does a skin whose pressures are not known. */
   update(frame: LinkFrame | undefined, colouring: Colouring): void {
     const { surface } = this;
     if (frame)
-      surface.update(this.fields.displacements(frame), this.fields.values(frame, colouring.quantity));
+      surface.update(
+        this.fields.displacements(frame),
+        this.fields.values(frame, colouring.quantity),
+        colouring.depthScale,
+      );
     else surface.update(undefined, undefined);
     const known = frame !== undefined && isKnown(frame, colouring.quantity);
     this.skin.material.vertexColors = known;
@@ -116,7 +130,7 @@ export class LinkObject {
     for (let vertex = 0; vertex < values.length; ++vertex) {
       const value = values[vertex];
       if (value > largest) largest = value;
-      const from = 3 * colourIndex(value, range);
+      const from = 3 * colourIndex(value < NOISE_SHARE * range ? 0 : value, range);
       colours[3 * vertex] = table[from];
       colours[3 * vertex + 1] = table[from + 1];
       colours[3 * vertex + 2] = table[from + 2];
@@ -125,38 +139,41 @@ export class LinkObject {
     this.colours.needsUpdate = true;
   }
 
-  /** Draws the contacts' outlines: x, y, z of each corner, link frame, m. */
-  outline(contacts: readonly (readonly number[])[]): void {
-    const points: number[] = [];
-    for (const corners of contacts) {
-      const corner = (i: number) => {
-        const [x, y, z] = [0, 1, 2].map((axis) => corners[(3 * i + axis) % corners.length]);
-        const out = 1 + OUTLINE_ABOVE_M / Math.max(Math.hypot(x, y), OUTLINE_ABOVE_M);
-        points.push(x * out, y * out, z);
-      };
-      for (let i = 0; 3 * i < corners.length; ++i) {
-        corner(i);
-        corner(i + 1);
-      }
-    }
-    const { geometry } = this.outlines;
-    if (points.length === 0 && !this.outlines.visible) return;
-    this.outlines.visible = points.length > 0;
-    geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
-  }
-
   /** The middle of the link, base frame. */
   center(): THREE.Vector3 {
     return new THREE.Vector3(0, 0, this.model.lengthM / 2).applyMatrix4(this.group.matrix);
+  }
+
+  /** The middle of a clamped end, base frame. */
+  end(far: boolean): THREE.Vector3 {
+    return new THREE.Vector3(0, 0, far ? this.model.lengthM : 0).applyMatrix4(this.group.matrix);
+  }
+
+  get endRadiusM(): number {
+    return this.model.profileRadiusM.at(-1) ?? 0.02;
+  }
+
+  /** The link's outline, base frame: around both ends and the middle. */
+  surroundings(): THREE.Vector3[] {
+    const radius = Math.max(...this.model.profileRadiusM);
+    const out: THREE.Vector3[] = [];
+    for (const z of [0, this.model.lengthM / 2, this.model.lengthM])
+      for (let i = 0; i < 8; ++i) {
+        const angle = (i / 8) * 2 * Math.PI;
+        out.push(
+          new THREE.Vector3(radius * Math.cos(angle), radius * Math.sin(angle), z).applyMatrix4(
+            this.group.matrix,
+          ),
+        );
+      }
+    return out;
   }
 
   dispose(): void {
     this.group.traverse((object) => {
       if (object instanceof THREE.Mesh) object.geometry.dispose();
     });
-    this.outlines.geometry.dispose();
-    this.outlines.material.dispose();
     this.skin.material.dispose();
-    this.caps.dispose();
+    this.flanges.dispose();
   }
 }

@@ -1,5 +1,9 @@
-/** Colour maps of even lightness, also for colour-blind people; each from dark to bright. sRGB, 0 to 255. */
+/**
+ * Colour maps of even lightness, also for colour-blind people. sRGB, 0 to 255. `skin` begins at the colour of the silicone
+ * and gets darker, so that only what is pressed has a colour; the others go from dark to bright.
+ */
 const STOPS = {
+  skin: "e6e1d8 f6dca0 fcc365 fba03f f47a2a e2541f c5331f a01b2a 76103a 4b0a3f",
   cividis: "00224e 123570 3b496c 575d6d 707173 8a8678 a59c74 c3b369 e1cc55 fee838",
   viridis: "440154 482878 3e4a89 31688e 26828e 1f9e89 35b779 6dcd59 b4de2c fde725",
   inferno: "000004 1b0c41 4a0c6b 781c6d a52c60 cf4446 ed6925 fb9b06 f7d13d fcffa4",
@@ -32,7 +36,12 @@ export function colourIndex(value: number, range: number): number {
   return Math.max(0, Math.min(SIZE - 1, Math.round((value / range) * (SIZE - 1))));
 }
 
-/** CSS, from dark to bright. */
+/** Of lines over the colours of no load. */
+export function inkOn(name: ColourMapName): string {
+  return name === "skin" ? "#16202b" : "#ffffff";
+}
+
+/** CSS, from no load to the most. */
 export function gradientOf(name: ColourMapName, direction = "to right"): string {
   const table = colourTable(name);
   const stops = Array.from({ length: 11 }, (_, i) => {

@@ -16,7 +16,7 @@ export interface QuantityInfo {
 }
 
 export const QUANTITIES: Record<Quantity, QuantityInfo> = {
-  pressure: { name: "Contact pressure", unit: "kPa", scale: 1e3, range: 5 },
+  pressure: { name: "Contact pressure", unit: "kPa", scale: 1e3, range: 2 },
   displacement: { name: "Displacement", unit: "mm", scale: 1e-3, range: 5 },
 };
 

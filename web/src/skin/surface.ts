@@ -21,7 +21,7 @@ export class SkinSurface {
   private readonly paths: number;
   private readonly between: Float32Array; // rows x paths x 4: displacement and value
 
-  constructor(model: LinkModel, vertices = { around: 48, along: 40 }) {
+  constructor(model: LinkModel, vertices = { around: 72, along: 48 }) {
     const grid = model.markers!;
     this.paths = grid.paths;
     this.columns = Math.max(1, Math.round(vertices.around / grid.paths)) * grid.paths;
@@ -42,9 +42,16 @@ export class SkinSurface {
     this.update(undefined, undefined);
   }
 
-  /** Of each marker, in their order: displacement (x, y, z), m, and a value. Without them: at rest, 0. */
-  update(displacements: ArrayLike<number> | undefined, values: ArrayLike<number> | undefined): void {
-    this.alongAxis(displacements, values);
+  /**
+   * Of each marker, in their order: displacement (x, y, z), m, and a value. Without them: at rest, 0. `scale`: of the
+   * displacements.
+   */
+  update(
+    displacements: ArrayLike<number> | undefined,
+    values: ArrayLike<number> | undefined,
+    scale = 1,
+  ): void {
+    this.alongAxis(displacements, values, scale);
     this.aroundAxis();
     gridNormals(this.positions, this.rows, this.columns, this.normals);
   }
@@ -52,6 +59,7 @@ export class SkinSurface {
   private alongAxis(
     displacements: ArrayLike<number> | undefined,
     values: ArrayLike<number> | undefined,
+    scale: number,
   ): void {
     const { between, paths } = this;
     between.fill(0);
@@ -63,7 +71,7 @@ export class SkinSurface {
           const to = 4 * (row * paths + path);
           if (displacements)
             for (let axis = 0; axis < 3; ++axis)
-              between[to + axis] += weight[k] * displacements[3 * marker + axis];
+              between[to + axis] += scale * weight[k] * displacements[3 * marker + axis];
           if (values) between[to + 3] += weight[k] * values[marker];
         }
       }

@@ -6,6 +6,8 @@ import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
 import { useApp, type Theme } from "../app_state";
 import { statusOf } from "../ui/words";
 import { RecorderControl } from "./recorder_control";
+import { lengthOf } from "../model/vectors";
+import { newtons } from "../ui/format";
 import { SignIn } from "./sign_in";
 
 export function Header() {
@@ -64,14 +66,29 @@ function Health() {
     document.title = `${mark}${store.arm.value?.name ?? "TacLINK"}${app.log.value ? " – replay" : ""}`;
   }, [state, alarms, unwell, store.arm.value?.name, app.log.value]);
   const kind = state === "live" ? (unwell === 0 ? "good" : "warn") : state === "connecting" ? "" : "bad";
+  const touches = links.flatMap((link) =>
+    (store.link(link.name).newest?.contacts ?? []).map((contact) => ({
+      link: link.name,
+      newtons: contact.isRingContact || !contact.forceN ? contact.normalForceN : lengthOf(contact.forceN),
+    })),
+  );
   return (
     <p class={`health ${kind}`} role="status">
       {text}
+      {state === "live" && `. ${touchSentence(touches)}`}
       {alarms > 0 && (
         <strong class="bad"> {alarms === 1 ? "1 link" : `${alarms} links`} above the alarm force</strong>
       )}
     </p>
   );
+}
+
+/** What goes on, in a sentence. */
+export function touchSentence(touches: readonly { link: string; newtons: number }[]): string {
+  if (touches.length === 0) return "Nothing is touched";
+  const strongest = touches.reduce((a, b) => (b.newtons > a.newtons ? b : a));
+  const force = `${newtons(strongest.newtons)} on ${strongest.link}`;
+  return touches.length === 1 ? `One touch, ${force}` : `${touches.length} touches, strongest ${force}`;
 }
 
 function ThemeChoice() {

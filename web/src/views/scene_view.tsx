@@ -1,9 +1,11 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { selectedLink, useApp } from "../app_state";
+import { selectedLink, useApp, type AppState } from "../app_state";
+import { SourceKind } from "../api/gen/taclink/v1/arm_pb";
 import type { ArmScene, Scales } from "../scene/arm_scene";
 import { COLOUR_MAPS, gradientOf, type ColourMapName } from "../skin/colour_map";
 import { QUANTITIES, type Quantity } from "../skin/fields";
+import { PokeCard } from "./poke_card";
 
 const HINT = "Arrow keys turn the view, + and - zoom, Home shows the whole arm.";
 
@@ -31,10 +33,15 @@ export function SceneView() {
       }
       made.onPick = (link) => (app.link.value = link);
       made.onScales = (now) => (scales.value = now);
+      made.mayPress = (link) => mayPress(app, link);
+      made.onPress = (place) => app.poker.press(place);
+      made.onDeepen = (byM) => app.poker.deepen(byM);
+      made.onLetGo = () => app.poker.letGo();
       scene.value = made;
     });
     return () => {
       gone = true;
+      app.poker.letGo();
       scene.value = undefined;
       made?.dispose();
     };
@@ -45,6 +52,7 @@ export function SceneView() {
     () => scene.value?.setColours(app.quantity.value, app.colourMap.value),
     [scene.value, app.quantity.value, app.colourMap.value],
   );
+  useEffect(() => scene.value?.setDepthScale(app.depthScale.value), [scene.value, app.depthScale.value]);
   useEffect(() => scene.value?.select(link), [scene.value, link]);
 
   return (
@@ -61,6 +69,7 @@ export function SceneView() {
         {!store.arm.value && !trouble.value && <p class="empty">Waiting for the server …</p>}
       </div>
       <Legend scales={scales.value} />
+      <PokeCard link={link} />
       <div class="tools" role="group" aria-label="View">
         <button type="button" onClick={() => scene.value?.reset()} title="The whole arm (Home)">
           Whole arm
@@ -78,6 +87,12 @@ export function SceneView() {
       </div>
     </section>
   );
+}
+
+function mayPress(app: AppState, link: string): boolean {
+  const arm = app.store.value.arm.peek();
+  const kind = arm?.links.find((each) => each.name === link)?.source?.kind;
+  return kind === SourceKind.SIMULATED && !app.log.peek() && app.session.mayOperate.peek();
 }
 
 function Legend({ scales }: { scales: Scales | undefined }) {
@@ -118,6 +133,17 @@ function Legend({ scales }: { scales: Scales | undefined }) {
         </span>
         {scales ? `${(scales.arrowM * 100).toFixed(0)} cm arrow = ${scales.arrowN} N` : ""}
       </div>
+      <label class="small">
+        Dents{" "}
+        <select
+          value={String(app.depthScale.value)}
+          onChange={(event) => (app.depthScale.value = Number(event.currentTarget.value))}
+        >
+          {[1, 2, 3, 5].map((scale) => (
+            <option value={String(scale)}>×{scale}</option>
+          ))}
+        </select>
+      </label>{" "}
       <label class="small">
         Colours{" "}
         <select

@@ -3,7 +3,7 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import type { Link } from "../api/gen/taclink/v1/arm_pb";
 import type { MarkerRange } from "../api/gen/taclink/v1/events_pb";
 import { useApp } from "../app_state";
-import { colourTable, roundUp, StickyRange } from "../skin/colour_map";
+import { colourTable, inkOn, roundUp, StickyRange } from "../skin/colour_map";
 import { isKnown, MarkerFields, QUANTITIES } from "../skin/fields";
 import { sameShape } from "../skin/same_shape";
 import { outlineFlat, paintFlat } from "../skin/unroll";
@@ -45,6 +45,7 @@ export function UnrolledMap({ link }: { link: Link }) {
       const values = fields.values(frame, quantity);
       range.include(Math.max(...values) / scale);
       painter.paint(values, range.top * scale, colourTable(app.colourMap.value));
+      painter.ink = inkOn(app.colourMap.value);
       for (const contact of frame.contacts) painter.outline(outlineFlat(contact.outlineM, grid));
       const now = store.arm.peek()?.links.find((each) => each.name === link.name);
       painter.regions(now?.forceLevels.flatMap((level) => (level.markers ? [level.markers] : [])) ?? []);
@@ -91,7 +92,7 @@ export function UnrolledMap({ link }: { link: Link }) {
   return (
     <div class="map">
       <div class="map-frame">
-        <span class="axis-y">ring (0 at the top camera's side)</span>
+        <span class="axis-y">ring (1 at the top camera's side)</span>
         <canvas
           ref={canvas}
           tabIndex={0}
@@ -123,7 +124,7 @@ function Readout(props: { link: Link; cell: Cell | undefined; fields: MarkerFiel
   if (!cell)
     return (
       <p class="readout numbers">
-        0 to {top} {info.unit}. White lines: contacts. Point at a marker, or use the arrow keys.
+        0 to {top} {info.unit}. Lines: contacts. Point at a marker, or use the arrow keys.
       </p>
     );
   const marker = cell.ring * link.model!.markers!.paths + cell.path;
@@ -133,8 +134,8 @@ function Readout(props: { link: Link; cell: Cell | undefined; fields: MarkerFiel
   const sigma = frame.nodalForceSigmasN[marker];
   return (
     <p class="readout numbers" aria-live="polite">
-      path {cell.path}, ring {cell.ring}: {pressure === undefined ? "–" : `${fixed(pressure, 1)} kPa`},{" "}
-      {fixed(move, 2)} mm, {force.length === 3 ? `${fixed(Math.hypot(...force), 3)} N` : "–"}
+      path {cell.path + 1}, ring {cell.ring + 1}: {pressure === undefined ? "–" : `${fixed(pressure, 1)} kPa`}
+      , {fixed(move, 2)} mm, {force.length === 3 ? `${fixed(Math.hypot(...force), 3)} N` : "–"}
       {sigma > 0 ? ` ± ${fixed(sigma, 3)} N` : ""}
     </p>
   );
@@ -142,6 +143,7 @@ function Readout(props: { link: Link; cell: Cell | undefined; fields: MarkerFiel
 
 /** Draws on the canvas of the map. */
 class FlatPainter {
+  ink = "#ffffff";
   private readonly picture: ImageData;
   private readonly buffer = document.createElement("canvas");
 
@@ -206,14 +208,14 @@ class FlatPainter {
       }
       context.closePath();
     }
-    context.strokeStyle = "white";
+    context.strokeStyle = this.ink;
     context.lineWidth = 2 * devicePixelRatio;
     context.stroke();
   }
 
   regions(regions: readonly MarkerRange[]): void {
     const { context } = this;
-    context.strokeStyle = "rgb(255 255 255 / 60%)";
+    context.strokeStyle = this.ink;
     context.lineWidth = devicePixelRatio;
     context.setLineDash([6, 4]);
     for (const { firstRing, lastRing, firstPath, lastPath } of regions) {

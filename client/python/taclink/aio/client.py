@@ -191,6 +191,32 @@ class Client:
     async def restart_link(self, link: str) -> None:
         await self._connection.ask(_calls.restart_link(link))
 
+    async def press(
+        self,
+        link: str,
+        angle_rad: float,
+        z_m: float,
+        *,
+        depth_m: float | None = None,
+        force_n: float | None = None,
+        shape: str = "finger",
+        diameter_m: float = 0,
+        body_id: int = 1,
+        hold_s: float = 0,
+    ) -> None:
+        await self._connection.ask(
+            _calls.press(link, angle_rad, z_m, depth_m, force_n, shape, diameter_m, body_id, hold_s)
+        )
+
+    async def release(self, link: str, body_id: int = 0) -> None:
+        await self._connection.ask(_calls.release(link, body_id))
+
+    async def set_scene_pressure(self, link: str, pressure_pa: float | None) -> None:
+        await self._connection.ask(_calls.set_scene_pressure(link, pressure_pa))
+
+    async def move_scene_joint(self, link: str, position_rad: float | None) -> None:
+        await self._connection.ask(_calls.move_scene_joint(link, position_rad))
+
     def update_joint_states(self) -> JointStateWriter:
         return JointStateWriter(self._connection)
 

@@ -145,6 +145,25 @@ class SpecificForceReport:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, slots=True)
+class AppliedContact:
+    """A rigid body, or one piece of it, that presses on a simulated skin; link frame."""
+
+    body_id: int  # as in press(); 0: of the link's scene
+    center_m: FloatArray  # (3,), of pressure, on the deformed outer surface
+    normal: FloatArray  # (3,), unit, away from the axis
+    force_n: FloatArray  # (3,), what it exerts on the skin
+    depth_m: float  # of its foremost point, along the normal from the undeformed surface
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, slots=True)
+class SimulationReport:
+    """What is true of a simulated link. Nothing is estimated from it."""
+
+    contacts: tuple[AppliedContact, ...]
+    trouble: str  # why a user's bodies do not go on or were taken off; empty: nothing
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, slots=True)
 class Frame:
     """Vectors are in the link frame; arrays by marker have no rows below their detail, or where nothing is measured."""
 
@@ -164,6 +183,7 @@ class Frame:
     pressure_estimate: PressureEstimate | None  # None: nothing was estimated
     specific_force: SpecificForceReport | None  # as it was measured; None: the link never moves
     specific_force_estimate: SpecificForceEstimate | None  # None: likewise, or the attitude counts as exact
+    simulation: SimulationReport | None  # None: the link is not simulated
     markers_seen: int
     markers_inferred: int
     contacts: tuple[Contact, ...]
@@ -238,6 +258,20 @@ def _specific_force_report_from(message: frame_pb2.SpecificForceReport) -> Speci
     )
 
 
+def _simulation_from(message: frame_pb2.SimulationReport) -> SimulationReport:
+    contacts = tuple(
+        AppliedContact(
+            body_id=each.body_id,
+            center_m=vector(each.center_m),
+            normal=vector(each.normal),
+            force_n=vector(each.force_n),
+            depth_m=each.depth_m,
+        )
+        for each in message.contacts
+    )
+    return SimulationReport(contacts=contacts, trouble=message.trouble)
+
+
 def _contact_from(message: frame_pb2.Contact) -> Contact:
     return alike(
         Contact,
@@ -298,6 +332,7 @@ def frame_from(message: frame_pb2.LinkFrame, client_utc_ns: int = 0, gap: int | 
         specific_force_estimate=_specific_force_from(message.specific_force_estimate)
         if message.HasField("specific_force_estimate")
         else None,
+        simulation=_simulation_from(message.simulation) if message.HasField("simulation") else None,
         contacts=tuple(map(_contact_from, message.contacts)),
         total_force_n=vector(message.total_force_n)
         if message.HasField("total_force_n")
