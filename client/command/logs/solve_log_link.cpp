@@ -159,9 +159,12 @@ Result<void> LogLinkSolver::SolvePictures(const RecordedPictures& pictures, v1::
   pipeline_->Process(frame_, state_);
   report_.solve_s += SecondsSince(start);
   state_.times = recorded_.times;
-  const bool replayed = solved.replayed();
+  const bool replayed = solved.replayed(), is_simulated = solved.has_simulation();
+  // What was true then, bit for bit: it does not pass through the domain's units.
+  const v1::SimulationReport simulation = solved.simulation();
   wire::Fill({solved.link(), solved.link_index()}, state_, Detail::kFull, solved);
   solved.set_replayed(replayed);
+  if (is_simulated) *solved.mutable_simulation() = simulation;
   return {};
 }
 
