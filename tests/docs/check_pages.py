@@ -26,8 +26,9 @@ def help_of(*command: str) -> tuple[str, frozenset[str]]:
     """The help text of a command, and its subcommands."""
     program, *words = command
     text = subprocess.run([programs / program, *words, "--help"], capture_output=True, text=True, check=True).stdout
-    listed = text.partition("Subcommands:")[2]
-    return text, frozenset(re.findall(r"^  ([a-z][a-z-]*)", listed, re.M))
+    # Commands stand under headings of their own; options begin with a dash, and positionals are no commands.
+    listed = re.sub(r"^Positionals:\n(?:  .*\n)*", "", text, flags=re.M)
+    return text, frozenset(re.findall(r"^  ([a-z][a-z-]*)  ", listed, re.M))
 
 
 def check_command(page: str, line: str) -> bool:

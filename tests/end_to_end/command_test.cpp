@@ -25,9 +25,52 @@ void ExpectRefused(const std::vector<std::string>& arguments, int exit_code, con
   EXPECT_EQ(run.out, "") << shown;
 }
 
+TEST_F(CommandTest, HelpListsCommandsByWhatTheyAreFor) {
+  const std::string help = Taclink({"--help"}).out;
+  size_t last = 0;
+  for (const char* heading : {"Live", "Recordings", "Offline", "Setup"}) {
+    const size_t at = help.find(std::string("\n") + heading);
+    ASSERT_NE(at, std::string::npos) << heading << "\n" << help;
+    EXPECT_GT(at, last) << heading;
+    last = at;
+  }
+  EXPECT_EQ(help.find("Subcommands:"), std::string::npos) << "a command has no heading:\n" << help;
+}
+
+TEST_F(CommandTest, ShellsCompleteCommandsAndOptions) {
+  const auto words = [](const std::vector<std::string>& before) {
+    std::vector<std::string> arguments = {"__complete"};
+    arguments.insert(arguments.end(), before.begin(), before.end());
+    return Taclink(arguments).out;
+  };
+  EXPECT_THAT(words({}), AllOf(HasSubstr("watch\n"), HasSubstr("poke\n"), HasSubstr("--version\n")));
+  EXPECT_THAT(words({"poke"}), AllOf(HasSubstr("--depth\n"), HasSubstr("--stay\n")));
+  EXPECT_THAT(words({"record"}), HasSubstr("start\n"));
+  const std::string script = Taclink({"completion", "bash"}).out;
+  const std::string line = script + "COMP_WORDS=(taclink poke --dep) COMP_CWORD=2; PATH=" +
+                           std::filesystem::path(kTaclink).parent_path().string() +
+                           ":$PATH; _taclink; echo ${COMPREPLY[@]}";
+  EXPECT_EQ(RunToEnd({"/bin/bash", "-c", line}).out, "--depth\n");
+  for (const char* shell : {"zsh", "fish"})
+    EXPECT_THAT(Taclink({"completion", shell}).out, HasSubstr("__complete"));
+}
+
+TEST_F(CommandTest, TheDoctorSaysWhatIsWellAndWhatMendsTheRest) {
+  const Finished run = Taclink({"doctor", "--server", "127.0.0.1:1"});
+  EXPECT_THAT(run.out, AllOf(HasSubstr("version"), HasSubstr("disk"), HasSubstr("clock"), HasSubstr("port"),
+                             HasSubstr("no server answers at 127.0.0.1:1"), HasSubstr("-> deploy/demo")));
+  EXPECT_EQ(run.out.find('\x1b'), std::string::npos) << "no colors into a pipe";
+  const Finished bad =
+      Taclink({"doctor", "--server", "127.0.0.1:1", "--config", Write("bad.yaml", "arm: 3\n")});
+  EXPECT_EQ(bad.exit_code, 1);
+  EXPECT_THAT(bad.out, HasSubstr("BAD   configuration"));
+}
+
 TEST_F(CommandTest, BadInputGivesOneLineAndAnExitCode) {
   ExpectRefused({}, 2, "subcommand");
   ExpectRefused({"dance"}, 2, "dance");
+  ExpectRefused({"wacth"}, 2, "did you mean 'watch'?");
+  ExpectRefused({"poke", "--link", "a", "--forse", "1"}, 2, "did you mean '--force'?");
   ExpectRefused({"solve"}, 2, "--model");
   ExpectRefused({"solve", "--model", "cylinder"}, 2, "--markers");
   ExpectRefused({"solve", "--model", "cube", "--markers", "m.csv"}, 1, "shipped model");

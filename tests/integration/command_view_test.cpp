@@ -1,9 +1,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
+#include <vector>
 
 #include "client/command/cli/json.h"
+#include "client/command/cli/nearest.h"
+#include "client/command/cli/terminal_style.h"
 #include "client/command/live/contacts_view.h"
 #include "client/command/live/frame_json.h"
 #include "client/command/live/watch_view.h"
@@ -89,8 +93,43 @@ TEST(ChangeLog, OneLineForEachChange) {
   EXPECT_THAT(log.Take(lost), IsEmpty());
 }
 
+TEST(Nearest, IsTheNameThatWasMeant) {
+  const std::vector<std::string> names = {"watch", "list", "record", "contacts", "calibrate"};
+  EXPECT_EQ(Nearest("wacth", names), "watch");
+  EXPECT_EQ(Nearest("lst", names), "list");
+  EXPECT_EQ(Nearest("calibrte", names), "calibrate");
+  EXPECT_EQ(Nearest("dance", names), "");
+  EXPECT_EQ(Nearest("", names), "");
+  EXPECT_EQ(Nearest(std::string(100000, 'a'), names), "");
+}
+
+TEST(TerminalStyle, BarsAndSparklinesAreAsLongAsTheyShould) {
+  EXPECT_EQ(Bar(0, 4), "    ");
+  EXPECT_EQ(Bar(1, 4), "████");
+  EXPECT_EQ(Bar(9, 4), "████");
+  EXPECT_EQ(Bar(0.5, 3), "█▌ ");
+  EXPECT_EQ(Bar(std::nan(""), 2), "  ");
+  EXPECT_EQ(Sparkline(std::vector<double>{0, 1, std::nan(""), 2}, 2), " ▄ █");
+}
+
+TEST(LiveView, ContactsAreInTheOrderOfTheirForces) {
+  LiveView view("title", true);
+  for (const double force_n : {0.2, 0.7, 0.4}) {
+    v1::LinkFrame frame = MakeFrame(force_n);
+    frame.set_link_index(static_cast<uint32_t>(10 * force_n));
+    view.Take(frame);
+  }
+  const auto text = view.Draw({}, std::chrono::steady_clock::now(), {"a note", ""});
+  const size_t contacts = text.find("#3");
+  EXPECT_LT(text.find("0.70 N (", contacts), text.find("0.40 N (", contacts));
+  EXPECT_LT(text.find("0.40 N (", contacts), text.find("0.20 N (", contacts));
+  EXPECT_THAT(text, HasSubstr("bars to 1 N"));
+  EXPECT_THAT(text, HasSubstr("a note"));
+  EXPECT_THAT(text, HasSubstr("\x1b[32m")) << "ok is green";
+}
+
 TEST(LiveView, ShowsLinkForceAndDrops) {
-  LiveView view("title");
+  LiveView view("title", false);
   view.Take(MakeFrame(0.2));
   v1::StreamStatus status;
   status.add_links()->set_frames_dropped(4);

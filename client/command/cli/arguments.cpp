@@ -101,6 +101,9 @@ bool Option::IsGiven() const {
 Arguments Arguments::AddCommand(const std::string& name, const std::string& help) const {
   return Arguments(*app_->add_subcommand(name, help));
 }
+void Arguments::Group(const std::string& heading, std::initializer_list<const char*> commands) const {
+  for (const char* command : commands) app_->get_subcommand(command)->group(heading);
+}
 void Arguments::RequireCommand() const {
   app_->require_subcommand(1);
 }

@@ -66,6 +66,8 @@ class Arguments {
   explicit Arguments(CLI::App& app) : app_(&app) {}
 
   Arguments AddCommand(const std::string& name, const std::string& help) const;
+  /// Lists these commands, which have been added, together under a heading of the help.
+  void Group(const std::string& heading, std::initializer_list<const char*> commands) const;
   /// One of them has to be given.
   void RequireCommand() const;
   bool HasCommand() const;  ///< one was given

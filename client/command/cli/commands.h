@@ -12,6 +12,8 @@ namespace taclink::command {
 using Selected = std::function<Result<void>()>;
 
 /// Each registers one subcommand with its options.
+void AddDoctor(const Arguments& app, Selected& selected);
+void AddCompletion(const Arguments& app, Selected& selected);
 void AddCameras(const Arguments& app, Selected& selected);
 void AddList(const Arguments& app, Selected& selected);
 void AddLog(const Arguments& app, Selected& selected);

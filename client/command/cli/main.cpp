@@ -8,26 +8,34 @@ constexpr const char* kEnvironment =
 
 void AddCommands(const taclink::command::Arguments& app, taclink::command::Selected& selected) {
   using namespace taclink::command;
-  AddCameras(app, selected);
+  // Groups stand in the help in the order of their first commands.
   AddList(app, selected);
-  AddLog(app, selected);
-  AddPoke(app, selected);
-  AddRecord(app, selected);
-  AddRestart(app, selected);
   AddWatch(app, selected);
-  AddDetect(app, selected);
-  AddSolve(app, selected);
-  AddCalibrate(app, selected);
-  AddSimulate(app, selected);
-  AddSkin(app, selected);
   AddContacts(app, selected);
-  AddJoints(app, selected);
-  AddShow(app, selected);
-  AddToken(app, selected);
-  AddTare(app, selected);
   AddEvents(app, selected);
+  AddPoke(app, selected);
+  AddTare(app, selected);
   AddThresholds(app, selected);
   AddSet(app, selected);
+  AddJoints(app, selected);
+  AddRestart(app, selected);
+  AddRecord(app, selected);
+  AddLog(app, selected);
+  AddDetect(app, selected);
+  AddSolve(app, selected);
+  AddSimulate(app, selected);
+  AddSkin(app, selected);
+  AddCalibrate(app, selected);
+  AddCameras(app, selected);
+  AddShow(app, selected);
+  AddToken(app, selected);
+  AddDoctor(app, selected);
+  AddCompletion(app, selected);
+  app.Group("Live", {"list", "watch", "contacts", "events", "poke", "tare", "thresholds", "set", "joints",
+                     "restart"});
+  app.Group("Recordings", {"record", "log"});
+  app.Group("Offline", {"detect", "solve", "simulate", "skin"});
+  app.Group("Setup", {"cameras", "calibrate", "show", "token", "doctor", "completion"});
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "client/command/cli/json.h"
+#include "client/command/cli/terminal_style.h"
 #include "client/command/live/frame_json.h"
 #include "sensing/core/printable.h"
 
@@ -20,7 +21,7 @@ constexpr const char* kClearScreen = "\x1b[2J";
 }  // namespace
 
 FrameOutput::FrameOutput(const std::string& title, bool json)
-    : json_(json), live_(!json && isatty(STDOUT_FILENO) == 1), view_(title) {
+    : json_(json), live_(!json && isatty(STDOUT_FILENO) == 1), view_(title, WantsColor()) {
   if (live_) fmt::print("{}", kClearScreen);
 }
 
@@ -37,11 +38,11 @@ void FrameOutput::Take(const v1::LinkFrame& frame, const v1::StreamStatus& statu
   }
 }
 
-void FrameOutput::Refresh(const v1::StreamStatus& status) {
+void FrameOutput::Refresh(const v1::StreamStatus& status, const std::vector<std::string>& footer) {
   const auto now = steady_clock::now();
   if (!live_ || now - drawn_ < kRedraw) return;
   drawn_ = now;
-  fmt::print("{}", view_.Draw(status, now));
+  fmt::print("{}", view_.Draw(status, now, footer));
   std::fflush(stdout);
 }
 

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <string>
+#include <vector>
 
 #include "client/command/live/watch_view.h"
 #include "taclink/v1/tactile.pb.h"
@@ -17,7 +18,7 @@ class FrameOutput {
 
   void Take(const v1::LinkFrame& frame, const v1::StreamStatus& status = {});
   /// Draws the view, now and then.
-  void Refresh(const v1::StreamStatus& status = {});
+  void Refresh(const v1::StreamStatus& status = {}, const std::vector<std::string>& footer = {});
   bool drawn_over() const { return live_; }
 
  private:

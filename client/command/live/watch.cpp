@@ -10,6 +10,7 @@
 #include "client/command/cli/interrupt.h"
 #include "client/command/live/connect.h"
 #include "client/command/live/frame_output.h"
+#include "client/command/live/watch_keys.h"
 #include "client/cpp/taclink/client.h"
 
 namespace taclink::command {
@@ -44,6 +45,7 @@ Result<void> RunWatch(const WatchOptions& options) {
   auto reader = connection->StreamFrames(ToStream(options));
   if (!reader) return reader.error();
   CatchInterrupts();
+  WatchKeys keys(*connection);
   FrameOutput output("taclink watch " + options.server + "   (Ctrl-C ends)", options.json);
   // Every link says something once a second, so silence means a server or a network that hangs.
   const double chosen_s =
@@ -54,7 +56,7 @@ Result<void> RunWatch(const WatchOptions& options) {
     const auto frame = (*reader)->Next(kInterruptPoll);
     if (frame) {
       silence_s = 0;
-      output.Take(*frame, (*reader)->status());
+      if (!keys.paused()) output.Take(*frame, (*reader)->status());
       ++taken;
     } else if (frame.error().code != ErrorCode::kTimeout) {
       return frame.error();
@@ -65,7 +67,9 @@ Result<void> RunWatch(const WatchOptions& options) {
                                options.server, patience_s)};
     }
     if (std::ferror(stdout) != 0) break;  // main reports it
-    output.Refresh((*reader)->status());
+    if (output.drawn_over()) keys.Run();
+    if (keys.ends()) break;
+    output.Refresh((*reader)->status(), {keys.message(), keys.Help()});
   }
   return {};
 }

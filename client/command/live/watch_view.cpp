@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "client/command/cli/terminal_style.h"
 #include "client/cpp/taclink/values.h"
 #include "sensing/core/printable.h"
 
@@ -17,6 +19,11 @@ using std::chrono::steady_clock;
 constexpr double kLeastChangeN = 0.05;
 constexpr double kRelativeChange = 0.2;
 constexpr std::chrono::milliseconds kRateWindow{1000};
+constexpr std::chrono::milliseconds kSample{250};
+constexpr size_t kSamples = 24;  // six seconds
+constexpr int kBarCharacters = 16;
+constexpr double kLeastTopN = 0.5;  // of a bar
+constexpr size_t kMostContacts = 12;
 constexpr const char* kHome = "\x1b[H";
 constexpr const char* kClearLine = "\x1b[K\n";
 constexpr const char* kClearBelow = "\x1b[J";
@@ -24,6 +31,23 @@ constexpr const char* kClearBelow = "\x1b[J";
 std::string Where(const v1::Contact& contact) {
   const v1::Vector3& c = contact.center_m();
   return fmt::format("({:6.1f}, {:6.1f}, {:6.1f}) mm", c.x() * 1e3, c.y() * 1e3, c.z() * 1e3);
+}
+
+Color ColorOf(v1::LinkStatus status) {
+  if (status == v1::LINK_STATUS_OK) return Color::kGreen;
+  return status == v1::LINK_STATUS_LOST ? Color::kRed : Color::kYellow;
+}
+
+// Of a scale: the next of 1, 2, 5, 10, ... tenths.
+double RoundUp(double value) {
+  double top = kLeastTopN;
+  for (int step = 0; top < value && std::isfinite(value); ++step) top *= step % 3 == 2 ? 2.5 : 2;
+  return top;
+}
+
+double TotalN(const v1::LinkFrame& frame) {
+  return frame.has_total_force_n() ? client::Norm(frame.total_force_n())
+                                   : std::numeric_limits<double>::quiet_NaN();
 }
 
 std::string Force(const v1::Contact& contact) {
@@ -47,28 +71,72 @@ void LiveView::Take(const v1::LinkFrame& frame) {
   if (!added && frame.times().exposure_ns() != 0) ++view.frames;
 }
 
-std::string LiveView::Draw(const v1::StreamStatus& status, steady_clock::time_point now) {
-  std::string out = kHome + title_ + kClearLine;
-  for (auto& [index, view] : links_) {
-    if (now - view.counted_since >= kRateWindow) {
-      view.rate_hz = view.frames / duration<double>(now - view.counted_since).count();
-      view.counted_since = now;
-      view.frames = 0;
-    }
-    const v1::LinkFrame& frame = view.frame;
-    out += fmt::format("{}{:<14} {:<11} {:5.1f}/s  latency {:>8}  total {:>7}  markers {}+{}  {}{}",
-                       kClearLine, Printable(frame.link()), client::Name(frame.status()), view.rate_hz,
-                       view.latency_s ? fmt::format("{:.1f} ms", *view.latency_s * 1e3) : "-", Total(frame),
-                       frame.markers_seen(), frame.markers_inferred(), Printable(frame.status_reason()),
-                       kClearLine);
-    for (const auto& contact : frame.contacts()) {
-      out += fmt::format("  #{:<4} {}  at {}  area {:.0f} mm2{}", contact.id(), Force(contact),
-                         Where(contact), contact.area_m2() * 1e6, kClearLine);
-    }
+void LiveView::Count(LinkView& view, steady_clock::time_point now) const {
+  if (now - view.counted_since >= kRateWindow) {
+    view.rate_hz = view.frames / duration<double>(now - view.counted_since).count();
+    view.counted_since = now;
+    view.frames = 0;
   }
+  if (now - view.sampled < kSample) return;
+  view.sampled = now;
+  view.forces_n.push_back(TotalN(view.frame));
+  if (view.forces_n.size() > kSamples) view.forces_n.pop_front();
+}
+
+std::string LiveView::Row(const LinkView& view, size_t name_width, double top_n) const {
+  const v1::LinkFrame& frame = view.frame;
+  const std::string status = fmt::format("{:<11}", client::Name(frame.status()));
+  const std::string bar = Bar(TotalN(frame) / top_n, kBarCharacters);
+  const std::string latency = view.latency_s ? fmt::format("{:.1f} ms", *view.latency_s * 1e3) : "-";
+  return fmt::format("{:<{}}  {} {:>7} {} {:<{}}  {:5.1f}/s {:>8}  {}+{}  {}", Printable(frame.link()),
+                     name_width, color_ ? Colored(status, ColorOf(frame.status())) : status, Total(frame),
+                     color_ ? Colored(bar, Color::kOrange) : bar, Sparkline(view.forces_n, top_n), kSamples,
+                     view.rate_hz, latency, frame.markers_seen(), frame.markers_inferred(),
+                     Printable(frame.status_reason()));
+}
+
+std::vector<LiveView::Touch> LiveView::TouchesByForce() const {
+  std::vector<Touch> touches;
+  for (const auto& [index, view] : links_) {
+    for (const v1::Contact& contact : view.frame.contacts())
+      touches.push_back(
+          {&view.frame, &contact,
+           contact.is_ring_contact() ? contact.normal_force_n() : client::Norm(contact.force_n())});
+  }
+  std::ranges::sort(touches, [](const Touch& a, const Touch& b) { return a.force_n > b.force_n; });
+  return touches;
+}
+
+std::string LiveView::Draw(const v1::StreamStatus& status, steady_clock::time_point now,
+                           const std::vector<std::string>& footer) {
+  size_t name_width = 4;
+  double largest_n = 0;
+  for (auto& [index, view] : links_) {
+    Count(view, now);
+    name_width = std::max(name_width, view.frame.link().size());
+    for (const double force_n : view.forces_n)
+      if (force_n > largest_n) largest_n = force_n;
+  }
+  const double top_n = RoundUp(largest_n);
+  std::string out = kHome + (color_ ? Colored(title_, Color::kBold) : title_) + kClearLine;
+  out += fmt::format("bars to {:.3g} N{}{}", top_n, kClearLine, kClearLine);
+  for (const auto& [index, view] : links_) out += Row(view, name_width, top_n) + kClearLine;
+  const std::vector<Touch> touches = TouchesByForce();
+  out += kClearLine;
+  for (size_t i = 0; i < std::min(touches.size(), kMostContacts); ++i) {
+    const Touch& touch = touches[i];
+    out += fmt::format("  {:<{}} #{:<4} {}  at {}  area {:.0f} mm2{}", Printable(touch.frame->link()),
+                       name_width, touch.contact->id(), Force(*touch.contact), Where(*touch.contact),
+                       touch.contact->area_m2() * 1e6, kClearLine);
+  }
+  if (touches.size() > kMostContacts)
+    out += fmt::format("  and {} more{}", touches.size() - kMostContacts, kClearLine);
   uint64_t dropped = 0;
   for (const v1::LinkStreamCounts& link : status.links()) dropped += link.frames_dropped();
   if (dropped > 0) out += fmt::format("{}dropped for this client: {}{}", kClearLine, dropped, kClearLine);
+  for (const std::string& line : footer)
+    if (!line.empty())
+      out += kClearLine + (color_ ? Colored(Printable(line), Color::kDim) : Printable(line)) + kClearLine;
   return out + kClearBelow;
 }
 

@@ -11,6 +11,7 @@ import { Bones } from "./bones";
 import { ForceArrows, type ForceArrow } from "./force_arrows";
 import { fitView } from "./fit_view";
 import { Labels, type Label } from "./labels";
+import { Lens, type LensPlace } from "./lens";
 import { LinkObject } from "./link_object";
 import { SkinPointer } from "./skin_pointer";
 
@@ -33,6 +34,8 @@ export interface Scales {
 export class ArmScene {
   onPick: (link: string) => void = () => undefined;
   onScales: (scales: Scales) => void = () => undefined;
+  /** The newest contact, seen from near by: what and where; undefined: there is none, or no room. */
+  onLens: (text: string, place: LensPlace | undefined) => void = () => undefined;
   /** A skin that may be pressed. */
   mayPress: (link: string) => boolean = () => false;
   onPress: (place: SkinPlace) => void = () => undefined;
@@ -52,6 +55,9 @@ export class ArmScene {
   private readonly endListening: () => void;
   private drawing = 0;
   private readonly bones = new Bones();
+  private readonly lens: Lens;
+  private readonly begun = new Map<string, number>(); // contacts of now, in the order in which they came
+  private contactsBegun = 0;
   private readonly seen = new THREE.Box3(); // where links have been
   private followsArm = true; // the view, until somebody turns it
 
@@ -72,6 +78,7 @@ export class ArmScene {
   ) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.lens = new Lens(this.renderer);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
@@ -96,7 +103,10 @@ export class ArmScene {
     this.resizes.observe(canvas.parentElement!);
     this.pointer = new SkinPointer(canvas.parentElement!, {
       placeAt: (x, y, link) => this.placeAt(x, y, link),
-      press: (place) => this.onPress(place),
+      press: (place) => {
+        this.followsArm = false;
+        this.onPress(place);
+      },
       deepen: (byM) => this.onDeepen(byM),
       letGo: () => this.onLetGo(),
       allowTurning: (allowed) => (this.controls.enabled = allowed),
@@ -241,6 +251,7 @@ export class ArmScene {
     const inOrder = arm.links.flatMap((link) => this.links.get(link.name) ?? []);
     this.bones.show(inOrder, this.floor.position.z);
     this.renderer.render(this.scene, this.camera);
+    this.drawLens(arrows);
     const texts: Label[] = arrows.map((arrow) => ({
       place: arrow.tip,
       text: arrow.text,
@@ -255,6 +266,21 @@ export class ArmScene {
       });
     this.labels.show(texts, outline, this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
     this.canvas.dataset.frames = String(Number(this.canvas.dataset.frames ?? 0) + 1);
+  }
+
+  private drawLens(arrows: readonly ForceArrow[]): void {
+    const keys = new Set(arrows.map((arrow) => arrow.key));
+    for (const key of this.begun.keys()) if (!keys.has(key)) this.begun.delete(key);
+    for (const key of keys) if (!this.begun.has(key)) this.begun.set(key, this.contactsBegun++);
+    const since = (arrow: ForceArrow) => this.begun.get(arrow.key) ?? -1;
+    const newest = arrows.reduce<ForceArrow | undefined>(
+      (best, arrow) => (best && since(best) > since(arrow) ? best : arrow),
+      undefined,
+    );
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const place = newest && this.lens.place(width);
+    if (newest && place) this.lens.draw(this.scene, newest.tip, newest.normal, place, width, height);
+    this.onLens(newest ? `${newest.text} on ${newest.link}` : "", place);
   }
 
   private longestArrowM(): number {
@@ -313,6 +339,8 @@ export class ArmScene {
         if (this.arrowRange.include(newtons)) this.tellScales();
         const rotation = new THREE.Matrix3().setFromMatrix4(object.group.matrix);
         out.push({
+          key: `${link.name} ${contact.id}`,
+          link: link.name,
           tip: new THREE.Vector3(centerM.x, centerM.y, centerM.z).applyMatrix4(object.group.matrix),
           normal: new THREE.Vector3(normal.x, normal.y, normal.z).applyMatrix3(rotation),
           radiusM: Math.sqrt(contact.areaM2 / Math.PI),

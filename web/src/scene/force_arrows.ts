@@ -9,6 +9,9 @@ const HALO_ABOVE_M = 0.0015; // the skin
 const HALO_LEAST_M = 0.006;
 
 export interface ForceArrow {
+  /** Of the contact, as long as it lasts. */
+  key: string;
+  link: string;
   /** Where it points to, base frame, m. */
   tip: THREE.Vector3;
   /** Of the skin there, unit, base frame. */

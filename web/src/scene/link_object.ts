@@ -5,11 +5,11 @@ import type { Pose } from "../api/gen/taclink/v1/geometry_pb";
 import { colourIndex } from "../skin/colour_map";
 import { isKnown, MarkerFields, type Quantity } from "../skin/fields";
 import { SkinSurface } from "../skin/surface";
+import { hatching } from "./hatching";
 
 const FLANGE_LENGTH_M = 0.014;
 const FLANGE_COLOUR = 0x4a525c;
 const FLANGE_SELECTED = 0x2f81f7;
-const UNMEASURED = 0x9aa1a8;
 const NOISE_SHARE = 0.03; // of the scale, below which a value is drawn as none
 
 /** How scalar values become colours. */
@@ -33,6 +33,7 @@ export class LinkObject {
   private readonly surface: SkinSurface;
   private readonly fields: MarkerFields;
   private readonly colours: THREE.BufferAttribute;
+  private readonly hatch = hatching();
   private readonly flanges = new THREE.MeshPhongMaterial({ color: FLANGE_COLOUR, shininess: 60 });
 
   constructor(
@@ -46,6 +47,7 @@ export class LinkObject {
     geometry.setAttribute("normal", new THREE.BufferAttribute(this.surface.normals, 3));
     this.colours = new THREE.BufferAttribute(new Float32Array(this.surface.positions.length), 3);
     geometry.setAttribute("color", this.colours);
+    geometry.setAttribute("uv", new THREE.BufferAttribute(this.surface.gridPlaces(), 2));
     geometry.setIndex(new THREE.BufferAttribute(this.surface.indices, 1));
     this.skin = new THREE.Mesh(
       geometry,
@@ -103,7 +105,7 @@ export class LinkObject {
     this.flanges.color.set(selected ? FLANGE_SELECTED : FLANGE_COLOUR);
   }
 
-  /** Without a frame nothing is measured, and it shows; so does a skin whose pressures are not known. */
+  /** Hatched while nothing is measured, or the pressures are not known. */
   update(frame: LinkFrame | undefined, colouring: Colouring): void {
     const { surface } = this;
     if (frame)
@@ -114,11 +116,13 @@ export class LinkObject {
       );
     else surface.update(undefined, undefined);
     const known = frame !== undefined && isKnown(frame, colouring.quantity);
-    this.skin.material.vertexColors = known;
-    this.skin.material.wireframe = frame === undefined;
-    this.skin.material.color.set(known ? 0xffffff : UNMEASURED);
-    this.skin.material.needsUpdate = true;
-    this.paint(colouring);
+    if (known === (this.skin.material.map !== null)) {
+      this.skin.material.vertexColors = known;
+      this.skin.material.map = known ? null : this.hatch;
+      this.skin.material.needsUpdate = true;
+    }
+    this.largest = 0;
+    if (known) this.paint(colouring);
     this.skin.geometry.attributes.position.needsUpdate = true;
     this.skin.geometry.attributes.normal.needsUpdate = true;
   }
@@ -174,6 +178,7 @@ export class LinkObject {
       if (object instanceof THREE.Mesh) object.geometry.dispose();
     });
     this.skin.material.dispose();
+    this.hatch.dispose();
     this.flanges.dispose();
   }
 }

@@ -42,6 +42,15 @@ export class SkinSurface {
     this.update(undefined, undefined);
   }
 
+  /** Of each vertex: part of the way around, and along; 0 to 1. */
+  gridPlaces(): Float32Array {
+    const out = new Float32Array(2 * this.rows * this.columns);
+    for (let row = 0; row < this.rows; ++row)
+      for (let column = 0; column < this.columns; ++column)
+        out.set([column / this.columns, row / (this.rows - 1)], 2 * (row * this.columns + column));
+    return out;
+  }
+
   /**
    * Of each marker, in their order: displacement (x, y, z), m, and a value. Without them: at rest, 0. `scale`: of the
    * displacements.

@@ -5,6 +5,7 @@ import { ForceLevel } from "../api/gen/taclink/v1/events_pb";
 import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
 import { useApp, type Theme } from "../app_state";
 import { statusOf } from "../ui/words";
+import { KeysHelp } from "./keys_help";
 import { RecorderControl } from "./recorder_control";
 import { lengthOf } from "../model/vectors";
 import { newtons } from "../ui/format";
@@ -40,6 +41,7 @@ export function Header() {
       <span class="grow" />
       <RecorderControl />
       <ThemeChoice />
+      <KeysHelp />
       <User />
     </header>
   );

@@ -1,6 +1,7 @@
 import { useSignal } from "@preact/signals";
 import { selectedLink, useApp } from "../app_state";
 import { CameraView } from "./camera_view";
+import { LinkStrip } from "./link_strip";
 import { SettingsView } from "./settings_view";
 import { UnrolledMap } from "./unrolled_map";
 
@@ -48,6 +49,7 @@ export function LinkPanel() {
           ))}
         </div>
       </header>
+      <LinkStrip />
       <div
         id="tab-content"
         role="tabpanel"

@@ -3,6 +3,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { selectedLink, useApp, type AppState } from "../app_state";
 import { SourceKind } from "../api/gen/taclink/v1/arm_pb";
 import type { ArmScene, Scales } from "../scene/arm_scene";
+import type { LensPlace } from "../scene/lens";
 import { COLOUR_MAPS, gradientOf, type ColourMapName } from "../skin/colour_map";
 import { QUANTITIES, type Quantity } from "../skin/fields";
 import { PokeCard } from "./poke_card";
@@ -17,6 +18,7 @@ export function SceneView() {
   const scene = useSignal<ArmScene | undefined>(undefined);
   const scales = useSignal<Scales | undefined>(undefined);
   const trouble = useSignal("");
+  const lens = useSignal<{ text: string; place: LensPlace } | undefined>(undefined);
   const store = app.store.value;
 
   useEffect(() => {
@@ -33,6 +35,11 @@ export function SceneView() {
       }
       made.onPick = (link) => (app.link.value = link);
       made.onScales = (now) => (scales.value = now);
+      made.onLens = (text, place) => {
+        const before = lens.peek();
+        if (before?.text === text && before.place.width === place?.width) return;
+        lens.value = place && { text, place };
+      };
       made.mayPress = (link) => mayPress(app, link);
       made.onPress = (place) => app.poker.press(place);
       made.onDeepen = (byM) => app.poker.deepen(byM);
@@ -65,6 +72,7 @@ export function SceneView() {
           aria-label={`The arm with its skins and forces. ${HINT}`}
         />
         <div ref={labels} class="labels" aria-hidden="true" />
+        {lens.value && <LensFrame {...lens.value} />}
         {trouble.value && <p class="empty">{trouble.value}</p>}
         {!store.arm.value && !trouble.value && <p class="empty">Waiting for the server …</p>}
       </div>
@@ -86,6 +94,18 @@ export function SceneView() {
         </button>
       </div>
     </section>
+  );
+}
+
+function LensFrame({ text, place }: { text: string; place: LensPlace }) {
+  const { x, y, width, height } = place;
+  return (
+    <div
+      class="lens"
+      style={{ left: `${x}px`, bottom: `${y}px`, width: `${width}px`, height: `${height}px` }}
+    >
+      <span class="numbers">{text}</span>
+    </div>
   );
 }
 

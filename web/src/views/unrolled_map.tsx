@@ -1,21 +1,16 @@
 import { useSignal } from "@preact/signals";
+import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import type { Link } from "../api/gen/taclink/v1/arm_pb";
-import type { MarkerRange } from "../api/gen/taclink/v1/events_pb";
 import { useApp } from "../app_state";
 import { colourTable, inkOn, roundUp, StickyRange } from "../skin/colour_map";
 import { isKnown, MarkerFields, QUANTITIES } from "../skin/fields";
 import { sameShape } from "../skin/same_shape";
-import { outlineFlat, paintFlat } from "../skin/unroll";
+import { outlineFlat } from "../skin/unroll";
 import { fixed } from "../ui/format";
+import { statusOf } from "../ui/words";
 import { ContactList } from "./contact_list";
-
-const FINE = 6; // pixels of the picture a cell, before the browser scales it
-
-interface Cell {
-  path: number;
-  ring: number;
-}
+import { FlatPainter, type Cell } from "./flat_painter";
 
 /** The selected skin laid flat: path across, ring up. */
 export function UnrolledMap({ link }: { link: Link }) {
@@ -41,7 +36,7 @@ export function UnrolledMap({ link }: { link: Link }) {
       const frame = store.link(link.name).shape;
       const quantity = app.quantity.value;
       const { scale } = QUANTITIES[quantity];
-      if (!frame || !isKnown(frame, quantity)) return painter.clear();
+      if (!frame || !isKnown(frame, quantity)) return painter.hatch();
       const values = fields.values(frame, quantity);
       range.include(Math.max(...values) / scale);
       painter.paint(values, range.top * scale, colourTable(app.colourMap.value));
@@ -91,8 +86,7 @@ export function UnrolledMap({ link }: { link: Link }) {
 
   return (
     <div class="map">
-      <div class="map-frame">
-        <span class="axis-y">ring (1 at the top camera's side)</span>
+      <MapFrame link={link}>
         <canvas
           ref={canvas}
           tabIndex={0}
@@ -102,10 +96,52 @@ export function UnrolledMap({ link }: { link: Link }) {
           onPointerLeave={() => (cell.value = undefined)}
           onKeyDown={steer}
         />
-        <span class="axis-x">path (around the axis)</span>
+      </MapFrame>
+      <div class="beside-map">
+        <Readout link={link} cell={cell.value} fields={fields} top={range.top} />
+        <ContactList link={link.name} />
       </div>
-      <Readout link={link} cell={cell.value} fields={fields} top={range.top} />
-      <ContactList link={link.name} />
+    </div>
+  );
+}
+
+const FULL_TURN_DEG = 360;
+const QUARTER_DEG = 90;
+const AXES: Record<number, string> = { 0: "+x", 90: "+y", 180: "−x", 270: "−y" };
+
+/** The map in its true proportions, with angles around the axis and millimeters along it. */
+function MapFrame({ link, children }: { link: Link; children: ComponentChildren }) {
+  const model = link.model!;
+  const { paths, firstPathAngleRad, ringZM } = model.markers!;
+  const radiusM = Math.max(...model.profileRadiusM);
+  const ratio =
+    (2 * Math.PI * radiusM) / (ringZM[ringZM.length - 1] - ringZM[0] + model.lengthM / ringZM.length);
+  // The middle of path 0 is half a cell from the left.
+  const firstDeg = (firstPathAngleRad * 180) / Math.PI - FULL_TURN_DEG / paths / 2;
+  const angles = [0, QUARTER_DEG, 2 * QUARTER_DEG, 3 * QUARTER_DEG].map((deg) => ({
+    deg,
+    left: ((((deg - firstDeg) % FULL_TURN_DEG) + FULL_TURN_DEG) % FULL_TURN_DEG) / FULL_TURN_DEG,
+  }));
+  const rings = [0, Math.floor((ringZM.length - 1) / 2), ringZM.length - 1];
+  return (
+    <div class="map-frame" style={{ "--ratio": ratio.toFixed(3) }}>
+      <span class="map-end">bottom camera</span>
+      <div class="axis-y numbers" aria-hidden="true">
+        {rings.map((ring) => (
+          <span style={{ bottom: `${((ring + 0.5) / ringZM.length) * 100}%` }}>
+            {(ringZM[ring] * 1e3).toFixed(0)} mm
+          </span>
+        ))}
+      </div>
+      {children}
+      <div class="axis-x numbers" aria-hidden="true">
+        {angles.map(({ deg, left }) => (
+          <span style={{ left: `${left * 100}%` }}>
+            {deg}° {AXES[deg]}
+          </span>
+        ))}
+      </div>
+      <span class="map-end low">top camera</span>
     </div>
   );
 }
@@ -117,10 +153,10 @@ function Readout(props: { link: Link; cell: Cell | undefined; fields: MarkerFiel
   const { link, cell, fields } = props;
   const info = QUANTITIES[app.quantity.value];
   const frame = store.link(link.name).shape;
-  if (!frame) return <p class="readout empty">Nothing is measured now: see the link's status.</p>;
+  const why = statusOf(link, store.link(link.name).newest).reason;
+  if (!frame) return <p class="readout">Nothing is measured now. {why}</p>;
   const top = roundUp(props.top);
-  if (!isKnown(frame, app.quantity.value))
-    return <p class="readout empty">No forces are known now: see the link's status.</p>;
+  if (!isKnown(frame, app.quantity.value)) return <p class="readout">No forces are known now. {why}</p>;
   if (!cell)
     return (
       <p class="readout numbers">
@@ -139,107 +175,4 @@ function Readout(props: { link: Link; cell: Cell | undefined; fields: MarkerFiel
       {sigma > 0 ? ` ± ${fixed(sigma, 3)} N` : ""}
     </p>
   );
-}
-
-/** Draws on the canvas of the map. */
-class FlatPainter {
-  ink = "#ffffff";
-  private readonly picture: ImageData;
-  private readonly buffer = document.createElement("canvas");
-
-  constructor(
-    private readonly canvas: HTMLCanvasElement,
-    private readonly paths: number,
-    private readonly rings: number,
-  ) {
-    this.buffer.width = paths * FINE;
-    this.buffer.height = rings * FINE;
-    this.picture = new ImageData(this.buffer.width, this.buffer.height);
-  }
-
-  private get context(): CanvasRenderingContext2D {
-    return this.canvas.getContext("2d")!;
-  }
-
-  clear(): void {
-    this.fit();
-    this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-  }
-
-  private fit(): void {
-    const width = Math.round(this.canvas.clientWidth * devicePixelRatio);
-    const height = Math.round(this.canvas.clientHeight * devicePixelRatio);
-    if (this.canvas.width !== width) this.canvas.width = width;
-    if (this.canvas.height !== height) this.canvas.height = height;
-  }
-
-  paint(values: ArrayLike<number>, range: number, table: Uint8Array): void {
-    this.fit();
-    const { width, height } = this.buffer;
-    paintFlat(
-      this.picture.data,
-      width,
-      height,
-      values,
-      { paths: this.paths, rings: this.rings },
-      table,
-      range,
-    );
-    this.buffer.getContext("2d")!.putImageData(this.picture, 0, 0);
-    this.context.imageSmoothingEnabled = true;
-    this.context.drawImage(this.buffer, 0, 0, this.canvas.width, this.canvas.height);
-  }
-
-  private x(path: number): number {
-    return (path / this.paths) * this.canvas.width;
-  }
-  private y(ring: number): number {
-    return (1 - ring / this.rings) * this.canvas.height;
-  }
-
-  // A second and a third time a turn away: what crosses the seam is on both sides of it.
-  outline(corners: readonly [path: number, ring: number][]): void {
-    const { context } = this;
-    context.beginPath();
-    for (const turn of [-this.paths, 0, this.paths]) {
-      for (const [i, [path, ring]] of corners.entries()) {
-        if (i === 0) context.moveTo(this.x(path + turn), this.y(ring));
-        else context.lineTo(this.x(path + turn), this.y(ring));
-      }
-      context.closePath();
-    }
-    context.strokeStyle = this.ink;
-    context.lineWidth = 2 * devicePixelRatio;
-    context.stroke();
-  }
-
-  regions(regions: readonly MarkerRange[]): void {
-    const { context } = this;
-    context.strokeStyle = this.ink;
-    context.lineWidth = devicePixelRatio;
-    context.setLineDash([6, 4]);
-    for (const { firstRing, lastRing, firstPath, lastPath } of regions) {
-      const parts =
-        firstPath <= lastPath
-          ? [[firstPath, lastPath]]
-          : [
-              [firstPath, this.paths - 1],
-              [0, lastPath],
-            ];
-      for (const [from, to] of parts) {
-        const top = this.y(lastRing + 1);
-        context.strokeRect(this.x(from), top, this.x(to + 1) - this.x(from), this.y(firstRing) - top);
-      }
-    }
-    context.setLineDash([]);
-  }
-
-  mark(cell: Cell | undefined): void {
-    if (!cell) return;
-    const { context } = this;
-    context.strokeStyle = "#ff6a13";
-    context.lineWidth = 2 * devicePixelRatio;
-    const top = this.y(cell.ring + 1);
-    context.strokeRect(this.x(cell.path), top, this.x(1), this.y(cell.ring) - top);
-  }
 }
