@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kGate = 1.0 / 3;  // of the way to the nearest neighbour
 constexpr double kMovedGate = 1;   // the same, for what is left
-// Nearer spots that fail the gate are badly seen ones of the far ring, whose neighbors are 3 px apart.
-constexpr double kLeastMovedPx = 2;
+// Of the spacing of the far ring's markers. Nearer spots that fail the gate are badly seen ones of that ring.
+constexpr double kLeastMoved = 2.0 / 3;
 constexpr int kMaxTurns = 5;
 // So many markers more must be explained by a camera that is off the nominal one by sqrt(2) tolerances more.
 constexpr double kMarkersPerDeparture = 4;
@@ -46,13 +46,16 @@ void MatchMoved(const Detections& detections, std::vector<std::optional<Vec2>> e
   for (size_t m = 0; m < markers.size(); ++m) {
     if (markers[m].seen) expected[m].reset();
   }
+  double spacing_px = std::numeric_limits<double>::infinity();
+  for (size_t m = 0; m < all.size(); ++m)
+    if (all[m]) spacing_px = std::min(spacing_px, Nearest(all, *all[m], static_cast<int>(m)).second);
   for (size_t k = 0; k < detections.size(); ++k) {
     const auto& spot = spots[k];
     if (!spot) continue;
     const auto [marker, distance] = Nearest(expected, *spot);
     if (marker < 0) continue;
     const Vec2 place = expected[static_cast<size_t>(marker)].value_or(*spot);
-    if (distance < kLeastMovedPx || distance > kMovedGate * Nearest(all, place, marker).second) continue;
+    if (distance < kLeastMoved * spacing_px || distance > kMovedGate * Nearest(all, place, marker).second) continue;
     if (Nearest(spots, place).first != static_cast<int>(k)) continue;
     markers[static_cast<size_t>(marker)] = {true, detections[k].center_px, detections[k].covariance_px2};
     taken[k] = true;

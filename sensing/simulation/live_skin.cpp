@@ -12,7 +12,10 @@ namespace {
 constexpr double kTouchMm = 0.02;     // of a body that begins to press
 constexpr double kGoneN = 1e-6;       // a body that presses less has left
 constexpr double kSphereShare = 0.3;  // of its diameter, where a sphere touches first
-constexpr int kMostHalvings = 4;      // of the way to a key that has no equilibrium at once
+// Of the way to a key that has no equilibrium at once.
+constexpr double kLeastStep = 1.0 / 16;
+// For a try, and for a key: frames of the link wait for it. Most keys need 1 to 4; each takes about 15 ms.
+constexpr int kMostFactorizationsOfTry = 6, kMostFactorizationsOfKey = 10;
 constexpr double kRateShare = 1e-3;   // of the way to a key, for rates
 constexpr double kMostPredictedMm = 8;
 constexpr double kSameMpa = 1e-7, kSameRad = 2e-3, kSameRadps = 2e-2;
@@ -38,6 +41,7 @@ LiveSkin::LiveSkin(const LinkModel& model, const Scene& scene, std::vector<Conta
 
 bool LiveSkin::Begin(double time_s, const SkinNodes& nodes, std::span<const KeyContact> contacts) {
   trouble_.clear();
+  step_ = 1;
   balance_ = skin_.NearTo(nodes.mids_mm, nodes.directors);
   for (size_t i = 0; i < contacts.size(); ++i) {
     if (contacts[i].on) balance_.depth_mm[i] = contacts[i].value[6];
@@ -99,7 +103,7 @@ void LiveSkin::PlaceNewDiscs(const SkinLoad& load, SkinBalance& balance) const {
 bool LiveSkin::Balance(double time_s, const HandledMotion& motion, SkinBalance guess) {
   const SkinLoad load = LoadAt(time_s, motion);
   PlaceNewDiscs(load, guess);
-  is_balance_newest_ = skin_.Balance(load, guess).ok();
+  is_balance_newest_ = skin_.Balance(load, guess, kMostFactorizationsOfTry).ok();
   if (is_balance_newest_) balance_ = std::move(guess);
   return is_balance_newest_;
 }
@@ -133,36 +137,45 @@ SkinBalance LiveSkin::Predicted(double from_s, const HandledMotion& from, double
   return predicted;
 }
 
-bool LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to,
-                     int halvings) {
-  if (Balance(to_s, to, Predicted(from_s, from, to_s, to))) return true;
-  if (halvings == 0) return false;
-  const double middle_s = (from_s + to_s) / 2;
-  const HandledMotion middle = Between(from, to, 0.5);
-  return Reach(from_s, from, middle_s, middle, halvings - 1) &&
-         Reach(middle_s, middle, to_s, to, halvings - 1);
+// Leaves balance_ at the share of the way that it returns.
+double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to) {
+  const int before = skin_.factorizations();
+  const auto time_at = [&](double share) { return from_s + share * (to_s - from_s); };
+  double reached = 0;
+  while (reached < 1 && skin_.factorizations() - before < kMostFactorizationsOfKey) {
+    const double next = std::min(reached + step_, 1.0);
+    const HandledMotion here = Between(from, to, reached), there = Between(from, to, next);
+    if (Balance(time_at(next), there, Predicted(time_at(reached), here, time_at(next), there))) {
+      reached = next;
+      step_ = std::min(2 * step_, 1.0);
+    } else if (step_ > kLeastStep) {
+      step_ /= 2;
+    } else {
+      break;
+    }
+  }
+  return reached;
 }
 
-// Bodies that can't go on stay where they are; where that has no equilibrium either, the user lets go of all.
+// Bodies that can't go on at their speed go on slower or stay where they are; where that has no equilibrium
+// either, the user lets go of all.
 bool LiveSkin::NextKey(double time_s, const Handling& wanted) {
   from_ = std::move(to_);
   RemoveBodies();
   AddBodies(wanted.bodies);
   const HandledMotion before = motion_;
-  const SkinBalance balance_before = balance_;
   const double span_s = time_s - from_.time_s;
   motion_ = MovedOn(model_, before, wanted.bodies, GoalAt(time_s, wanted), span_s);
-  const bool reached = Reach(from_.time_s, before, time_s, motion_, kMostHalvings);
-  if (!reached) {
-    balance_ = balance_before;
-    motion_ = before;
-    trouble_ = "what presses stays where it is: the skin has no equilibrium further on, it would snap";
+  const double reached = Reach(from_.time_s, before, time_s, motion_);
+  trouble_.clear();
+  if (reached < 1) {
+    motion_ = Between(before, motion_, reached);
+    if (reached == 0)
+      trouble_ = "what presses stays where it is: the skin has no equilibrium further on, it would snap";
     if (!Balance(time_s, motion_, balance_)) {
       trouble_ = "what pressed was taken off: the skin has no equilibrium under it";
       return false;
     }
-  } else {
-    trouble_.clear();
   }
   to_ = MakeKey(time_s);
   ReadBack(to_.contacts);

@@ -49,7 +49,7 @@ class LiveSkin {
   bool Balance(double time_s, const HandledMotion& motion, SkinBalance guess);
   void PlaceNewDiscs(const SkinLoad& load, SkinBalance& balance) const;
   SkinBalance Predicted(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to);
-  bool Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to, int halvings);
+  double Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to);
   bool NextKey(double time_s, const Handling& wanted);
   void AddBodies(const std::vector<PressedBody>& wanted);
   void RemoveBodies();
@@ -70,6 +70,7 @@ class LiveSkin {
   SkinBalance balance_;
   bool is_balance_newest_ = false;  // of what skin_ has solved, or tried to
   HandledMotion motion_;
+  double step_ = 1;  // of the way to a key, that a try for the next one takes
   Key from_, to_;
   std::string trouble_;
 };

@@ -182,7 +182,7 @@ void AddPoke(const Arguments& app, Selected& selected) {
   command.AddOption("--force", options->force_n, "How hard along the skin's normal, N")
       .Must(Positive())
       .Excludes(depth);
-  command.AddOption("--hold", options->hold_s, "Take it off after so many seconds")
+  command.AddOption("--hold", options->hold_s, "Remove the body after so many seconds")
       .Must(Positive())
       .ShowDefault();
   const Option stay = command.AddFlag("--stay", options->stay, "Leave it there until --release");
