@@ -35,9 +35,10 @@ const HandledCase kCases[] = {
 
 void LiveEquilibria(benchmark::State& state) {
   const HandledCase& handled = kCases[state.range(0)];
-  const Scene scene = ParseScene("bench", "taclink_scene: 1\nname: bench\nduration_s: 60\n"
-                                          "pressure_keyframes: [{time_s: 0, kpa: " +
-                                              std::to_string(handled.pressure_kpa) + "}]\n")
+  const Scene scene = ParseScene("bench",
+                                 "taclink_scene: 1\nname: bench\nduration_s: 60\n"
+                                 "pressure_keyframes: [{time_s: 0, kpa: " +
+                                     std::to_string(handled.pressure_kpa) + "}]\n")
                           .value();
   const auto skin = SimulatedSkin::Make(LoadLinkModel(handled.model).value(), scene).value();
   SkinTruth truth;
@@ -50,8 +51,8 @@ void LiveEquilibria(benchmark::State& state) {
     skin->Handle(handling);
     const auto begin = std::chrono::steady_clock::now();
     skin->Evaluate(time_s, truth);
-    slowest_s = std::max(slowest_s,
-                         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    slowest_s =
+        std::max(slowest_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   }
   state.SetItemsProcessed(state.iterations());
   state.counters["slowest_ms"] = 1e3 * slowest_s;

@@ -55,7 +55,8 @@ void MatchMoved(const Detections& detections, std::vector<std::optional<Vec2>> e
     const auto [marker, distance] = Nearest(expected, *spot);
     if (marker < 0) continue;
     const Vec2 place = expected[static_cast<size_t>(marker)].value_or(*spot);
-    if (distance < kLeastMoved * spacing_px || distance > kMovedGate * Nearest(all, place, marker).second) continue;
+    if (distance < kLeastMoved * spacing_px || distance > kMovedGate * Nearest(all, place, marker).second)
+      continue;
     if (Nearest(spots, place).first != static_cast<int>(k)) continue;
     markers[static_cast<size_t>(marker)] = {true, detections[k].center_px, detections[k].covariance_px2};
     taken[k] = true;

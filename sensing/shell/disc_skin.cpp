@@ -13,7 +13,7 @@ constexpr double kTolerance = 5e-8;        // of E t^2, of each entry of the res
 constexpr double kForceTolerance = 5e-5;   // of a disc's force
 constexpr double kLeastForceShare = 2e-6;  // of E t^2: what a disc's force need not be nearer to
 constexpr double kWorthKeeping = 0.5;      // a kept matrix must shrink the misfit by this each time
-constexpr int kMostIterations = 80;
+constexpr int kMostIterations = 80, kMostFactorizations = 14;
 constexpr double kMostStepMm = 4, kMostTurn = 0.5, kMostDepthStepMm = 2;
 constexpr double kNearMm = 0.01;  // of a state for which a matrix is as good as that state's own
 constexpr int kMostReleases = 4;
@@ -257,7 +257,7 @@ bool DiscSkin::ReleaseLimits(const SkinLoad& load, SkinBalance& balance) const {
   return released;
 }
 
-BalanceSummary DiscSkin::Balance(const SkinLoad& load, SkinBalance& balance, int most) {
+BalanceSummary DiscSkin::Balance(const SkinLoad& load, SkinBalance& balance) {
   BalanceSummary summary;
   const int before = factorizations_;
   const auto ended = [&](BalanceStop stop) {
@@ -280,7 +280,7 @@ BalanceSummary DiscSkin::Balance(const SkinLoad& load, SkinBalance& balance, int
       last = 0;
       continue;
     }
-    if (summary.iterations >= kMostIterations || factorizations_ - before >= most)
+    if (summary.iterations >= kMostIterations || factorizations_ - before >= kMostFactorizations)
       return ended(BalanceStop::kMaxIterations);
     // Also at first: last is 0.
     const bool slow = misfit > kWorthKeeping * last || searched != searched_;

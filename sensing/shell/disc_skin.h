@@ -71,8 +71,6 @@ struct BalanceSummary {
 /// holds where a force alone would let it snap. No line search: a guess that is too far fails. One thread.
 class DiscSkin {
  public:
-  static constexpr int kMostFactorizations = 14;
-
   /// `disc_count`: how many discs every SkinLoad has.
   DiscSkin(const LinkModel& model, size_t disc_count, const PressedSkinOptions& options);
   ~DiscSkin();
@@ -81,9 +79,8 @@ class DiscSkin {
   /// A guess with the nodes there, by node; directors need not be unit. No disc is on.
   SkinBalance NearTo(std::span<const Vec3> mids_mm, std::span<const Vec3> directors) const;
 
-  /// From a guess to the equilibrium, which is stable if it was found; `balance` is spoilt if not, or if that
-  /// takes more factorizations than `most`.
-  BalanceSummary Balance(const SkinLoad& load, SkinBalance& balance, int most = kMostFactorizations);
+  /// From a guess to the equilibrium, which is stable if it was found; `balance` is spoilt if not.
+  BalanceSummary Balance(const SkinLoad& load, SkinBalance& balance);
 
   /// Of the equilibrium that Balance found last, `span` apart from `before` to `after` it.
   SkinRates RatesAt(const SkinLoad& before, const SkinLoad& after, double span, const SkinBalance& balance);

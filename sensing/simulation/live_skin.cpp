@@ -14,9 +14,9 @@ constexpr double kGoneN = 1e-6;       // a body that presses less has left
 constexpr double kSphereShare = 0.3;  // of its diameter, where a sphere touches first
 // Of the way to a key that has no equilibrium at once.
 constexpr double kLeastStep = 1.0 / 16;
-// For a try, and for a key: frames of the link wait for it. Most keys need 1 to 4; each takes about 15 ms.
-constexpr int kMostFactorizationsOfTry = 6, kMostFactorizationsOfKey = 10;
-constexpr double kRateShare = 1e-3;   // of the way to a key, for rates
+// For a key: frames of the link wait for it. Most keys need 1 to 4; each takes about 15 ms.
+constexpr int kMostFactorizations = 15;
+constexpr double kRateShare = 1e-3;  // of the way to a key, for rates
 constexpr double kMostPredictedMm = 8;
 constexpr double kSameMpa = 1e-7, kSameRad = 2e-3, kSameRadps = 2e-2;
 
@@ -103,7 +103,7 @@ void LiveSkin::PlaceNewDiscs(const SkinLoad& load, SkinBalance& balance) const {
 bool LiveSkin::Balance(double time_s, const HandledMotion& motion, SkinBalance guess) {
   const SkinLoad load = LoadAt(time_s, motion);
   PlaceNewDiscs(load, guess);
-  is_balance_newest_ = skin_.Balance(load, guess, kMostFactorizationsOfTry).ok();
+  is_balance_newest_ = skin_.Balance(load, guess).ok();
   if (is_balance_newest_) balance_ = std::move(guess);
   return is_balance_newest_;
 }
@@ -142,7 +142,7 @@ double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, co
   const int before = skin_.factorizations();
   const auto time_at = [&](double share) { return from_s + share * (to_s - from_s); };
   double reached = 0;
-  while (reached < 1 && skin_.factorizations() - before < kMostFactorizationsOfKey) {
+  while (reached < 1 && skin_.factorizations() - before < kMostFactorizations) {
     const double next = std::min(reached + step_, 1.0);
     const HandledMotion here = Between(from, to, reached), there = Between(from, to, next);
     if (Balance(time_at(next), there, Predicted(time_at(reached), here, time_at(next), there))) {
@@ -170,7 +170,7 @@ bool LiveSkin::NextKey(double time_s, const Handling& wanted) {
   trouble_.clear();
   if (reached < 1) {
     motion_ = Between(before, motion_, reached);
-    if (reached == 0)
+    if (reached == 0 && step_ <= kLeastStep)
       trouble_ = "what presses stays where it is: the skin has no equilibrium further on, it would snap";
     if (!Balance(time_s, motion_, balance_)) {
       trouble_ = "what pressed was taken off: the skin has no equilibrium under it";

@@ -6,6 +6,9 @@ import { chromium, type Browser, type Page } from "playwright-core";
 const PICTURES =
   process.env.TACLINK_PICTURES ?? fileURLToPath(new URL("../../build/web-pictures", import.meta.url));
 
+const SETTLE_MS = 20_000;
+const STILL_MS = 700;
+
 export function launch(): Promise<Browser> {
   return chromium.launch({
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
@@ -16,6 +19,13 @@ export function launch(): Promise<Browser> {
       "--disable-dev-shm-usage",
     ],
   });
+}
+
+/** What the card of a pressed skin says. */
+export interface Felt {
+  feltN: number;
+  trueN: number;
+  offMm: number;
 }
 
 /** A page of the server's; whatever it asks elsewhere, or complains of, fails the test at `close`. */
@@ -64,6 +74,23 @@ export class Visit {
       (least) => Number(document.querySelector<HTMLElement>(".scene canvas")?.dataset.frames) >= least,
       before + 2,
     );
+  }
+
+  async felt(): Promise<Felt | undefined> {
+    const text = (await this.page.locator(".felt").allInnerTexts()).join(" ");
+    const found = /: ([\d.]+) N, true ([\d.]+) N; ([\d.]+) mm off/.exec(text);
+    return found ? { feltN: +found[1], trueN: +found[2], offMm: +found[3] } : undefined;
+  }
+
+  /** Once the body has arrived: what is true does not change any more. */
+  async settledFelt(): Promise<Felt> {
+    const deadline = performance.now() + SETTLE_MS;
+    for (let last = -1; performance.now() < deadline; await this.page.waitForTimeout(STILL_MS)) {
+      const felt = await this.felt();
+      if (felt && felt.trueN === last) return felt;
+      last = felt?.trueN ?? -1;
+    }
+    throw new Error("what is pressed does not settle");
   }
 
   row(link: string) {

@@ -103,6 +103,17 @@ duration_s: 3600
 `;
 }
 
+/** A scene for somebody to press: inflated to 0.5 kPa once the rest shape was taken, and never touched by itself. */
+export function free(): string {
+  return `taclink_scene: 1
+name: free
+model: cylinder
+frame_rate_hz: ${RATE_HZ}
+duration_s: 3600
+pressure_keyframes: [{time_s: 4, kpa: 0}, {time_s: 6, kpa: 0.5}, {time_s: 3600, kpa: 0.5}]
+`;
+}
+
 /** Links above each other, each with its scene: a shipped one or a file. */
 export function configuration(arm: string, scenes: Record<string, string>, more = ""): string {
   const links = Object.entries(scenes).map(
