@@ -43,8 +43,10 @@ std::string Colored(std::string_view text, Color color) {
 }
 
 bool WantsColor() {
+  // Nothing sets the environment. NOLINTBEGIN(concurrency-mt-unsafe)
   const char* no_color = std::getenv("NO_COLOR");
   const char* terminal = std::getenv("TERM");
+  // NOLINTEND(concurrency-mt-unsafe)
   return isatty(STDOUT_FILENO) == 1 && (no_color == nullptr || *no_color == 0) &&
          (terminal == nullptr || std::string_view(terminal) != "dumb");
 }
