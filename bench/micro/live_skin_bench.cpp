@@ -8,7 +8,6 @@
 #include <numbers>
 #include <string>
 
-#include "sensing/core/units.h"
 #include "sensing/model/model_file.h"
 #include "sensing/simulation/live_skin.h"
 #include "sensing/simulation/simulated_skin.h"
