@@ -14,7 +14,7 @@ end_server() {
 trap 'end_server; rm -rf "$folder"' EXIT
 awk '/^```sh$/ {on = 1; next} /^```/ {on = 0} on' "$page" >"$folder/page.sh"
 [ -s "$folder/page.sh" ] || { echo "$page has no blocks of sh" >&2; exit 1; }
-ln -s "$(realpath "$(dirname "$page")/../deploy")" "$folder/deploy"
+ln -s "$(realpath "$(dirname "$0")/../../deploy")" "$folder/deploy"
 cd "$folder"
 export PATH=$bin:$PATH XDG_STATE_HOME=$folder/state
 
