@@ -150,6 +150,11 @@ Result<v1::Arm> Client::GetArm(milliseconds timeout) {
   return std::move(*response->mutable_arm());
 }
 
+Result<v1::GetForceHistoryResponse> Client::GetForceHistory(const v1::GetForceHistoryRequest& request,
+                                                            milliseconds timeout) {
+  return connection_->Ask(&TactileStub::GetForceHistory, request, timeout);
+}
+
 Result<void> Client::RestartLink(const std::string& link, milliseconds timeout) {
   const auto operations = v1::OperationsService::NewStub(connection_->channel);
   v1::RestartLinkRequest request;

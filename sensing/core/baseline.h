@@ -33,11 +33,13 @@ struct Baseline {
 struct TareOptions {
   int frames = 10;     ///< to average over
   bool force = false;  ///< even while touched, moved or with few markers
+  bool undo = false;   ///< undo the last tare instead
 };
 
 /// A baseline that was taken.
 struct TareSummary {
   int frames = 0;
+  bool undone = false;        ///< the last tare, which had moved the baseline by shift_mm
   bool forced = false;        ///< without that it would have been refused
   double shift_mm = 0;        ///< against the baseline before: of the marker that is furthest off
   double previous_age_s = 0;  ///< of the baseline before

@@ -51,6 +51,22 @@ void BaselineKeeper::Take(BaselineOrigin origin, const LabelledMarkers& markers,
   taken_ns_ = MonotonicNs(times, clock);
   loads_ = loads;
   follower_.Reset();
+  replaced_.reset();
+}
+
+Result<void> BaselineKeeper::UndoTare(std::optional<SkinStage>& skin) {
+  if (tare_) return Error{ErrorCode::kFailedPrecondition, "a tare is under way; wait for its end"};
+  if (!replaced_)
+    return Error{ErrorCode::kFailedPrecondition,
+                 "there is no tare to undo: none since the rest shape was taken, or it was undone already"};
+  skin.emplace(replaced_->skin);
+  baseline_ = replaced_->baseline;
+  taken_ns_ = replaced_->taken_ns;
+  loads_ = replaced_->loads;
+  follower_ = replaced_->follower;
+  tare_end_ = TareSummary{.undone = true, .shift_mm = replaced_->shift_mm};
+  replaced_.reset();
+  return {};
 }
 
 Result<void> BaselineKeeper::BeginTare(const TareOptions& options) {
@@ -138,9 +154,11 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
     // The pressures were good enough for their frames' estimates.
     const MeasuredLoads loads = tare_->loads();
     const auto untouched = estimator.UntouchedAt(loads.Loads());
+    Replaced before{skin, baseline_, taken_ns_, loads_, follower_, tare_->shift_mm()};
     skin.Tare(tare_->markers(), loads, untouched.value_or(estimator.estimate().baseline_mm));
     Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare,
          tare_->markers(), loads.Loads(), times, clock);
+    replaced_.emplace(std::move(before));
   }
   tare_.reset();
 }

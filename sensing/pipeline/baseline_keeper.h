@@ -34,6 +34,9 @@ class BaselineKeeper {
 
   /// Errors: kFailedPrecondition (one is under way).
   Result<void> BeginTare(const TareOptions& options);
+  /// Restores the baseline before the last tare; TakeTareEnd tells. Errors: kFailedPrecondition (a
+  /// tare is under way, or there was none since the rest shape was taken).
+  Result<void> UndoTare(std::optional<SkinStage>& skin);
   void CancelTare();
   /// Its end will say why.
   void AbortTare(const std::string& why);
@@ -62,6 +65,16 @@ class BaselineKeeper {
                      SkinStage& skin, StateEstimator& estimator, const Clock& clock);
   double AgeS(const FrameTimes& times, const Clock& clock) const;
 
+  /// What a tare replaced.
+  struct Replaced {
+    SkinStage skin;
+    Baseline baseline;
+    int64_t taken_ns;
+    KnownLoads loads;
+    DriftFollower follower;
+    double shift_mm;  // of the tare
+  };
+
   const LinkModel model_;
   const std::optional<DriftOptions> drift_;
   Baseline baseline_;
@@ -73,6 +86,7 @@ class BaselineKeeper {
   std::vector<Vec3> off_mm_;   // likewise: against the baseline as it was taken, without pressure's part
 
   std::optional<TareCollector> tare_;
+  std::optional<Replaced> replaced_;
   std::optional<int64_t> waits_since_ns_;  // for an answer; monotonic
   std::optional<Result<TareSummary>> tare_end_;
 };

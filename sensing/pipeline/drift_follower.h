@@ -33,7 +33,7 @@ class DriftFollower {
  private:
   void Follow(double seconds, std::span<const Vec3> off_mm);
 
-  const DriftOptions options_;
+  DriftOptions options_;
   std::vector<Vec3> drift_mm_;
   double largest_mm_ = 0;
   bool following_ = false;

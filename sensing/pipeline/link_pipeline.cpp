@@ -388,6 +388,7 @@ Result<void> LinkPipeline::BeginTare(const TareOptions& options) {
   if (stages_->rest || !stages_->skin)
     return Error{ErrorCode::kFailedPrecondition,
                  "the link's rest shape is being taken; wait until it measures"};
+  if (options.undo) return stages_->keeper.UndoTare(stages_->skin);
   return stages_->keeper.BeginTare(options);
 }
 void LinkPipeline::CancelTare() {

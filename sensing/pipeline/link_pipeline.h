@@ -73,8 +73,9 @@ class LinkPipeline {
   void CancelRest();
   const RestProgress& rest_progress() const;
 
-  /// Makes the mean of the next frames the baseline, the cameras stay. Meanwhile all goes on as before.
-  /// Errors: kFailedPrecondition (no baseline yet, or rest pairs are being taken).
+  /// Makes the mean of the next frames the baseline, the cameras stay. Meanwhile all goes on as before. Or
+  /// undoes the last tare (TareOptions::undo). Errors: kFailedPrecondition (no baseline yet, rest pairs
+  /// are being taken, or there is no tare to undo).
   Result<void> BeginTare(const TareOptions& options);
   void CancelTare();
   /// After each Process, once: how the tare ended. Errors: as TareCollector::Add; then the old baseline

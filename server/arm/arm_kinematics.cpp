@@ -58,6 +58,8 @@ struct ArmKinematics::Parts {
   std::vector<JointInfo> joints;
   std::set<std::string> dependent;
   std::vector<FrameChain> frames;
+  std::vector<ArmVisual> visuals;
+  std::vector<size_t> drawn_frames;
 
   Result<size_t> Find(const std::string& frame) const;
 };
@@ -95,6 +97,10 @@ Result<std::shared_ptr<const ArmKinematics>> ArmKinematics::Parse(const std::str
   for (FrameChain& frame : parts->frames) frame = MakeChain(*urdf, parts->base, frame.name);
   parts->joints = std::move(urdf->joints);
   parts->dependent = std::move(urdf->dependent);
+  parts->visuals = std::move(urdf->visuals);
+  std::set<size_t> drawn;
+  for (const ArmVisual& visual : parts->visuals) drawn.insert(visual.frame);
+  parts->drawn_frames.assign(drawn.begin(), drawn.end());
   return std::shared_ptr<const ArmKinematics>(new ArmKinematics(std::move(parts)));
 }
 
@@ -103,6 +109,15 @@ const std::string& ArmKinematics::base() const {
 }
 const std::vector<JointInfo>& ArmKinematics::joints() const {
   return parts_->joints;
+}
+const std::vector<ArmVisual>& ArmKinematics::visuals() const {
+  return parts_->visuals;
+}
+const std::vector<size_t>& ArmKinematics::drawn_frames() const {
+  return parts_->drawn_frames;
+}
+const std::string& ArmKinematics::frame_name(size_t frame) const {
+  return parts_->frames[frame].name;
 }
 const std::vector<size_t>& ArmKinematics::JointsOf(size_t frame) const {
   return parts_->frames[frame].joints;

@@ -26,6 +26,17 @@ struct JointInfo {
   std::optional<JointLimits> limits;  ///< none: the URDF gives no range
 };
 
+enum class VisualShape { kBox, kCylinder, kSphere };
+
+/// A body that a URDF draws: a <visual>. Meshes are left out.
+struct ArmVisual {
+  size_t frame = 0;               ///< that it moves with
+  Rigid3 frame_from_visual = {};  ///< mm
+  VisualShape shape = VisualShape::kBox;
+  Vec3 size_mm = Vec3::Zero();  ///< along its axes; a cylinder's axis is z
+  std::optional<Vec3> color;    ///< red, green, blue, 0 to 1; none: the URDF names none
+};
+
 /// Where an arm's frames are for given joint positions, after its URDF [urdf], by KDL [kdl]. Fixed joints are
 /// part of the frames, mimicking joints follow theirs. Immutable: any thread.
 class ArmKinematics {
@@ -52,6 +63,10 @@ class ArmKinematics {
   /// Whether it is a joint of the URDF that has no position of its own: fixed, or mimicking another.
   bool IsDependent(const std::string& joint) const;
 
+  const std::vector<ArmVisual>& visuals() const;
+  /// Frames that have visuals, rising.
+  const std::vector<size_t>& drawn_frames() const;
+  const std::string& frame_name(size_t frame) const;
   /// The index of a frame (a URDF link). Errors: kNotFound, with the frames there are.
   Result<size_t> FindFrame(const std::string& name) const;
   /// Indices of the joints that move the frame against the base, mimicked ones included; rising.

@@ -4,6 +4,24 @@
 #include <utility>
 
 namespace taclink::server {
+namespace {
+
+// Of the joint that is worst off.
+void SetValidity(const ArmKinematics& kinematics, size_t frame, const JointStateBuffer::Instant& instant,
+                 LinkPose& pose) {
+  for (const size_t joint : kinematics.JointsOf(frame)) {
+    const PoseValidity validity = instant.validity[joint];
+    const int64_t distance_ns = instant.distance_ns[joint];
+    if (validity > pose.validity) {
+      pose.validity = validity;
+      pose.distance_ns = distance_ns;
+    } else if (validity == pose.validity) {
+      pose.distance_ns = std::max(pose.distance_ns, distance_ns);
+    }
+  }
+}
+
+}  // namespace
 
 ArmPoses::ArmPoses(std::vector<LinkMount> mounts) : ArmPoses(nullptr, std::move(mounts)) {}
 
@@ -17,6 +35,19 @@ LinkPose ArmPoses::At(size_t link, int64_t time_ns) const {
   return MotionAt(link, time_ns).pose;
 }
 
+std::vector<LinkPose> ArmPoses::DrawnFrames(int64_t time_ns) const {
+  std::vector<LinkPose> poses;
+  if (!kinematics_ || kinematics_->drawn_frames().empty()) return poses;
+  JointStateBuffer::Instant instant;
+  joints_.At(time_ns, instant);
+  for (const size_t frame : kinematics_->drawn_frames()) {
+    LinkPose& pose = poses.emplace_back();
+    pose.base_from_link = kinematics_->BaseFromFrame(frame, instant.positions);
+    SetValidity(*kinematics_, frame, instant, pose);
+  }
+  return poses;
+}
+
 ArmPoses::Motion ArmPoses::MotionAt(size_t link, int64_t time_ns) const {
   const LinkMount& mount = mounts_[link];
   JointStateBuffer::Instant instant;
@@ -25,16 +56,7 @@ ArmPoses::Motion ArmPoses::MotionAt(size_t link, int64_t time_ns) const {
   if (!kinematics_ || !mount.frame) return out;
   LinkPose& pose = out.pose;
   pose.base_from_link = kinematics_->BaseFromFrame(*mount.frame, out.positions) * mount.frame_from_link;
-  for (const size_t joint : kinematics_->JointsOf(*mount.frame)) {
-    const PoseValidity validity = instant.validity[joint];
-    const int64_t distance_ns = instant.distance_ns[joint];
-    if (validity > pose.validity) {
-      pose.validity = validity;
-      pose.distance_ns = distance_ns;
-    } else if (validity == pose.validity) {
-      pose.distance_ns = std::max(pose.distance_ns, distance_ns);
-    }
-  }
+  SetValidity(*kinematics_, *mount.frame, instant, pose);
   return out;
 }
 

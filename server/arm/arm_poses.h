@@ -36,6 +36,9 @@ class ArmPoses {
 
   LinkPose At(size_t link, int64_t time_ns) const;
 
+  /// Of the kinematics' frames that have visuals, in their order. Empty without a URDF.
+  std::vector<LinkPose> DrawnFrames(int64_t time_ns) const;
+
   struct Motion {
     LinkPose pose;
     std::vector<double> positions;  ///< by joint

@@ -10,6 +10,7 @@ namespace taclink::server {
 namespace {
 
 constexpr double kMmPerMetre = 1e3;
+constexpr size_t kMaxVisuals = 1000;
 constexpr size_t kMaxLinks = 1000;  // every frame keeps its own chain of joints
 
 /// Keeps urdfdom's complaints, which it has only for the console.
@@ -68,6 +69,7 @@ class Reader {
 
  private:
   void ReadLink(const urdf::Link& link, UrdfTree& out) {
+    for (const auto& visual : link.visual_array) ReadVisual(*visual, out);
     out.frames.push_back(link.name);
     for (const auto& joint : link.child_joints) {
       if (!trouble_.empty()) return;
@@ -78,6 +80,41 @@ class Reader {
       out.tree.addSegment(KDL::Segment(joint->child_link_name, moving, origin), link.name);
       ReadLink(*model_.getLink(joint->child_link_name), out);
     }
+  }
+
+  static void ReadVisual(const urdf::Visual& visual, UrdfTree& out) {
+    if (!visual.geometry || out.visuals.size() >= kMaxVisuals) return;
+    const KDL::Frame origin = ToKdl(visual.origin);
+    ArmVisual body{.frame = out.frames.size(), .color = {}};
+    switch (visual.geometry->type) {
+      case urdf::Geometry::BOX: {
+        const urdf::Vector3& edges = static_cast<const urdf::Box&>(*visual.geometry).dim;
+        body.size_mm = kMmPerMetre * Vec3(edges.x, edges.y, edges.z);
+        break;
+      }
+      case urdf::Geometry::CYLINDER: {
+        const auto& cylinder = static_cast<const urdf::Cylinder&>(*visual.geometry);
+        body.shape = VisualShape::kCylinder;
+        body.size_mm = kMmPerMetre * Vec3(2 * cylinder.radius, 2 * cylinder.radius, cylinder.length);
+        break;
+      }
+      case urdf::Geometry::SPHERE:
+        body.shape = VisualShape::kSphere;
+        body.size_mm.setConstant(2 * kMmPerMetre * static_cast<const urdf::Sphere&>(*visual.geometry).radius);
+        break;
+      case urdf::Geometry::MESH:
+        return;
+    }
+    // Only for looks: what can't be drawn is left out.
+    if (!IsFinite(origin) || !body.size_mm.allFinite() || !(body.size_mm.minCoeff() > 0)) return;
+    for (int row = 0; row < 3; ++row) {
+      body.frame_from_visual.translation[row] = origin.p(row);
+      for (int column = 0; column < 3; ++column)
+        body.frame_from_visual.rotation(row, column) = origin.M(row, column);
+    }
+    if (visual.material)
+      body.color = Vec3(visual.material->color.r, visual.material->color.g, visual.material->color.b);
+    out.visuals.push_back(body);
   }
 
   KDL::Joint ReadJoint(const urdf::Joint& joint, UrdfTree& out) {

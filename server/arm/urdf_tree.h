@@ -22,7 +22,8 @@ struct JointRule {
 struct UrdfTree {
   KDL::Tree tree;
   std::string root;
-  std::vector<std::string> frames;         ///< from the root to the tips
+  std::vector<std::string> frames;  ///< from the root to the tips
+  std::vector<ArmVisual> visuals;
   std::vector<JointInfo> joints;           ///< that move by themselves, likewise
   std::map<std::string, JointRule> rules;  ///< by the name of each joint that moves
   std::set<std::string> dependent;         ///< fixed and mimicking joints

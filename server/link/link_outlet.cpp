@@ -30,6 +30,7 @@ bool LinkOutlet::PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, S
   const int64_t exposure_ns = state->replayed ? 0 : frame.times.exposure_monotonic_ns;
   statistics_.Record(state->sequence, exposure_ns, state->times.published_ns);
   histograms_.Record(*state);
+  forces_.Add(*state);
   PicturesPtr pictures;
   if (hub_->WantsPictures(link_)) {
     auto taken = picture_pool_.Acquire();

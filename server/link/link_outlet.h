@@ -10,6 +10,7 @@
 #include "sensing/core/link_state.h"
 #include "server/hub/hub.h"
 #include "server/hub/state_pool.h"
+#include "server/link/force_history.h"
 #include "server/link/link_histograms.h"
 #include "server/link/link_statistics.h"
 
@@ -49,6 +50,7 @@ class LinkOutlet {
   std::unique_ptr<LinkState> Acquire() { return pool_.Acquire(); }
   LinkStatistics Statistics() const { return statistics_.Snapshot(clock_.MonotonicNs()); }
   const LinkHistograms& histograms() const { return histograms_; }
+  const ForceHistory& forces() const { return forces_; }
 
  private:
   void Send(std::unique_ptr<LinkState> state, const PicturesPtr& pictures = nullptr);  // with the lock held
@@ -61,6 +63,7 @@ class LinkOutlet {
   SharedPool<FramePictures> picture_pool_;
   LinkStatisticsCollector statistics_;
   LinkHistograms histograms_;
+  ForceHistory forces_;
   std::atomic<uint64_t> life_ = 0;
   std::atomic<bool> trouble_ = false;
   std::atomic<int64_t> last_published_ns_ = 0;

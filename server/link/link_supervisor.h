@@ -76,6 +76,7 @@ class LinkSupervisor {
   Supervision supervision() const;
   LinkStatistics Statistics() const { return outlet_->Statistics(); }
   const LinkHistograms& histograms() const { return outlet_->histograms(); }
+  const ForceHistory& forces() const { return outlet_->forces(); }
   SourceCondition source_condition() const;
   /// Null between two workers.
   std::shared_ptr<LinkWorker> current() const;

@@ -1,5 +1,7 @@
 #include "server/messages/arm_message.h"
 
+#include <algorithm>
+
 #include "server/messages/contacts_message.h"
 #include "server/messages/event_message.h"
 #include "wire/convert.h"
@@ -122,12 +124,42 @@ void FillJoints(const Arm& arm, v1::Arm& out) {
   }
 }
 
+v1::VisualShape ToWire(VisualShape shape) {
+  switch (shape) {
+    case VisualShape::kBox:
+      return v1::VISUAL_SHAPE_BOX;
+    case VisualShape::kCylinder:
+      return v1::VISUAL_SHAPE_CYLINDER;
+    case VisualShape::kSphere:
+      return v1::VISUAL_SHAPE_SPHERE;
+  }
+  return v1::VISUAL_SHAPE_UNSPECIFIED;
+}
+
+void FillVisuals(const Arm& arm, v1::Arm& out) {
+  const ArmKinematics* const kinematics = arm.poses().kinematics();
+  if (kinematics == nullptr) return;
+  const std::vector<LinkPose> drawn = arm.poses().DrawnFrames(arm.clock().MonotonicNs());
+  const std::vector<size_t>& frames = kinematics->drawn_frames();
+  for (const ArmVisual& visual : kinematics->visuals()) {
+    v1::Visual& message = *out.add_visuals();
+    message.set_frame(kinematics->frame_name(visual.frame));
+    const auto place = std::ranges::lower_bound(frames, visual.frame) - frames.begin();
+    wire::Fill(drawn[static_cast<size_t>(place)].base_from_link, *message.mutable_base_from_frame());
+    wire::Fill(visual.frame_from_visual, *message.mutable_frame_from_visual());
+    message.set_shape(ToWire(visual.shape));
+    wire::Fill(visual.size_mm, wire::kMetresPerMm, *message.mutable_size_m());
+    for (int i = 0; visual.color && i < 3; ++i) message.add_color(static_cast<float>((*visual.color)[i]));
+  }
+}
+
 }  // namespace
 
 void Fill(const Arm& arm, v1::Arm& out) {
   out.set_name(arm.name());
   out.set_server_version(TACLINK_VERSION);
   FillJoints(arm, out);
+  FillVisuals(arm, out);
   for (size_t i = 0; i < arm.links().size(); ++i) {
     const LinkDescription& link = arm.links()[i];
     const SourceCondition source = arm.worker(i).source_condition();

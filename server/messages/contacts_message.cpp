@@ -57,6 +57,22 @@ void FillJoints(const std::vector<JointLoad>& loads, v1::StreamContactsResponse&
   if (!known) out.clear_joint_torque_sigmas();
 }
 
+// All at one time, so that bodies which touch stay together.
+void FillFrames(const std::vector<std::shared_ptr<const LinkContacts>>& newest, const ArmPoses& poses,
+                v1::StreamContactsResponse& out) {
+  int64_t time_ns = 0;
+  for (const auto& link : newest)
+    if (link) time_ns = std::max(time_ns, link->times.exposure_monotonic_ns);
+  if (time_ns == 0) return;
+  const std::vector<LinkPose> drawn = poses.DrawnFrames(time_ns);
+  for (size_t i = 0; i < drawn.size(); ++i) {
+    v1::FramePose& pose = *out.add_frame_poses();
+    pose.set_frame(poses.kinematics()->frame_name(poses.kinematics()->drawn_frames()[i]));
+    wire::Fill(drawn[i].base_from_link, *pose.mutable_base_from_frame());
+    pose.set_validity(ToWire(drawn[i].validity));
+  }
+}
+
 }  // namespace
 
 v1::PoseValidity ToWire(PoseValidity validity) {
@@ -64,9 +80,10 @@ v1::PoseValidity ToWire(PoseValidity validity) {
 }
 
 void Fill(const std::vector<std::shared_ptr<const LinkContacts>>& newest,
-          const std::vector<std::string>& link_names, const std::vector<JointInfo>& joints,
+          const std::vector<std::string>& link_names, const ArmPoses& poses,
           v1::StreamContactsResponse& out) {
   out.Clear();
+  const std::vector<JointInfo>& joints = poses.joints().joints();
   Vec3 force_n = Vec3::Zero(), moment_nmm = Vec3::Zero();
   std::vector<JointLoad> loads(joints.size());
   PoseValidity worst = PoseValidity::kFixed;
@@ -96,6 +113,7 @@ void Fill(const std::vector<std::shared_ptr<const LinkContacts>>& newest,
   if (std::ranges::any_of(out.links(), is_unknown)) out.clear_joint_torque_sigmas();
   for (const JointInfo& joint : joints) out.add_joint_names(joint.name);
   out.set_validity(ToWire(worst));
+  FillFrames(newest, poses, out);
 }
 
 }  // namespace taclink::server

@@ -43,7 +43,7 @@ void ArmRecorder::TakeFrame(const Publication& publication, int64_t utc_ns) {
   newest_[publication.link()] = contacts;
   const int64_t published_ns = publication.state().times.published_ns;
   if (contact_rate_.Due(published_ns)) {
-    Fill(newest_, link_names_, joints_, contacts_message_);
+    Fill(newest_, link_names_, arm_.poses(), contacts_message_);
     contacts_message_.set_sequence(++contacts_sequence_);
     contacts_message_.set_utc_ns(utc_ns);
     write_({.kind = TopicKind::kContacts}, contacts_message_, {.log_utc_ns = utc_ns});

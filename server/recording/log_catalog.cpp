@@ -27,6 +27,19 @@ mcap::TextMap MetadataOf(const mcap::Reader& reader, const char* name) {
   return {};
 }
 
+// A damaged one is left out: it is for a glance.
+void FillSummary(const mcap::Reader& reader, v1::Log& out) {
+  for (const mcap::AttachmentIndex& index : reader.attachments()) {
+    if (index.name != wire::log::kSummaryName) continue;
+    mcap::Buffer buffer;
+    const auto attachment = reader.ReadAttachment(index, buffer);
+    v1::LogSummary summary;
+    if (attachment &&
+        summary.ParseFromArray(attachment->data.data(), static_cast<int>(attachment->data.size())))
+      *out.mutable_summary() = std::move(summary);
+  }
+}
+
 void Fill(const mcap::Reader& reader, v1::Log& out) {
   const mcap::Statistics& statistics = reader.statistics();
   out.set_start_utc_ns(static_cast<int64_t>(statistics.message_start_ns));
@@ -42,6 +55,7 @@ void Fill(const mcap::Reader& reader, v1::Log& out) {
   }
   const mcap::TextMap begin = MetadataOf(reader, wire::log::kMetadataName);
   if (const auto note = begin.find("note"); note != begin.end()) out.set_note(note->second);
+  FillSummary(reader, out);
   const mcap::TextMap totals = MetadataOf(reader, wire::log::kTotalsName);
   uint64_t contacts = 0;
   const auto at = totals.find("contacts");

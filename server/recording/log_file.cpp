@@ -33,10 +33,13 @@ Result<void> LogFile::Begin(const LogPreamble& preamble, mcap::WriterOptions opt
   return {};
 }
 
-Result<void> LogFile::Close(mcap::TextMap totals) {
+Result<void> LogFile::Close(mcap::TextMap totals, const v1::LogSummary& summary) {
   if (const auto flushed = writer_->mcap().Flush(); !flushed) return flushed.error();
   if (const auto added = writer_->AddMetadata(wire::log::kTotalsName, std::move(totals)); !added)
     return added.error();
+  const auto attached = writer_->AddAttachment(wire::log::kSummaryName, wire::log::kSummaryType,
+                                               summary.SerializeAsString(), started_utc_ns_);
+  if (!attached) return attached.error();
   if (const auto closed = writer_->mcap().Close(); !closed) return closed.error();
   if (const auto synced = sink_->Sync(); !synced) return synced.error();
   is_complete_ = true;

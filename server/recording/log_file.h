@@ -8,6 +8,7 @@
 
 #include "mcap/file_sink.h"
 #include "server/recording/log_folder.h"
+#include "taclink/v1/recording.pb.h"
 #include "wire/log/log_writer.h"
 
 namespace taclink::server {
@@ -45,7 +46,7 @@ class LogFile {
   mcap::FileSink::Place WhereItIs() const { return sink_->WhereItIs(); }
   /// Ends the log and gives it its final name, or, where its file was moved, leaves it there. Errors: the
   /// system's; then it stays ".part".
-  Result<void> Close(mcap::TextMap totals);
+  Result<void> Close(mcap::TextMap totals, const v1::LogSummary& summary);
   /// All of it is safe from a power cut, by Close, whatever its name.
   bool is_complete() const { return is_complete_; }
 

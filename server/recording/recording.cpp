@@ -199,6 +199,7 @@ void Recording::TakeFrame(const Publication& publication, const PicturesPtr& pic
   losses_.Wrote(publication.link(), state.sequence);
   Wrote(written);
   others_->TakeFrame(publication, stamp.log_utc_ns);
+  if (written) digest_.Take(link, arm_.links()[publication.link()].model, state, stamp.log_utc_ns);
 }
 
 void Recording::TellLosses(size_t link, uint64_t next_sequence) {
@@ -321,12 +322,15 @@ Result<void> Recording::NextFile() {
 }
 
 void Recording::CloseFile(LogFile& file) {
+  const v1::LogSummary summary = digest_.Summary();
+  digest_.Clear();
   const auto place = file.WhereItIs();
   if (place == mcap::FileSink::Place::kNowhere || place == mcap::FileSink::Place::kCut)
     return TellTrouble("misplaced", Misplaced(file));
   const auto closed = file.Close({{"frames", std::to_string(losses_.written() - frames_before_)},
                                   {"contacts", std::to_string(others_->contacts_begun())},
-                                  {"frames_lost", std::to_string(losses_.lost())}});
+                                  {"frames_lost", std::to_string(losses_.lost())}},
+                                 summary);
   if (!closed) SetTrouble(trouble_, closed.error().message);
   if (file.chunks() != chunks_) losses_.Taken();
   if (!closed) losses_.Lost(LogStage::kOpen, closed.error().message);

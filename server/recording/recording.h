@@ -14,6 +14,7 @@
 #include "server/config/options.h"
 #include "server/hub/rate_limit.h"
 #include "server/recording/arm_recorder.h"
+#include "server/recording/log_digest.h"
 #include "server/recording/log_file.h"
 #include "server/recording/log_folder.h"
 #include "server/recording/loss_book.h"
@@ -85,6 +86,7 @@ class Recording {
   std::unique_ptr<ArmRecorder> others_;
   std::unique_ptr<LogFile> file_;
   LossBook losses_;
+  LogDigest digest_;                                 // of file_
   std::vector<uint64_t> dropped_;                    // by link, as counted
   uint64_t dropped_total_ = 0, dropped_synced_ = 0;  // now, and at the last sync
   uint64_t chunks_ = 0;                              // of file_, that losses_ knows of

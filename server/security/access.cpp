@@ -7,6 +7,7 @@ namespace {
 
 constexpr AccessRule kTable[] = {
     {"/taclink.v1.TactileService/GetArm", Role::kViewer},
+    {"/taclink.v1.TactileService/GetForceHistory", Role::kViewer},
     {"/taclink.v1.TactileService/StreamFrames", Role::kViewer},
     {"/taclink.v1.TactileService/StreamContacts", Role::kViewer},
     {"/taclink.v1.TactileService/StreamEvents", Role::kViewer},

@@ -32,16 +32,24 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (size == 0) return 0;
   const grpc::Slice slice(data + 1, size - 1);
   const grpc::ByteBuffer bytes(&slice, 1);
-  constexpr void (*kParsers[])(const grpc::ByteBuffer&) = {
-      &Parse<v1::CalibrateRequest>,         &Parse<v1::TareRequest>,
-      &Parse<v1::StreamContactsRequest>,    &Parse<v1::StreamEventsRequest>,
-      &Parse<v1::SetThresholdsRequest>,     &Parse<v1::StreamPreviewRequest>,
-      &Parse<v1::SetForceModelRequest>,     &Parse<v1::RestartLinkRequest>,
-      &Parse<v1::StartRecordingRequest>,    &Parse<v1::DownloadLogRequest>,
-      &Parse<v1::ControlReplayRequest>,     &Parse<v1::GetReplayPicturesRequest>,
-      &Parse<v1::UpdateJointStatesRequest>, &Parse<v1::UpdatePressureRequest>,
-      &Parse<v1::UpdateAttitudeRequest>,    &Parse<v1::PressRequest>,
-      &Parse<v1::SetScenePressureRequest>};
+  constexpr void (*kParsers[])(const grpc::ByteBuffer&) = {&Parse<v1::CalibrateRequest>,
+                                                           &Parse<v1::TareRequest>,
+                                                           &Parse<v1::StreamContactsRequest>,
+                                                           &Parse<v1::StreamEventsRequest>,
+                                                           &Parse<v1::GetForceHistoryRequest>,
+                                                           &Parse<v1::SetThresholdsRequest>,
+                                                           &Parse<v1::StreamPreviewRequest>,
+                                                           &Parse<v1::SetForceModelRequest>,
+                                                           &Parse<v1::RestartLinkRequest>,
+                                                           &Parse<v1::StartRecordingRequest>,
+                                                           &Parse<v1::DownloadLogRequest>,
+                                                           &Parse<v1::ControlReplayRequest>,
+                                                           &Parse<v1::GetReplayPicturesRequest>,
+                                                           &Parse<v1::UpdateJointStatesRequest>,
+                                                           &Parse<v1::UpdatePressureRequest>,
+                                                           &Parse<v1::UpdateAttitudeRequest>,
+                                                           &Parse<v1::PressRequest>,
+                                                           &Parse<v1::SetScenePressureRequest>};
   constexpr size_t kCount = std::size(kParsers);
   const size_t call = data[0] % (kCount + 2);
   if (call < kCount) {

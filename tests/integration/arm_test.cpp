@@ -206,6 +206,23 @@ TEST_F(ArmTest, GetArmTellsJointsAndPosesNow) {
   EXPECT_NEAR(arm->links(1).base_from_link().translation_m().z(), 0.25, 1e-12);
 }
 
+TEST_F(ArmTest, BodiesMoveWithTheJoints) {
+  const auto arm = connection_->GetArm();
+  ASSERT_TRUE(arm.ok()) << arm.error().message;
+  ASSERT_EQ(arm->visuals_size(), 1);
+  EXPECT_EQ(arm->visuals(0).frame(), "wrist");
+  EXPECT_EQ(arm->visuals(0).shape(), v1::VISUAL_SHAPE_BOX);
+  EXPECT_NEAR(arm->visuals(0).size_m().z(), 0.02, 1e-12);
+  EXPECT_NEAR(arm->visuals(0).frame_from_visual().translation_m().z(), 0.01, 1e-12);
+  EXPECT_NEAR(arm->visuals(0).base_from_frame().translation_m().x(), 0.55, 1e-12);
+  Joints({kPi / 2, 0});
+  server_->Publish(0, 5, Now(), Now());
+  const auto contacts = NextOf(*Contacts());
+  ASSERT_EQ(contacts.frame_poses_size(), 1);
+  EXPECT_EQ(contacts.frame_poses(0).frame(), "wrist");
+  EXPECT_NEAR(contacts.frame_poses(0).base_from_frame().translation_m().y(), 0.55, 1e-12);
+}
+
 TEST_F(ArmTest, CallsEndWithTheServer) {
   const auto reader = Contacts();
   NextOf(*reader);

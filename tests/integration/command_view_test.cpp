@@ -7,6 +7,7 @@
 
 #include "client/command/cli/json.h"
 #include "client/command/cli/nearest.h"
+#include "client/command/cli/progress.h"
 #include "client/command/cli/terminal_style.h"
 #include "client/command/live/contacts_view.h"
 #include "client/command/live/frame_json.h"
@@ -137,6 +138,14 @@ TEST(LiveView, ShowsLinkForceAndDrops) {
   EXPECT_THAT(text, HasSubstr("upper"));
   EXPECT_THAT(text, HasSubstr("0.20 N"));
   EXPECT_THAT(text, HasSubstr("dropped for this client: 4"));
+}
+
+TEST(ProgressTest, TellsTheTimeThatIsLeft) {
+  EXPECT_DOUBLE_EQ(SecondsLeft(0.25, 10), 30);
+  EXPECT_EQ(TimeLeftText(0.2), "1 s");
+  EXPECT_EQ(TimeLeftText(59), "59 s");
+  EXPECT_EQ(TimeLeftText(200), "3 min 20 s");
+  EXPECT_EQ(TimeLeftText(7500), "2 h 5 min");
 }
 
 }  // namespace

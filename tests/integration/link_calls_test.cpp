@@ -204,6 +204,51 @@ TEST_F(LinkCallsTest, PreviewRefusesWhatItCantDo) {
   EXPECT_EQ(status("upper", 31), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
+TEST_F(LinkCallsTest, TheHistoryHasTheFramesOfBefore) {
+  constexpr int64_t kBegin = 1'700'000'000'000'000'000;
+  v1::GetForceHistoryRequest request;
+  v1::GetForceHistoryResponse history;
+  const auto ask = [&] {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kForever);
+    return stub_->GetForceHistory(&context, request, &history);
+  };
+  // Frame i presses with i tenths of a newton, half a second after the one before.
+  for (uint64_t i = 1; i <= 4; ++i) {
+    script_->Push([i](StereoFrame& frame) -> Result<void> {
+      frame.sequence = i;
+      frame.times.exposure_monotonic_ns = static_cast<int64_t>(i);
+      frame.times.exposure_utc_ns = kBegin + static_cast<int64_t>(i) * 500'000'000;
+      return {};
+    });
+    // A worker that is busy passes over all frames but the newest.
+    const auto give_up = std::chrono::steady_clock::now() + kForever;
+    do {
+      ASSERT_LT(std::chrono::steady_clock::now(), give_up);
+      history.Clear();
+      ASSERT_TRUE(ask().ok());
+      ASSERT_EQ(history.links_size(), 1);
+    } while (history.links(0).exposure_utc_ns_size() < static_cast<int>(i));
+  }
+  const v1::LinkForceHistory& link = history.links(0);
+  EXPECT_EQ(link.link(), "upper");
+  EXPECT_EQ(link.exposure_utc_ns(0), kBegin + 500'000'000);
+  EXPECT_THAT(link.total_force_n(), ElementsAre(0.1F, 0.2F, 0.3F, 0.4F));
+  ASSERT_EQ(link.contacts_size(), 1);
+  EXPECT_EQ(link.contacts(0).id(), 7u);
+  EXPECT_THAT(link.contacts(0).samples(), ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(link.contacts(0).force_n(), ElementsAre(0.1F, 0.2F, 0.3F, 0.4F));
+  request.set_span_s(0.7);
+  history.Clear();
+  ASSERT_TRUE(ask().ok());
+  EXPECT_THAT(history.links(0).total_force_n(), ElementsAre(0.3F, 0.4F));
+  request.set_span_s(301);
+  EXPECT_EQ(ask().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  request.set_span_s(3);
+  request.add_links("elbow");
+  EXPECT_EQ(ask().error_code(), grpc::StatusCode::NOT_FOUND);
+}
+
 TEST_F(LinkCallsTest, CamerasAreSetOnTheirThread) {
   WaitUntilRunning();
   v1::SetCameraRequest request;

@@ -69,6 +69,8 @@ v1::StartRecordingRequest Uncompressed() {
   return request;
 }
 
+constexpr int64_t kUtc = 1'700'000'000'000'000'000;
+
 class RecordingTest : public ::testing::Test {
  protected:
   explicit RecordingTest(const RecordingConfig& config = {})
@@ -143,6 +145,33 @@ TEST_F(RecordingTest, HoldsEveryFrameAsItWasSent) {
   EXPECT_FALSE(log.open());
   EXPECT_EQ(log.problem(), "");
   EXPECT_EQ(log.bytes(), fs::file_size(PathOf(log.name())));
+}
+
+TEST_F(RecordingTest, ItsSummaryShowsWhenAndWhereItWasPressedMost) {
+  Start();
+  const int64_t begin_ns = server_.clock().MonotonicNs();
+  // A frame each half second; the sequence is tenths of a newton.
+  for (const uint64_t sequence : {1, 2, 9, 3}) {
+    const int64_t now_ns = server_.clock().MonotonicNs();
+    server_.Publish(0, sequence, now_ns, now_ns, kUtc + now_ns - begin_ns);
+    server_.clock().Advance(std::chrono::milliseconds(500));
+  }
+  Stop();
+  const auto logs = recordings_.List();
+  ASSERT_TRUE(logs.ok() && logs->logs_size() == 1);
+  ASSERT_TRUE(logs->logs(0).has_summary());
+  const v1::LogSummary& summary = logs->logs(0).summary();
+  EXPECT_THAT(summary.peak_force_n(), ElementsAre(0.2F, 0.9F));
+  const v1::StrongestContact& strongest = summary.strongest();
+  EXPECT_EQ(strongest.link(), "upper");
+  EXPECT_EQ(strongest.log_utc_ns(), kUtc + 1'000'000'000);
+  EXPECT_NEAR(strongest.force_n(), 0.9, 1e-12);
+  EXPECT_FALSE(strongest.is_ring_contact());
+  EXPECT_NEAR(strongest.angle_rad(), 0, 1e-12);
+  EXPECT_NEAR(strongest.z_m(), 0.009, 1e-12);
+  EXPECT_NEAR(strongest.largest_displacement_m(), 0.009, 1e-12);
+  ASSERT_EQ(strongest.displacements().size(), size_t{strongest.paths()} * strongest.rings());
+  EXPECT_EQ(strongest.displacements().front(), '\xff');
 }
 
 TEST_F(RecordingTest, OnlyTheLinksAskedFor) {

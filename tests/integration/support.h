@@ -77,17 +77,19 @@ class TestServer {
     return out;
   }
 
-  void Publish(size_t link, uint64_t sequence, int64_t published_ns = 0, int64_t exposure_ns = 0) {
-    PublishNumbered(link, sequence, sequence, published_ns, exposure_ns);
+  void Publish(size_t link, uint64_t sequence, int64_t published_ns = 0, int64_t exposure_ns = 0,
+               int64_t exposure_utc_ns = 0) {
+    PublishNumbered(link, sequence, sequence, published_ns, exposure_ns, exposure_utc_ns);
   }
   /// With the numbers of the state `number`.
   void PublishNumbered(size_t link, uint64_t sequence, uint64_t number, int64_t published_ns,
-                       int64_t exposure_ns = 0) {
+                       int64_t exposure_ns = 0, int64_t exposure_utc_ns = 0) {
     auto* state = new LinkState;
     FillTestState(link, number, *state);
     state->sequence = sequence;
     state->times.published_ns = published_ns;
     state->times.exposure_monotonic_ns = exposure_ns;
+    state->times.exposure_utc_ns = exposure_utc_ns;
     ++*alive_;
     arm_->hub().Publish(link, {state, [alive = alive_](const LinkState* done) {
                                  --*alive;

@@ -66,7 +66,7 @@ describe("signing in", () => {
   test("a viewer sees why buttons do nothing", async () => {
     const visit = await enter("vera", "?link=still");
     await visit.page.getByRole("tab", { name: "Settings" }).click();
-    const tare = visit.page.getByRole("button", { name: /^Tare/ });
+    const tare = visit.page.getByRole("button", { name: "Tare …", exact: true });
     expect(await tare.getAttribute("aria-disabled")).toBe("true");
     expect(await tare.getAttribute("title")).toContain("sign in as an operator");
     await tare.click({ force: true });
@@ -81,14 +81,39 @@ describe("an operator", () => {
   test("tares; a touched skin refuses and says why", async () => {
     const visit = await enter("otto", "?link=still");
     await visit.page.getByRole("tab", { name: "Settings" }).click();
-    await visit.page.getByRole("button", { name: "Tare", exact: true }).click();
-    await visit.page.getByText(/still is tared/).waitFor();
+    const dialog = visit.page.getByRole("dialog");
+    const begin = visit.page.getByRole("button", { name: "Tare …", exact: true });
+    await begin.click();
+    await dialog.getByText("still: nothing touches it").waitFor();
+    await dialog.getByRole("button", { name: "Tare", exact: true }).click();
+    await dialog.getByText(/still is tared/).waitFor();
+    await dialog.getByRole("button", { name: "Undo" }).click();
+    await dialog.getByText("still: the tare is undone.").waitFor();
+    await dialog.getByRole("button", { name: "Close" }).last().click();
     await visit.row("touched").click();
     await visit.page.locator(".label.force").first().waitFor();
-    await visit.page.getByRole("button", { name: "Tare", exact: true }).click();
-    await visit.page.getByRole("alert").filter({ hasText: /touch/ }).waitFor();
-    await visit.page.getByRole("button", { name: "Tare all the same" }).waitFor();
+    await begin.click();
+    await dialog.getByText("touched: 1 contact").waitFor();
+    await dialog.getByRole("button", { name: "Tare", exact: true }).click();
+    await dialog.getByText(/^touched: .*touch/).waitFor();
+    await dialog.getByRole("button", { name: "Tare anyway" }).waitFor();
     await visit.picture("tare-refused");
+    await visit.close();
+  });
+
+  test("tares all links only when that was confirmed", async () => {
+    const visit = await enter("otto", "?link=still");
+    await visit.page.getByRole("button", { name: "Tare all links" }).click();
+    const dialog = visit.page.getByRole("dialog", { name: "Tare all 2 links" });
+    await dialog.getByText("touched: 1 contact").waitFor();
+    await visit.page.keyboard.press("Escape");
+    await dialog.waitFor({ state: "detached" });
+    expect(await visit.page.locator(".events").innerText()).not.toContain("tare");
+    await visit.page.getByRole("button", { name: "Tare all links" }).click();
+    await dialog.getByRole("button", { name: "Tare all", exact: true }).click();
+    await dialog.getByText(/still is tared/).waitFor();
+    await dialog.getByText(/^touched: .*touch/).waitFor();
+    await visit.picture("tare-all");
     await visit.close();
   });
 
@@ -160,6 +185,8 @@ describe("an operator", () => {
     await page.getByRole("navigation").getByRole("button", { name: "Logs" }).click();
     const row = page.locator("tr[data-log]");
     await row.getByText("a pinch").waitFor();
+    await row.getByRole("img", { name: /^Force over time, at most 0\.[34]\d N/ }).waitFor();
+    await row.getByText(/^0\.[34]\d N on touched/).waitFor();
     await visit.picture("logs");
     await page.getByRole("searchbox").fill("nothing like it");
     await page.getByText("No log holds these words").waitFor();
@@ -172,7 +199,7 @@ describe("an operator", () => {
     await download.saveAs(copy);
     taclink("log", "check", copy);
 
-    await row.getByRole("button", { name: /^Play/ }).click();
+    await row.getByRole("button", { name: /^Play .*mcap$/ }).click();
     await page.locator(".replay").getByText("REPLAY").waitFor();
     await visit.row("touched").getByText("OK").waitFor();
     await page.getByRole("button", { name: "Pause", exact: true }).first().click();
@@ -194,7 +221,7 @@ describe("an operator", () => {
     expect(new URL(shared).searchParams.get("t")).not.toBeNull();
     const tare = page.getByRole("tab", { name: "Settings" });
     await tare.click({ force: true });
-    const title = await page.getByRole("button", { name: /^Tare/ }).getAttribute("title");
+    const title = await page.getByRole("button", { name: "Tare …" }).getAttribute("title");
     expect(title).toContain("live arm");
     await page.getByRole("button", { name: "Back to the live arm", exact: true }).click();
     await expect.poll(() => new URL(page.url()).searchParams.get("log")).toBeNull();

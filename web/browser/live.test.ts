@@ -2,7 +2,7 @@ import axe from "axe-core";
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, onTestFinished, test } from "vitest";
 import { launch, Visit } from "./page";
-import { configuration, pressed, Server, untouched } from "./server";
+import { configuration, pressed, Server, taclink, untouched } from "./server";
 
 // In inferno no load is black, a fifth of the scale and more is purple to red; arrows are orange.
 const isLoaded = (r: number, g: number, b: number) => r > g + 50 && b > 50;
@@ -144,6 +144,54 @@ describe("the arm", () => {
   });
 });
 
+describe("a link that measures nothing", () => {
+  // Shares of the small map's pixels: hatched, and of a light skin.
+  const shares = (visit: Visit, link: string) =>
+    visit.page.locator(".small-map", { hasText: link }).evaluate((button) => {
+      const { width, height, data } = (() => {
+        const canvas = button.querySelector("canvas")!;
+        return canvas.getContext("2d")!.getImageData(0, 0, canvas.width, canvas.height);
+      })();
+      let [hatched, light] = [0, 0];
+      for (let i = 0; i < data.length; i += 4) {
+        if (data[i] > 60 && data[i] < 130 && data[i + 2] > data[i]) ++hatched;
+        if (data[i] > 180 && data[i + 2] > 150) ++light;
+      }
+      return { hatched: hatched / (width * height), light: light / (width * height) };
+    });
+
+  test("is hatched with its reason, without numbers, and changes no other", async () => {
+    const own = new Server();
+    onTestFinished(() => own.close());
+    const still = own.write("still.yaml", untouched());
+    const held = own.write("held.yaml", pressed(7, 5, 0.4));
+    await own.start("--config", own.write("arm.yaml", configuration("two", { touched: held, still })));
+    const visit = await Visit.open(browser, `${own.url}?link=touched`);
+    const { page } = visit;
+    await page.locator(".lens", { hasText: /0\.[34]\d N on touched/ }).waitFor({ timeout: 30_000 });
+    expect(await page.locator(".small-map").allInnerTexts()).toEqual([
+      expect.stringContaining("touched"),
+      expect.stringContaining("still"),
+    ]);
+    expect((await shares(visit, "touched")).hatched).toBeLessThan(0.05);
+    const ticks = await page.locator(".legend .ticks").innerText();
+    // Its rest shape can't be taken while something presses.
+    taclink("restart", "--link", "touched", "--server", own.address);
+    await visit.row("touched").getByText("calibrating").waitFor({ timeout: 20_000 });
+    await page.locator(".readout", { hasText: /Nothing is measured now\. .+/ }).waitFor({ timeout: 20_000 });
+    await expect.poll(async () => (await shares(visit, "touched")).hatched).toBeGreaterThan(0.9);
+    expect((await shares(visit, "still")).light).toBeGreaterThan(0.9);
+    expect(await page.locator(".legend .ticks").innerText()).toBe(ticks);
+    expect(await visit.row("touched").locator("td").nth(1).innerText()).toBe("–");
+    expect(await page.locator(".lens").count()).toBe(0);
+    await page
+      .locator(".health", { hasText: "No touch is found; the forces of 1 link are not known" })
+      .waitFor();
+    await visit.picture("hatched");
+    await visit.close();
+  });
+});
+
 describe("the forces' curves", () => {
   test("stand still while paused, and the stream goes on", async () => {
     const visit = await Visit.open(browser, server.url);
@@ -163,11 +211,88 @@ describe("the forces' curves", () => {
     await visit.close();
   });
 
+  test("begin with what the server remembers", async () => {
+    const visit = await Visit.open(browser, server.url);
+    const { page } = visit;
+    await page.getByRole("button", { name: "10 s" }).click();
+    // The curve of "touched", the second link's color, held at 0.4 N for long before the page was opened.
+    const columns = () =>
+      page.locator(".chart canvas").evaluate((canvas: HTMLCanvasElement) => {
+        const { width, height } = canvas;
+        const { data } = canvas.getContext("2d")!.getImageData(0, 0, width, height);
+        const found = new Set<number>();
+        for (let i = 0; i < data.length; i += 4)
+          if (data[i] > 200 && data[i + 1] > 120 && data[i + 1] < 190 && data[i + 2] < 60)
+            found.add((i / 4) % width);
+        return found.size / width;
+      });
+    await expect.poll(columns, { timeout: 5000 }).toBeGreaterThan(0.7);
+    await expect.poll(() => page.locator(".u-legend").innerText()).toMatch(/touched:?\s*0\.[34]\d N/);
+    await visit.close();
+  });
+
   test("can be those of each contact", async () => {
     const visit = await Visit.open(browser, `${server.url}?link=touched`);
     await visit.page.locator(".label.force").first().waitFor();
     await visit.page.getByRole("button", { name: "Contacts of touched" }).click();
     await expect.poll(() => visit.page.locator(".u-legend").innerText()).toMatch(/#\d+/);
+    await visit.close();
+  });
+});
+
+describe("the time line", () => {
+  test("shows a moment before in rows, map, arm and pictures, and goes back to now", async () => {
+    const visit = await Visit.open(browser, `${server.url}?link=still`);
+    const { page } = visit;
+    await visit.row("still").getByText("OK").waitFor();
+    await page.getByRole("tab", { name: "Cameras" }).click();
+    await page.getByRole("img", { name: "top camera of still" }).waitFor();
+    const forceN = async () => Number.parseFloat(await visit.row("still").locator("td").nth(1).innerText());
+    const place = ["--link", "still", "--angle", "0", "--z", "90", "--server", server.address];
+    taclink("poke", ...place, "--depth", "14", "--hold", "2");
+    await expect.poll(forceN, { timeout: 20_000 }).toBeLessThan(0.02);
+    const pictured = page.locator(".cameras .numbers").first();
+    const takenNow = await pictured.innerText();
+    // Back to when it was pressed: pictures, numbers and arrow are of then, and stay.
+    const track = page.locator(".track");
+    await track.focus();
+    for (let second = 0; second < 20 && (await forceN()) < 0.05; ++second) {
+      await page.keyboard.press("ArrowLeft");
+      await page.waitForTimeout(250);
+    }
+    const thenN = await forceN();
+    expect(thenN).toBeGreaterThan(0.05);
+    await page.getByRole("button", { name: "Back to now" }).waitFor();
+    await page.locator(".health", { hasText: /At .*touch/ }).waitFor();
+    await page.locator(".label.force", { hasText: `${thenN.toFixed(2)} N` }).waitFor();
+    expect(await pictured.innerText()).not.toBe(takenNow);
+    expect(await page.locator(".poke").count()).toBe(0);
+    await visit.picture("past");
+    const frames = () => page.locator(".scene canvas").getAttribute("data-frames").then(Number);
+    const drawn = await frames();
+    await page.keyboard.press("Tab");
+    expect(await forceN()).toBe(thenN);
+    expect(await frames()).toBeGreaterThanOrEqual(drawn);
+    await page.keyboard.press("Escape");
+    await expect.poll(forceN).toBeLessThan(0.02);
+    await page.getByText("● LIVE").waitFor();
+    await visit.close();
+  });
+
+  test("a click on the curves shows that moment", async () => {
+    const visit = await Visit.open(browser, `${server.url}?link=touched`);
+    const { page } = visit;
+    await page.locator(".label.force").first().waitFor();
+    await page.locator(".replay", { hasText: /last ([3-9]|\d\d)/ }).waitFor();
+    await page.getByRole("button", { name: "10 s" }).click();
+    const curves = page.locator(".u-over");
+    await expect.poll(() => curves.boundingBox()).not.toBeNull();
+    const box = (await curves.boundingBox())!;
+    await page.mouse.click(box.x + 0.85 * box.width, box.y + box.height / 2);
+    await page.getByRole("button", { name: "Back to now" }).waitFor();
+    await page.locator(".replay", { hasText: /\d s ago/ }).waitFor();
+    await page.getByRole("button", { name: "Back to now" }).click();
+    await page.getByText("● LIVE").waitFor();
     await visit.close();
   });
 });

@@ -22,7 +22,7 @@ async function open(url: string, viewport: { width: number; height: number }): P
 
 /** Once a touch is drawn: in the header, beside the arm and on the canvas. */
 async function touched(visit: Visit): Promise<void> {
-  await visit.page.locator(".health", { hasText: /touch/ }).waitFor({ timeout: 60_000 });
+  await visit.page.locator(".health", { hasText: /^all .*touch/ }).waitFor({ timeout: 60_000 });
   await visit.page.locator(".labels .label").first().waitFor({ timeout: 60_000 });
   await visit.drawn();
 }
@@ -39,7 +39,8 @@ async function pressed(): Promise<void> {
   const { page } = visit;
   await page.locator('tr[data-link="upper"]', { hasText: "0.50 kPa" }).waitFor({ timeout: 60_000 });
   await page.getByRole("button", { name: /^Focus/ }).click();
-  await page.locator(".poke input[type=range]").first().fill("12");
+  await page.locator(".poke select").selectOption({ label: "hand" });
+  await page.locator(".poke input[type=range]").first().fill("6");
   await visit.drawn();
   const box = (await page.locator(".scene canvas").boundingBox())!;
   await page.mouse.move(box.x + 0.51 * box.width, box.y + 0.45 * box.height);

@@ -5,8 +5,8 @@ import { Header } from "./views/header";
 import { LinkPanel } from "./views/link_panel";
 import { LinkTable } from "./views/link_table";
 import { LogsPage } from "./views/logs_page";
-import { ReplayBar } from "./views/replay_bar";
 import { SceneView } from "./views/scene_view";
+import { TimeBar } from "./views/time_bar";
 import { TimeView } from "./views/time_view";
 
 export function App({ state }: { state: AppState }) {
@@ -28,7 +28,7 @@ function Page() {
       </button>
       <Header />
       <ConnectionBanner />
-      <ReplayBar />
+      {(app.page.value === "live" || app.log.value) && <TimeBar />}
       {app.page.value === "logs" ? (
         <LogsPage />
       ) : (

@@ -5,8 +5,8 @@ import { Session } from "./api/session";
 import { formatAddress, parseAddress } from "./model/address";
 import { ArmStore } from "./model/arm_store";
 import type { Feed } from "./model/feed";
-import { keepCurves, restoreCurves } from "./model/kept_curves";
 import { LiveFeed } from "./model/live_feed";
+import { PastImages } from "./model/past";
 import { Poker } from "./model/poker";
 import { ReplayFeed } from "./model/replay_feed";
 import { COLOUR_MAPS, type ColourMapName } from "./skin/colour_map";
@@ -24,6 +24,7 @@ export class AppState {
   /** Of the live arm; of a log while one is played. */
   readonly store: Signal<ArmStore>;
   readonly feed: Signal<Feed>;
+  readonly pastImages = new PastImages();
 
   readonly page = signal<"live" | "logs">("live");
   readonly link = signal("");
@@ -56,6 +57,9 @@ export class AppState {
       if (!log) this.showAddress({ page, link, log, timeS: NaN });
     });
     effect(() => {
+      if (this.page.value !== "live") this.store.peek().lookAt(undefined);
+    });
+    effect(() => {
       this.session.generation.value;
       const running = this.feed.value;
       running.start();
@@ -63,18 +67,30 @@ export class AppState {
     });
     prefersLight.addEventListener("change", () => (this.systemLight.value = prefersLight.matches));
     document.addEventListener("visibilitychange", () => this.feed.value.setHidden(document.hidden));
-    addEventListener("pagehide", () => this.keepCurves());
     addEventListener("popstate", () => location.reload());
   }
 
   /** Plays a log from a time on (s since 1970-01-01 UTC); empty: the live arm. */
   play(log: string, timeS = NaN): void {
-    this.keepCurves();
     const [store, feed] = this.open(log, timeS);
     this.log.value = log;
     this.page.value = "live";
     this.store.value = store;
     this.feed.value = feed;
+  }
+
+  /** Shows the arm as it was at a time, s since 1970-01-01 UTC; undefined: as it is now, or goes on with the log. */
+  seek(timeS: number | undefined): void {
+    const feed = this.feed.value;
+    if (!(feed instanceof ReplayFeed)) this.store.value.lookAt(timeS);
+    else if (timeS !== undefined) void feed.seek(timeS);
+  }
+
+  /** The moment that is shown, s since 1970-01-01 UTC; undefined: now. */
+  shownS(): number | undefined {
+    const feed = this.feed.value;
+    if (!(feed instanceof ReplayFeed)) return this.store.value.lookedAtS.value;
+    return Number.isFinite(feed.positionS.value) ? feed.positionS.value : undefined;
   }
 
   tell(text: string, bad = false): void {
@@ -93,16 +109,9 @@ export class AppState {
     }
   }
 
-  private keepCurves(): void {
-    if (!this.log.value) keepCurves(this.store.value);
-  }
-
   private open(log: string, timeS: number): [ArmStore, Feed] {
-    const store = new ArmStore();
-    if (!log) {
-      restoreCurves(store);
-      return [store, new LiveFeed(this.session, store)];
-    }
+    const store = new ArmStore(!log);
+    if (!log) return [store, new LiveFeed(this.session, store)];
     const told = (atS: number) =>
       this.showAddress({ page: this.page.value, link: this.link.value, log, timeS: atS });
     return [store, new ReplayFeed(this.session, store, log, timeS, told)];

@@ -65,3 +65,24 @@ test("contacts come by id, in the order of their ids, the strongest only", () =>
 test("bins are told by their middles", () => {
   expect(binTimes(0, 4, 4)).toEqual([0.5, 1.5, 2.5, 3.5]);
 });
+
+test("what the server remembers fills the gaps and replaces nothing", () => {
+  const history = new ForceHistory();
+  history.add(10, 1, [{ id: "7", forceN: 1 }]);
+  history.add(12, 3, []);
+  history.merge([
+    [9, 0.5, []],
+    [10, 8, []],
+    [11, 2, [["7", 2]]],
+    [11.5, null, []],
+  ]);
+  expect(history.samplesFrom(0)).toEqual([
+    [9, 0.5, []],
+    [10, 1, [["7", 1]]],
+    [11, 2, [["7", 2]]],
+    [11.5, null, []],
+    [12, 3, []],
+  ]);
+  history.add(13, 4, []);
+  expect(history.newestS).toBe(13);
+});

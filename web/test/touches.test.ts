@@ -32,11 +32,14 @@ describe("touches", () => {
       contact(EventKind.CONTACT_BEGIN, 1n, 10, 0.1),
       contact(EventKind.CONTACT_BEGIN, 1n, 50, 0.3),
     ];
-    expect(touchesOf(events.reverse())).toMatchObject([{ beginS: 50, peakN: 0.3 }]);
+    expect(touchesOf(events.reverse())).toMatchObject([
+      { beginS: 50, durationS: undefined, peakN: 0.3 },
+      { beginS: 10, durationS: 0, peakN: 0.1 },
+    ]);
   });
-  test("that began before are there from their end", () => {
+  test("that began before the known events begin where their end says", () => {
     const end = contact(EventKind.CONTACT_END, 9n, 13, 0, { peakForceN: 0.7, durationS: 5 });
-    expect(touchesOf([end])).toMatchObject([{ beginS: NaN, durationS: 5, peakN: 0.7 }]);
+    expect(touchesOf([end])).toMatchObject([{ beginS: 8, durationS: 5, peakN: 0.7 }]);
   });
   test("from a frame that is not well are doubted", () => {
     const begin = contact(EventKind.CONTACT_BEGIN, 1n, 10, 0.1);

@@ -42,6 +42,9 @@ inline constexpr const char* kBaseFrameId = "base";
 // Names of records.
 inline constexpr const char* kMetadataName = "taclink";
 inline constexpr const char* kTotalsName = "taclink.totals";  ///< at the end of a closed log
+/// An attachment of a closed log, a taclink.v1.LogSummary.
+inline constexpr const char* kSummaryName = "taclink.summary";
+inline constexpr const char* kSummaryType = "application/x-protobuf; messageType=taclink.v1.LogSummary";
 inline constexpr const char* kSolvedName =
     "taclink.solved";  ///< of a log that was solved again: from what, how
 /// What a link was solved with; OptionsText.

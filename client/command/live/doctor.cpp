@@ -137,16 +137,24 @@ Finding LookAtLink(const v1::Link& link) {
           "docs/troubleshooting.md has each reason"};
 }
 
-// Without a server: whether one could start here.
+// No arm is to be had there. Where no server runs on this machine, whether one could start.
+std::vector<Finding> LookAtSilence(const std::string& address, const Error& why) {
+  const bool is_refusal =
+      why.code == ErrorCode::kUnauthenticated || why.code == ErrorCode::kPermissionDenied ||
+      why.code == ErrorCode::kFailedPrecondition || why.code == ErrorCode::kInvalidArgument;
+  if (is_refusal) return {{Verdict::kBad, "server", why.message, "docs/security.md"}};
+  const bool is_here = address.starts_with("127.") || address.starts_with("localhost");
+  if (!is_here)
+    return {{Verdict::kBad, "server", why.message, "look at the server's machine and the network between"}};
+  std::vector<Finding> findings = LookAtPorts();
+  findings.push_back({Verdict::kNote, "server", why.message, "deploy/demo, or taclinkd --config FILE"});
+  return findings;
+}
+
 std::vector<Finding> LookAtServer(const std::string& address) {
   auto connection = ConnectTo(address);
   const auto arm = connection ? connection->GetArm() : Result<v1::Arm>(connection.error());
-  if (!arm) {
-    std::vector<Finding> findings = LookAtPorts();
-    findings.push_back(
-        {Verdict::kNote, "server", arm.error().message, "deploy/demo, or taclinkd --config FILE"});
-    return findings;
-  }
+  if (!arm) return LookAtSilence(address, arm.error());
   std::vector<Finding> findings = {
       {Verdict::kGood, "server",
        fmt::format("{} at {}, arm {}", arm->server_version(), address, arm->name())}};
@@ -176,7 +184,8 @@ Finding LookAtConfig(const std::string& file) {
   if (posix_spawnp(&child, program.c_str(), nullptr, nullptr, arguments.data(), environ) != 0)
     return {Verdict::kNote, "configuration", "taclinkd is not there to check it", "install the server"};
   int status = 0;
-  waitpid(child, &status, 0);
+  while (waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) return {Verdict::kNote, "configuration", "taclinkd's check has no result"};
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0)
     return {Verdict::kGood, "configuration", file + " is good"};
   return {Verdict::kBad, "configuration", file + " is refused, see above", "docs/configuration.md"};

@@ -38,9 +38,11 @@ void FrameOutput::Take(const v1::LinkFrame& frame, const v1::StreamStatus& statu
   }
 }
 
-void FrameOutput::Refresh(const v1::StreamStatus& status, const std::vector<std::string>& footer) {
+void FrameOutput::Refresh(const v1::StreamStatus& status, const std::vector<std::string>& footer,
+                          bool paused) {
   const auto now = steady_clock::now();
-  if (!live_ || now - drawn_ < kRedraw) return;
+  if (!live_ || now - drawn_ < kRedraw || (paused && footer == footer_)) return;
+  footer_ = footer;
   drawn_ = now;
   fmt::print("{}", view_.Draw(status, now, footer));
   std::fflush(stdout);

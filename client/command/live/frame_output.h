@@ -17,8 +17,9 @@ class FrameOutput {
   FrameOutput(const std::string& title, bool json);
 
   void Take(const v1::LinkFrame& frame, const v1::StreamStatus& status = {});
-  /// Draws the view, now and then.
-  void Refresh(const v1::StreamStatus& status = {}, const std::vector<std::string>& footer = {});
+  /// Draws the view, now and then; while it is paused, only where the footer has changed.
+  void Refresh(const v1::StreamStatus& status = {}, const std::vector<std::string>& footer = {},
+               bool paused = false);
   bool drawn_over() const { return live_; }
 
  private:
@@ -30,6 +31,7 @@ class FrameOutput {
   ChangeLog log_;
   uint64_t dropped_ = 0;
   std::chrono::steady_clock::time_point drawn_;
+  std::vector<std::string> footer_;  // as drawn
 };
 
 }  // namespace taclink::command

@@ -12,6 +12,7 @@
 #include "client/command/cli/interrupt.h"
 #include "client/command/cli/json.h"
 #include "client/command/cli/log_text.h"
+#include "client/command/cli/progress.h"
 #include "client/command/live/connect.h"
 #include "client/cpp/taclink/recordings.h"
 #include "sensing/core/printable.h"
@@ -175,8 +176,10 @@ Result<void> Download(const RecordOptions& options) {
   if (!out) return Error{ErrorCode::kPermissionDenied, path + " cannot be written"};
   bool written = true;
   uint64_t end = there;
+  Progress progress(options.log);
   const auto done =
-      recordings->Download(options.log, there, [&](std::string_view data, uint64_t offset, uint64_t) {
+      recordings->Download(options.log, there, [&](std::string_view data, uint64_t offset, uint64_t size) {
+        progress.Show(static_cast<double>(end - there) / static_cast<double>(size - there));
         written = offset == end && out.write(data.data(), static_cast<std::streamsize>(data.size())).good();
         end += data.size();
         return written;

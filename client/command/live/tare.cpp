@@ -16,7 +16,7 @@ namespace {
 struct TareOptions {
   std::string server = "127.0.0.1:50051";
   std::vector<std::string> links;
-  bool force = false;
+  bool force = false, undo = false;
   int frames = 10;
   bool json = false;
 };
@@ -25,6 +25,11 @@ void PrintText(const v1::TareResponse& response) {
   for (const v1::LinkTare& link : response.links()) {
     if (!link.accepted()) {
       fmt::print("{}: refused: {}\n", link.link(), link.reason());
+      continue;
+    }
+    if (link.undone()) {
+      fmt::print("{}: the last tare is undone, which had moved the baseline by {:.3f} mm\n", link.link(),
+                 link.shift_m() * kMmPerMetre);
       continue;
     }
     fmt::print("{}: tared{} over {} frames; {:.3f} mm off the baseline before, which was {:.0f} s old\n",
@@ -40,6 +45,7 @@ void PrintTareJson(const v1::TareResponse& response) {
                     {"accepted", link.accepted()},
                     {"reason", link.reason()},
                     {"forced", link.forced()},
+                    {"undone", link.undone()},
                     {"frames", link.frames()},
                     {"shift_mm", link.shift_m() * kMmPerMetre},
                     {"previous_age_s", link.previous_age_s()}});
@@ -53,6 +59,7 @@ Result<void> RunTare(const TareOptions& options) {
   v1::TareRequest request;
   request.mutable_links()->Assign(options.links.begin(), options.links.end());
   request.set_force(options.force);
+  request.set_undo(options.undo);
   request.set_frames(static_cast<uint32_t>(options.frames));
   const auto response = connection->Tare(request);
   if (!response) return response.error();
@@ -78,6 +85,7 @@ void AddTare(const Arguments& app, Selected& selected) {
   AddServerOption(command, options->server);
   command.AddOption("links", options->links, "Names of links (all)");
   command.AddFlag("--force", options->force, "Even while touched, moved or with few markers");
+  command.AddFlag("--undo", options->undo, "Undo the last tare instead");
   command.AddOption("--frames", options->frames, "To average over").Must(Within(1, 300)).ShowDefault();
   command.AddFlag("--json", options->json, "One JSON object");
   command.OnChosen([options, &selected] { selected = [options] { return RunTare(*options); }; });

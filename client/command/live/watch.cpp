@@ -69,7 +69,7 @@ Result<void> RunWatch(const WatchOptions& options) {
     if (std::ferror(stdout) != 0) break;  // main reports it
     if (output.drawn_over()) keys.Run();
     if (keys.ends()) break;
-    output.Refresh((*reader)->status(), {keys.message(), keys.Help()});
+    output.Refresh((*reader)->status(), {keys.message(), keys.Help()}, keys.paused());
   }
   return {};
 }

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "client/command/cli/progress.h"
 #include "client/command/logs/log_output.h"
 #include "client/command/logs/log_source.h"
 #include "client/command/logs/log_tools.h"
@@ -65,6 +66,7 @@ Result<void> CopyDefinitions(const mcap::Reader& reader, const std::set<uint16_t
 Result<void> CopyRecords(LogSource& source, mcap::Writer& out) {
   mcap::Buffer buffer;
   for (const auto& index : source.reader().attachments()) {
+    if (index.name == wire::log::kSummaryName) continue;  // of the whole log
     const auto attachment = source.reader().ReadAttachment(index, buffer);
     if (!attachment) {
       source.NoteDamage("attachment " + index.name + ": " + attachment.error().message);
@@ -104,7 +106,9 @@ Result<void> Cut(const LogCutOptions& options) {
                                   .end_ns = part->end_ns,
                                   .channels = *channels,
                                   .order = mcap::MessageOrder::kFile});
+  Progress progress(options.input);
   while (const auto message = messages.Next()) {
+    progress.Show(messages.share());
     if (const auto written = writer.Write(*message); !written) return written;
   }
   if (const auto reported = (*source)->Report(); !reported) return reported;

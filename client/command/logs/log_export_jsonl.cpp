@@ -6,6 +6,7 @@
 
 #include "client/command/cli/json.h"
 #include "client/command/cli/log_text.h"
+#include "client/command/cli/progress.h"
 #include "client/command/cli/protobuf_json.h"
 #include "client/command/logs/log_export.h"
 #include "client/command/logs/log_output.h"
@@ -85,9 +86,11 @@ Result<void> ExportJsonl(LogSource& source, const LogPart& part, const std::stri
   if (!out) return out.error();
   Printer printer(source);
   const std::set<uint16_t> channels = printer.AddChannels(ChannelsOf(source.reader(), part));
+  Progress progress(source.file());
   LogMessages messages(source, {.start_ns = part.start_ns, .end_ns = part.end_ns, .channels = channels});
   uint64_t lines = 0;
   while (const auto message = messages.Next()) {
+    progress.Show(messages.share());
     const auto line = printer.Line(*message, with_pictures);
     if (!line) {
       source.NoteLeftOut(fmt::format("a message of {} at {}: {}",

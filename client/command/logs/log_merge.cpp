@@ -13,9 +13,11 @@
 #include <utility>
 #include <vector>
 
+#include "client/command/cli/progress.h"
 #include "client/command/logs/log_output.h"
 #include "client/command/logs/log_source.h"
 #include "client/command/logs/log_tools.h"
+#include "wire/log/topics.h"
 
 namespace taclink::command {
 namespace {
@@ -56,6 +58,7 @@ class Merger {
   Result<void> AddAttachments(LogSource& source) {
     mcap::Buffer buffer;
     for (const auto& index : source.reader().attachments()) {
+      if (index.name == wire::log::kSummaryName) continue;  // of the one log
       const auto attachment = source.reader().ReadAttachment(index, buffer);
       if (!attachment) {
         source.NoteDamage("attachment " + index.name + ": " + attachment.error().message);
@@ -128,6 +131,7 @@ Result<void> MergeMessages(std::vector<Input>& inputs, const Sources& sources, m
   std::priority_queue<Turn, std::vector<Turn>, std::greater<>> turns;
   for (size_t i = 0; i < inputs.size(); ++i)
     turns.emplace(sources[i]->reader().statistics().message_start_ns, i);
+  Progress progress("the logs");
   while (!turns.empty()) {
     const size_t i = turns.top().second;
     turns.pop();
@@ -138,6 +142,9 @@ Result<void> MergeMessages(std::vector<Input>& inputs, const Sources& sources, m
       if (const auto written = out.Write(message); !written) return written;
     }
     input.next = input.messages.Next();
+    double shares = 0;
+    for (const Input& each : inputs) shares += each.messages.share();
+    progress.Show(shares / static_cast<double>(inputs.size()));
     if (input.next) turns.emplace(input.next->log_time_ns, i);
   }
   return {};

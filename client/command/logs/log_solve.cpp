@@ -1,13 +1,12 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <string>
 
 #include "client/command/cli/json.h"
 #include "client/command/cli/log_text.h"
+#include "client/command/cli/progress.h"
 #include "client/command/logs/log_tools.h"
 #include "client/command/logs/solve_log.h"
 #include "taclink/v1/frame.pb.h"
@@ -145,35 +144,16 @@ void Print(const SolveLogOptions& options, const SolveLogSummary& summary, bool 
              summary.jobs == 1 ? "thread" : "threads");
 }
 
-// Where a person looks on.
-class ProgressLine {
- public:
-  ~ProgressLine() {
-    if (shown_) std::fputs("\r\x1b[K", stderr);
-  }
-  void Show(uint64_t done, uint64_t all) {
-    const auto now = std::chrono::steady_clock::now();
-    if (!wanted_ || all == 0 || now < next_) return;
-    next_ = now + std::chrono::milliseconds(200);
-    shown_ = true;
-    fmt::print(stderr, "\r{} % of {} messages\x1b[K", done * 100 / all, all);
-    std::fflush(stderr);
-  }
-
- private:
-  const bool wanted_ = ::isatty(STDERR_FILENO) == 1;
-  bool shown_ = false;
-  std::chrono::steady_clock::time_point next_;
-};
-
 Result<void> Solve(const LogSolveOptions& options) {
   SolveLogOptions solve = options.solve;
   if (!options.force_model.empty()) solve.force_model = options.force_model;
   if (options.force_refinement >= 0) solve.force_refinement = options.force_refinement;
   solve.pictures = !options.without_pictures;
   const auto summary = [&solve] {
-    ProgressLine line;
-    return SolveLog(solve, [&line](uint64_t done, uint64_t all) { line.Show(done, all); });
+    Progress progress("the log");
+    return SolveLog(solve, [&progress](uint64_t done, uint64_t all) {
+      progress.Show(static_cast<double>(done) / static_cast<double>(all));
+    });
   }();
   if (!summary) return summary.error();
   Print(solve, *summary, options.json);

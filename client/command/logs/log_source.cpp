@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -144,11 +145,20 @@ Result<void> LogSource::Report() const {
   return {};
 }
 
+LogMessages::LogMessages(LogSource& source, const mcap::CursorOptions& options)
+    : source_(source),
+      cursor_(source.reader(), options),
+      start_ns_(std::max(options.start_ns, source.reader().statistics().message_start_ns)),
+      end_ns_(std::min(options.end_ns, source.reader().statistics().message_end_ns)) {}
+
 std::optional<mcap::Message> LogMessages::Next() {
   while (true) {
     const auto message = cursor_.Next();
     if (message) {
       source_.NoteRead();
+      if (end_ns_ > start_ns_ && message->log_time_ns >= start_ns_)
+        share_ =
+            static_cast<double>(message->log_time_ns - start_ns_) / static_cast<double>(end_ns_ - start_ns_);
       return *message;
     }
     if (message.error().code == ErrorCode::kEndOfData) return std::nullopt;

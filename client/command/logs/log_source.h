@@ -46,15 +46,18 @@ class LogSource {
 /// Goes over a log's messages, past what is damaged, which it notes. The source outlives it.
 class LogMessages {
  public:
-  LogMessages(LogSource& source, mcap::CursorOptions options)
-      : source_(source), cursor_(source.reader(), std::move(options)) {}
+  LogMessages(LogSource& source, const mcap::CursorOptions& options);
 
   /// Its data are valid until the next call; none: there are no more.
   std::optional<mcap::Message> Next();
+  /// Of the log time that is gone over, how much lies before the newest message; 0 to 1.
+  double share() const { return share_; }
 
  private:
   LogSource& source_;
   mcap::MessageCursor cursor_;
+  const uint64_t start_ns_, end_ns_;  // of what is gone over
+  double share_ = 0;
 };
 
 /// What a command line says about which part of a log is meant.

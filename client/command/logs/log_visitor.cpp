@@ -7,6 +7,7 @@
 #include <map>
 
 #include "client/command/cli/log_text.h"
+#include "client/command/cli/progress.h"
 
 namespace taclink::command {
 namespace {
@@ -59,8 +60,10 @@ Result<void> Visit(LogSource& source, const LogPart& part, const LogVisitor& vis
   }
   std::set<uint16_t> channels;
   for (const auto& [id, take] : takers) channels.insert(id);
+  Progress progress(source.file());
   LogMessages messages(source, {.start_ns = part.start_ns, .end_ns = part.end_ns, .channels = channels});
   while (const auto message = messages.Next()) {
+    progress.Show(messages.share());
     if (const auto taken = takers.at(message->channel_id)(*message); !taken) return taken;
   }
   return {};

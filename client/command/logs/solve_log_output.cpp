@@ -109,7 +109,7 @@ Result<void> SolvedLog::CopyAttachments(const std::vector<LinkSettings>& links) 
   }
   mcap::Buffer buffer;
   for (const mcap::AttachmentIndex& index : log_.attachments()) {
-    if (replaced.contains(index.name)) continue;
+    if (replaced.contains(index.name) || index.name == wire::log::kSummaryName) continue;
     const auto attachment = log_.ReadAttachment(index, buffer);
     if (!attachment) return attachment.error();
     if (auto added = writer_->mcap().AddAttachment(*attachment); !added) return added.error();

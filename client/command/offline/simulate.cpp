@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "client/command/cli/commands.h"
+#include "client/command/cli/progress.h"
 #include "sensing/capture/image_io.h"
 #include "sensing/model/model_file.h"
 #include "sensing/simulation/renderer.h"
@@ -76,7 +77,9 @@ Result<void> Simulate(const SimulateOptions& options) {
   const int frames = options.frames > 0 ? options.frames : all;
   const auto rest = model->RestMarkers();
   SkinTruth truth;
+  Progress progress("the scene");
   for (int frame = 0; frame < frames; ++frame) {
+    progress.Show(static_cast<double>(frame) / frames);
     (*skin)->Evaluate(frame / scene->frame_rate_hz, truth);
     if (auto written = WritePictures(renderer, truth, folder, false); !written) return written.error();
     WriteTruthLine(truth, rest, truth_file);

@@ -83,6 +83,11 @@ class Client {
   /// The links, their models, poses and current state. Errors: kUnavailable, kTimeout.
   Result<v1::Arm> GetArm(std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
 
+  /// How strongly links were pressed in the last minutes. Errors: kNotFound (no such link), kInvalidArgument.
+  Result<v1::GetForceHistoryResponse> GetForceHistory(
+      const v1::GetForceHistoryRequest& request,
+      std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
+
   /// Returns once the server has accepted. Errors: kNotFound (no such link), kInvalidArgument,
   /// kResourceExhausted, kUnavailable.
   Result<std::unique_ptr<FrameReader>> StreamFrames(

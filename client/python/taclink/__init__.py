@@ -59,6 +59,7 @@ from taclink.messages.frame import (
     StatusReason,
     StreamCounts,
 )
+from taclink.messages.history import ContactForceHistory, ForceHistory
 from taclink.messages.others import (
     AttitudeSummary,
     Caller,
@@ -136,6 +137,7 @@ __all__ = [
     "Compression",
     "Contact",
     "ContactEvent",
+    "ContactForceHistory",
     "ContactStream",
     "DEFAULT_ADDRESS",
     "DataLoss",
@@ -146,6 +148,7 @@ __all__ = [
     "EventKind",
     "EventPlace",
     "EventStream",
+    "ForceHistory",
     "ForceLevel",
     "ForceLevelEvent",
     "ForceLevelState",

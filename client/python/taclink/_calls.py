@@ -11,6 +11,7 @@ from taclink.errors import InvalidArgument
 from taclink.messages.arm import Arm, arm_from
 from taclink.messages.baseline import LinkTare, tares_from
 from taclink.messages.force_level import ForceLevelState, force_level_state_from
+from taclink.messages.history import ForceHistory, histories_from
 from taclink.messages.others import Caller, ReplayPictures, caller_from, replay_pictures_from
 from taclink.messages.recording import (
     Log,
@@ -21,7 +22,7 @@ from taclink.messages.recording import (
     recorder_from,
 )
 from taclink.names import BodyShape, ForceModel, LogCompression, number_of
-from taclink.v1 import events_pb2, operations_pb2, recording_pb2, simulation_pb2, tactile_pb2, tare_pb2
+from taclink.v1 import events_pb2, history_pb2, operations_pb2, recording_pb2, simulation_pb2, tactile_pb2, tare_pb2
 
 T = TypeVar("T")
 
@@ -48,6 +49,11 @@ def _nothing(_: Any) -> None:
 
 def arm() -> Call[Arm]:
     return Call("tactile", "GetArm", tactile_pb2.GetArmRequest(), lambda answer: arm_from(answer.arm))
+
+
+def force_history(links: str | Iterable[str], span_s: float) -> Call[tuple[ForceHistory, ...]]:
+    request = history_pb2.GetForceHistoryRequest(links=names(links), span_s=span_s)
+    return Call("tactile", "GetForceHistory", request, histories_from)
 
 
 def caller() -> Call[Caller]:
@@ -101,9 +107,9 @@ def move_scene_joint(link: str, position_rad: float | None) -> Call[None]:
 
 
 def tare(
-    links: str | Iterable[str], force: bool, frames: int, timeout: float | None
+    links: str | Iterable[str], force: bool, frames: int, undo: bool, timeout: float | None
 ) -> Call[tuple[LinkTare, ...]]:
-    request = tare_pb2.TareRequest(links=names(links), force=force, frames=frames)
+    request = tare_pb2.TareRequest(links=names(links), force=force, frames=frames, undo=undo)
     return Call("tactile", "Tare", request, tares_from, chosen_s(timeout, SLOW_S))
 
 

@@ -18,6 +18,7 @@ from taclink.messages.arm import Arm
 from taclink.messages.baseline import CalibrationResult, LinkTare, calibration_from
 from taclink.messages.events import EventPlace
 from taclink.messages.force_level import ForceLevelState
+from taclink.messages.history import ForceHistory
 from taclink.messages.others import Caller
 from taclink.messages.recording import Log, LogDescription, RecorderStatus
 from taclink.streams import (
@@ -157,6 +158,12 @@ class Client:
         request = preview_pb2.StreamPreviewRequest(link=link, max_rate_hz=max_rate_hz)
         return PreviewStream(self._connection, request, self._connection.timeout_s)
 
+    def force_history(
+        self, links: str | Iterable[str] = (), *, span_s: float = 60
+    ) -> tuple[ForceHistory, ...]:
+        """How strongly links (none: all) were pressed in the last `span_s` seconds, at most 300."""
+        return self._connection.ask(_calls.force_history(links, span_s))
+
     def caller(self) -> Caller:
         """Who the server takes this client for."""
         return self._connection.ask(_calls.caller())
@@ -169,14 +176,16 @@ class Client:
         *,
         force: bool = False,
         frames: int = 10,
+        undo: bool = False,
         timeout: float | None = None,
     ) -> tuple[LinkTare, ...]:
         """Makes what the links show now (none: all) their untouched skins, each accepted or refused for itself.
 
-        force: even while touched, moved or with few markers. frames: to average over, 1 to 300.
+        force: even while touched, moved or with few markers. frames: to average over, 1 to 300. undo: undoes the
+        last tare instead, once.
         Errors: NotFound (no such link), InvalidArgument.
         """
-        return self._connection.ask(_calls.tare(links, force, frames, timeout))
+        return self._connection.ask(_calls.tare(links, force, frames, undo, timeout))
 
     def calibrate(
         self,

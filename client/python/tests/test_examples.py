@@ -39,6 +39,26 @@ def test_record_and_replay(server: servers.Server, touched: None, library: Path,
     assert done.stdout.splitlines()[-1] == "end of the log"
 
 
+def test_the_guides_program(server: servers.Server, touched: None, library: Path, tmp_path: Path) -> None:
+    page = (servers.EXAMPLES.parents[2] / "docs/guides/program.md").read_text(encoding="utf-8")
+    block = re.search(r"```python\n(.*?)```", page, re.DOTALL)
+    assert block
+    program = block[1].replace("127.0.0.1:50051", server.address).replace('"lower"', '"idle"')
+    path = tmp_path / "program.py"
+    path.write_text(program, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, str(path)],
+        env=servers.environment_of(library, tmp_path),
+        capture_output=True,
+        text=True,
+        timeout=servers.PATIENCE_S,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"^(ok|degraded) \d+ \[.*\] \[.*\]$", done.stdout, re.MULTILINE)
+    assert re.search(r"^\d{19} \[", done.stdout, re.MULTILINE)
+
+
 def test_live_plot(server: servers.Server, touched: None, library: Path, tmp_path: Path) -> None:
     options = ("--server", server.address, "--seconds", "1", "--save", "plot.png")
     done = servers.run_example(library, tmp_path, "live_plot.py", *options)

@@ -265,3 +265,20 @@ def test_proxies_are_passed_by(server: servers.Server, monkeypatch: pytest.Monke
 def test_who_calls(client: taclink.Client) -> None:
     caller = client.caller()
     assert (caller.name, caller.role, caller.tokens) == ("", taclink.Role.OPERATOR, False)
+
+
+def test_the_history_has_what_came_before(server: servers.Server, touched: None, client: taclink.Client) -> None:
+    newest = next(iter(client.frames("pressed")))
+    pressed, idle = client.force_history(span_s=30)
+    assert (pressed.link, idle.link) == ("pressed", "idle")
+    assert len(pressed.exposure_utc_ns) == len(pressed.total_force_n) > 0
+    assert np.all(np.diff(pressed.exposure_utc_ns) > 0)
+    assert pressed.exposure_utc_ns[-1] >= newest.times.exposure_utc_ns - 10**9
+    assert np.nanmax(idle.total_force_n) < 0.05 < np.nanmax(pressed.total_force_n)
+    contact = pressed.contacts[-1]
+    assert contact.samples[-1] < len(pressed.exposure_utc_ns) and np.all(np.diff(contact.samples) > 0)
+    assert np.nanmax(contact.force_n) == pytest.approx(np.nanmax(pressed.total_force_n), rel=0.2)
+    (only,) = client.force_history("idle")
+    assert only.link == "idle"
+    with pytest.raises(taclink.NotFound):
+        client.force_history("elbow")

@@ -24,6 +24,7 @@ constexpr double kMostPosition = 1e6;
 constexpr double kMostVacuumPa = 2e5, kMostPressurePa = 1e7;
 constexpr double kMostSpecificForce = 100;  // m/s^2
 constexpr double kMostHoldS = 3600;
+constexpr double kMostHistoryS = 300;
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 struct Bounds {
@@ -37,6 +38,7 @@ constexpr std::array kBounds = {
     Bounds{"StreamFramesRequest.max_rate_hz", 0, kMostRateHz, "Hz; 0: no limit"},
     Bounds{"StreamFramesRequest.deadband_force_n", 0, kMostForceN, "N; 0: none"},
     Bounds{"StreamFramesRequest.deadband_move_m", 0, kMostLengthM, "m; 0: none"},
+    Bounds{"GetForceHistoryRequest.span_s", 0, kMostHistoryS, "s; 0: 60"},
     Bounds{"StreamContactsRequest.max_rate_hz", 0, kMostRateHz, "Hz; 0: no limit"},
     Bounds{"StreamPreviewRequest.max_rate_hz", 0, 30, "Hz; 0: 5"},
     Bounds{"CalibrateRequest.pairs", 0, kMostPairs, "pairs of pictures; 0: 8"},

@@ -41,7 +41,9 @@ Operation ToOperation(const Result<TareSummary>& end, std::string who) {
   if (!end) return {.who = std::move(who), .accepted = false, .outcome = end.error().message, .values = {}};
   return {.who = std::move(who),
           .accepted = true,
-          .outcome = end->forced ? "forced" : "",
+          .outcome = end->undone   ? "undone"
+                     : end->forced ? "forced"
+                                   : "",
           .values = {{"frames", end->frames},
                      {"shift_m", end->shift_mm * wire::kMetresPerMm},
                      {"previous_age_s", end->previous_age_s}}};

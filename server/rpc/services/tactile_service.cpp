@@ -7,6 +7,7 @@
 
 #include "server/arm/link_names.h"
 #include "server/messages/arm_message.h"
+#include "server/messages/history_message.h"
 #include "server/rpc/requests/refusal.h"
 #include "server/rpc/requests/request_check.h"
 #include "server/rpc/requests/status.h"
@@ -67,6 +68,19 @@ void TactileService::SetLimits(ServiceLimits limits) {
 grpc::ServerUnaryReactor* TactileService::GetArm(grpc::CallbackServerContext* context,
                                                  const v1::GetArmRequest*, v1::GetArmResponse* response) {
   Fill(arm_, *response->mutable_arm());
+  auto* reactor = context->DefaultReactor();
+  reactor->Finish(grpc::Status::OK);
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* TactileService::GetForceHistory(grpc::CallbackServerContext* context,
+                                                          const v1::GetForceHistoryRequest* request,
+                                                          v1::GetForceHistoryResponse* response) {
+  constexpr const char* kCall = "GetForceHistory";
+  if (const auto good = CheckRequest(*request); !good) return RefuseCall(*context, kCall, good.error());
+  const auto links = FindLinks(link_names_, request->links());
+  if (!links) return RefuseCall(*context, kCall, links.error());
+  Fill(arm_, *links, request->span_s(), *response);
   auto* reactor = context->DefaultReactor();
   reactor->Finish(grpc::Status::OK);
   return reactor;
@@ -241,11 +255,15 @@ grpc::ServerUnaryReactor* TactileService::Tare(grpc::CallbackServerContext* cont
     call->End(added.error());
     return reactor;
   }
-  const TareOptions options{.frames = static_cast<int>(frames), .force = request->force()};
+  const TareOptions options{
+      .frames = static_cast<int>(frames), .force = request->force(), .undo = request->undo()};
   for (size_t place = 0; place < links.size(); ++place) {
     const auto observer = [call, place, &arm = arm_, link = links[place], name = names[place],
                            who = Who(*context, *security_)](const Result<TareSummary>& end) {
-      SPDLOG_INFO("{}: tare of link {}: {}", who, name, end ? "done" : end.error().message);
+      SPDLOG_INFO("{}: tare of link {}: {}", who, name,
+                  !end          ? end.error().message
+                  : end->undone ? "undone"
+                                : "done");
       arm.events().Post(EventKind::kTare, link, ToOperation(end, who));
       call->Answer(place, end);
     };

@@ -27,18 +27,20 @@ namespace taclink::server {
 /// UpdateStream).
 class TactileService final
     : public v1::TactileService::WithCallbackMethod_GetArm<
-          v1::TactileService::WithRawCallbackMethod_StreamFrames<
-              v1::TactileService::WithCallbackMethod_Calibrate<v1::TactileService::WithCallbackMethod_Tare<
-                  v1::TactileService::WithRawCallbackMethod_StreamContacts<
-                      v1::TactileService::WithRawCallbackMethod_UpdateJointStates<
-                          v1::TactileService::WithRawCallbackMethod_UpdatePressure<
-                              v1::TactileService::WithRawCallbackMethod_UpdateAttitude<
-                                  v1::TactileService::WithRawCallbackMethod_StreamEvents<
-                                      v1::TactileService::WithCallbackMethod_SetThresholds<
-                                          v1::TactileService::WithRawCallbackMethod_StreamPreview<
-                                              v1::TactileService::WithCallbackMethod_SetForceModel<
-                                                  v1::TactileService::WithCallbackMethod_SetCamera<
-                                                      v1::TactileService::Service>>>>>>>>>>>>> {
+          v1::TactileService::WithCallbackMethod_GetForceHistory<
+              v1::TactileService::WithRawCallbackMethod_StreamFrames<
+                  v1::TactileService::WithCallbackMethod_Calibrate<
+                      v1::TactileService::WithCallbackMethod_Tare<
+                          v1::TactileService::WithRawCallbackMethod_StreamContacts<
+                              v1::TactileService::WithRawCallbackMethod_UpdateJointStates<
+                                  v1::TactileService::WithRawCallbackMethod_UpdatePressure<
+                                      v1::TactileService::WithRawCallbackMethod_UpdateAttitude<
+                                          v1::TactileService::WithRawCallbackMethod_StreamEvents<
+                                              v1::TactileService::WithCallbackMethod_SetThresholds<
+                                                  v1::TactileService::WithRawCallbackMethod_StreamPreview<
+                                                      v1::TactileService::WithCallbackMethod_SetForceModel<
+                                                          v1::TactileService::WithCallbackMethod_SetCamera<
+                                                              v1::TactileService::Service>>>>>>>>>>>>>> {
  public:
   TactileService(Arm& arm, ServiceLimits limits, std::shared_ptr<boost::asio::thread_pool> senders,
                  std::shared_ptr<const Security> security);
@@ -56,6 +58,9 @@ class TactileService final
  private:
   grpc::ServerUnaryReactor* GetArm(grpc::CallbackServerContext* context, const v1::GetArmRequest* request,
                                    v1::GetArmResponse* response) override;
+  grpc::ServerUnaryReactor* GetForceHistory(grpc::CallbackServerContext* context,
+                                            const v1::GetForceHistoryRequest* request,
+                                            v1::GetForceHistoryResponse* response) override;
   grpc::ServerWriteReactor<grpc::ByteBuffer>* StreamFrames(grpc::CallbackServerContext* context,
                                                            const grpc::ByteBuffer* request) override;
   grpc::ServerWriteReactor<v1::CalibrateResponse>* Calibrate(grpc::CallbackServerContext* context,

@@ -12,6 +12,7 @@ void Fill(const Result<TareSummary>& answer, v1::LinkTare& out) {
   out.set_accepted(answer.ok());
   if (!answer) return out.set_reason(answer.error().message);
   out.set_forced(answer->forced);
+  out.set_undone(answer->undone);
   out.set_frames(static_cast<uint32_t>(answer->frames));
   out.set_shift_m(answer->shift_mm * wire::kMetresPerMm);
   out.set_previous_age_s(answer->previous_age_s);

@@ -8,11 +8,7 @@ namespace taclink::server {
 
 ContactStream::ContactStream(Arm& arm, double max_rate_hz, StreamRegistry& registry,
                              std::shared_ptr<boost::asio::thread_pool> senders)
-    : PumpedStream(registry, std::move(senders)),
-      arm_(arm),
-      joints_(arm.poses().joints().joints()),
-      newest_(arm.links().size()),
-      rate_(max_rate_hz) {
+    : PumpedStream(registry, std::move(senders)), arm_(arm), newest_(arm.links().size()), rate_(max_rate_hz) {
   link_names_ = arm.link_names();
 }
 
@@ -35,7 +31,7 @@ bool ContactStream::TakeNews() {
 
 std::optional<grpc::ByteBuffer> ContactStream::Next() {
   if (!TakeNews()) return std::nullopt;
-  Fill(newest_, link_names_, joints_, message_);
+  Fill(newest_, link_names_, arm_.poses(), message_);
   message_.set_sequence(++sent_);
   message_.set_utc_ns(arm_.clock().UtcNs());
   unsent_ = false;

@@ -31,7 +31,6 @@ class ContactStream final : public PumpedStream {
   // Constant after construction.
   Arm& arm_;
   std::vector<std::string> link_names_;
-  std::vector<JointInfo> joints_;
   std::unique_ptr<Subscription> subscription_;  // set by Begin
 
   // Used by one thread at a time.

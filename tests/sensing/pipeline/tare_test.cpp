@@ -160,6 +160,28 @@ TEST_F(TareTest, ATouchedSkinIsRefusedUnlessForced) {
   EXPECT_EQ(state_.reasons.back().id, ReasonId::kForcedBaseline) << state_.status_reason;
 }
 
+TEST_F(TareTest, ATareIsUndoneOnce) {
+  Start(TouchScene());
+  for (double t = 1.4; t < kTareTouchedS; t += kTareFrameS) Process(t);
+  const double force_n = TotalForce();
+  const Baseline before = state_.baseline;
+  ASSERT_GT(force_n, 0.15);
+  EXPECT_THAT(Tare({.undo = true}, kTareTouchedS).error().message, HasSubstr("no tare to undo"));
+  const auto tare = Tare({.frames = 4, .force = true}, kTareTouchedS);
+  ASSERT_TRUE(tare.ok()) << tare.error().message;
+  Process(kTareTouchedS);
+  EXPECT_LT(TotalForce(), 0.05);
+  const auto undone = Tare({.frames = 1, .undo = true}, kTareTouchedS);
+  ASSERT_TRUE(undone.ok()) << undone.error().message;
+  EXPECT_TRUE(undone->undone);
+  EXPECT_EQ(undone->shift_mm, tare->shift_mm);
+  Process(kTareTouchedS);
+  EXPECT_EQ(state_.baseline.origin, before.origin);
+  EXPECT_EQ(state_.baseline.taken_utc_ns, before.taken_utc_ns);
+  EXPECT_NEAR(TotalForce(), force_n, 0.02);
+  EXPECT_FALSE(Tare({.undo = true}, kTareTouchedS).ok());
+}
+
 TEST_F(TareTest, AForcedBaselineStaysSoWhereATareSeesNothing) {
   Start(TouchScene());
   for (double t = 1.4; t < kTareTouchedS; t += kTareFrameS) Process(t);

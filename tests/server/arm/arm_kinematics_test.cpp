@@ -130,6 +130,39 @@ TEST(ArmKinematics, JointsAreThoseThatMoveByThemselves) {
   EXPECT_FALSE(two->IsDependent("elbow"));
 }
 
+TEST(ArmKinematics, VisualsAreThoseOfTheFrames) {
+  const auto arm = Arm(R"(<robot name="drawn">
+  <material name="blue"><color rgba="0 0.5 1 1"/></material>
+  <link name="root">
+    <visual>
+      <origin xyz="0 0 0.1" rpy="0 1.5707963267948966 0"/> <geometry><cylinder radius="0.02" length="0.3"/></geometry>
+      <material name="blue"/>
+    </visual>
+    <visual><geometry><mesh filename="package://none/arm.stl"/></geometry></visual>
+    <visual><geometry><box size="0 0.1 0.1"/></geometry></visual>
+  </link>
+  <link name="hand">
+    <visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>
+    <visual><geometry><sphere radius="0.04"/></geometry></visual>
+  </link>
+  <joint name="wrist" type="fixed"><parent link="root"/> <child link="hand"/></joint>
+</robot>)");
+  const std::vector<ArmVisual>& visuals = arm->visuals();
+  ASSERT_EQ(visuals.size(), 3u);
+  EXPECT_EQ(arm->frame_name(visuals[0].frame), "root");
+  EXPECT_EQ(visuals[0].shape, VisualShape::kCylinder);
+  EXPECT_EQ(visuals[0].size_mm, Vec3(40, 40, 300));
+  ExpectSame(visuals[0].frame_from_visual, Origin(0, 0, 0.1, 0, kPi / 2));
+  ASSERT_TRUE(visuals[0].color);
+  EXPECT_NEAR((*visuals[0].color - Vec3(0, 0.5, 1)).norm(), 0, 1e-6);
+  EXPECT_EQ(arm->frame_name(visuals[1].frame), "hand");
+  EXPECT_EQ(visuals[1].shape, VisualShape::kBox);
+  EXPECT_EQ(visuals[1].size_mm, Vec3(100, 200, 300));
+  EXPECT_FALSE(visuals[1].color);
+  EXPECT_EQ(visuals[2].shape, VisualShape::kSphere);
+  EXPECT_EQ(visuals[2].size_mm, Vec3(80, 80, 80));
+}
+
 TEST(ArmKinematics, AMissingFrameListsThoseThereAre) {
   const auto frame = Arm(kTwoJointArm)->FindFrame("hand");
   ASSERT_FALSE(frame.ok());

@@ -6,7 +6,10 @@ namespace taclink::server {
 /// about x.
 inline constexpr const char* kTwoJointArm = R"(<?xml version="1.0"?>
 <robot name="planar">
-  <link name="world"/> <link name="upper"/> <link name="lower"/> <link name="wrist"/>
+  <link name="world"/> <link name="upper"/> <link name="lower"/>
+  <link name="wrist">
+    <visual> <origin xyz="0 0 0.01"/> <geometry><box size="0.1 0.1 0.02"/></geometry> </visual>
+  </link>
   <joint name="shoulder" type="revolute">
     <parent link="world"/> <child link="upper"/> <origin xyz="0 0 0.1" rpy="0 0 0"/>
     <axis xyz="0 0 1"/> <limit lower="-2" upper="2" effort="1" velocity="1"/>

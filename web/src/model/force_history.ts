@@ -69,7 +69,21 @@ export class ForceHistory {
     return out;
   }
 
-  addSample([timeS, totalN, contacts]: Sample): void {
+  /** Adds samples, in their order, where there are none yet. */
+  merge(samples: readonly Sample[]): void {
+    const own = this.samplesFrom(-Infinity);
+    const all = [...own, ...samples.filter(([timeS]) => !this.has(timeS))].sort((a, b) => a[0] - b[0]);
+    this.clear();
+    for (const sample of all) this.addSample(sample);
+  }
+
+  // Half a microsecond: times are whole ones.
+  private has(timeS: number): boolean {
+    const index = this.find(timeS - 5e-7);
+    return index < this.count && this.times[this.place(index)] < timeS + 5e-7;
+  }
+
+  private addSample([timeS, totalN, contacts]: Sample): void {
     this.add(
       timeS,
       totalN ?? NaN,

@@ -12,6 +12,7 @@ const FRAMES_HZ = 30;
 const STILL_FORCE_N = 0.02;
 const STILL_MOVE_M = 0.1e-3;
 const ARM_PERIOD_MS = 1000;
+const HISTORY_S = 60;
 // Every link gives a sign of life each second.
 const SILENCE_MS = 3500;
 // A glance at another tab does not close the stream.
@@ -109,12 +110,26 @@ export class LiveFeed implements Feed {
     const [{ arm }] = await Promise.all([asked, this.session.refresh()]);
     if (!arm) return;
     this.store.takeArm(arm);
+    void this.learnHistory(stop);
     if (arm.baseFrame)
       void keepOpen(stop, {
         run: (end) => this.readContacts(end),
         onLost: () => undefined,
         silenceMs: 0,
       });
+  }
+
+  // The curves of what was before: nothing else waits for them, nor needs them.
+  private async learnHistory(stop: AbortSignal): Promise<void> {
+    try {
+      const { links } = await this.session.tactile.getForceHistory(
+        { spanS: HISTORY_S },
+        { signal: stop, timeoutMs: 10_000 },
+      );
+      this.store.takeHistory(links);
+    } catch {
+      // An older server, or the connection: the frames say so.
+    }
   }
 
   private async followFrames(stop: AbortSignal, alive: () => void): Promise<void> {

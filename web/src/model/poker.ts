@@ -63,12 +63,29 @@ export class Poker {
 
   releaseAll(): void {
     this.letGo();
-    for (const link of this.left)
-      void this.session.simulation
-        .release({ link })
-        .catch((error: unknown) => this.onTrouble(messageOf(error)));
+    for (const link of this.left) this.tell(this.session.simulation.release({ link }));
     this.left.clear();
     this.bodyId = 1n;
+  }
+
+  /** Inside the link's skin, Pa. */
+  setPressure(link: string, pressurePa: number): void {
+    this.tell(this.session.simulation.setScenePressure({ link, pressurePa }));
+  }
+
+  /** The joint that swings the link in its scene. */
+  moveJoint(link: string, positionRad: number): void {
+    this.tell(this.session.simulation.moveSceneJoint({ link, positionRad }));
+  }
+
+  /** Pressure and joint as the scene has them. */
+  followScene(link: string): void {
+    this.tell(this.session.simulation.setScenePressure({ link }));
+    this.session.simulation.moveSceneJoint({ link }).catch(() => undefined); // not every scene has one
+  }
+
+  private tell(answer: Promise<unknown>): void {
+    answer.catch((error: unknown) => this.onTrouble(messageOf(error)));
   }
 
   private request({ link, angleRad, zM }: SkinPlace, holdS: number) {

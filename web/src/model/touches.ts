@@ -7,7 +7,7 @@ import { lengthOf } from "./vectors";
 export interface Touch {
   link: string;
   id: bigint;
-  /** s since 1970-01-01 UTC; NaN: it began before the events that are known. */
+  /** s since 1970-01-01 UTC. */
   beginS: number;
   /** s; undefined: it goes on. */
   durationS: number | undefined;
@@ -19,33 +19,36 @@ export interface Touch {
 
 /** `events`: newest first. The touches, in the order in which they began, newest first. */
 export function touchesOf(events: readonly Event[]): Touch[] {
-  const touches = new Map<string, Touch>();
+  const touches: Touch[] = [];
+  const open = new Map<string, { touch: Touch; lastS: number }>();
   for (const event of [...events].reverse()) {
     if (event.detail.case !== "contact") continue;
     const { contactId, forceN, peakForceN, durationS, endReason } = event.detail.value;
     const key = `${event.link} ${contactId}`;
-    const begins = event.kind === EventKind.CONTACT_BEGIN;
-    const beginS = begins ? secondsOf(event.times?.exposureUtcNs || event.times?.raisedUtcNs || 0n) : NaN;
-    let touch = touches.get(key);
-    // Another run of the server numbers contacts anew.
-    if (!touch || begins) {
-      touches.delete(key);
+    const timeS = secondsOf(event.times?.exposureUtcNs || event.times?.raisedUtcNs || 0n);
+    const before = open.get(key);
+    let touch = before?.touch;
+    if (!touch || event.kind === EventKind.CONTACT_BEGIN) {
+      // A link that was started again numbers its contacts from 1: how the one before ended is not known.
+      if (before) before.touch.durationS = before.lastS - before.touch.beginS;
       touch = {
         link: event.link,
         id: contactId,
-        beginS,
+        beginS: event.kind === EventKind.CONTACT_BEGIN ? timeS : timeS - durationS,
         durationS: undefined,
         peakN: 0,
         endReason: "",
         isDoubted: false,
       };
-      touches.set(key, touch);
+      touches.push(touch);
     }
+    open.set(key, { touch, lastS: timeS });
     touch.peakN = Math.max(touch.peakN, peakForceN, forceN ? lengthOf(forceN) : 0);
     touch.isDoubted ||= event.frameStatus !== LinkStatus.UNSPECIFIED && event.frameStatus !== LinkStatus.OK;
     if (event.kind !== EventKind.CONTACT_END) continue;
     touch.durationS = durationS;
     touch.endReason = endReason;
+    open.delete(key);
   }
-  return [...touches.values()].reverse();
+  return touches.sort((a, b) => b.beginS - a.beginS);
 }

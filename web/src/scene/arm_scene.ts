@@ -7,6 +7,7 @@ import { colourTable, StickyRange, type ColourMapName } from "../skin/colour_map
 import { QUANTITIES, type Quantity } from "../skin/fields";
 import { sameShape } from "../skin/same_shape";
 import type { SkinPlace } from "../model/poker";
+import { ArmBodies } from "./arm_bodies";
 import { Bones } from "./bones";
 import { ForceArrows, type ForceArrow } from "./force_arrows";
 import { fitView } from "./fit_view";
@@ -54,6 +55,7 @@ export class ArmScene {
   private readonly resizes: ResizeObserver;
   private readonly endListening: () => void;
   private drawing = 0;
+  private readonly bodies = new ArmBodies();
   private readonly bones = new Bones();
   private readonly lens: Lens;
   private readonly begun = new Map<string, number>(); // contacts of now, in the order in which they came
@@ -98,7 +100,7 @@ export class ArmScene {
     this.camera.add(sun);
     const sky = new THREE.HemisphereLight(0xffffff, 0x707883, 1.15);
     sky.position.set(0, 0, 1);
-    this.scene.add(sky, this.camera, this.floor, this.bones.group, this.arrows.group);
+    this.scene.add(sky, this.camera, this.floor, this.bodies.group, this.bones.group, this.arrows.group);
     this.resizes = new ResizeObserver(() => this.resize());
     this.resizes.observe(canvas.parentElement!);
     this.pointer = new SkinPointer(canvas.parentElement!, {
@@ -135,6 +137,7 @@ export class ArmScene {
     for (const link of this.links.values()) link.dispose();
     this.labels.dispose();
     this.arrows.dispose();
+    this.bodies.dispose();
     this.bones.dispose();
     this.floor.dispose();
     this.renderer.dispose();
@@ -199,7 +202,10 @@ export class ArmScene {
     const before = this.seen.clone();
     for (const point of outline) this.seen.expandByPoint(point);
     if (this.seen.equals(before)) return;
-    this.floor.position.z = Math.min(0, this.seen.min.z - FOOT_M);
+    this.floor.position.z = Math.min(
+      0,
+      this.seen.min.z - (this.bodies.group.children.length > 0 ? 0 : FOOT_M),
+    );
     if (this.followsArm) this.reset();
   }
 
@@ -245,13 +251,14 @@ export class ArmScene {
     for (const name of changed) this.updateLink(arm, name);
     const arrows = this.findArrows(arm);
     const metresPerNewton = this.longestArrowM() / this.arrowRange.top;
-    this.arrows.show(arrows, metresPerNewton);
+    this.arrows.show(arrows, metresPerNewton, this.camera.position);
+    const hasBodies = this.bodies.show(arm, this.store.framePoses());
     const outline = [...this.links.values()].flatMap((link) => link.surroundings());
-    this.follow(outline);
+    this.follow([...outline, ...this.bodies.outline()]);
     const inOrder = arm.links.flatMap((link) => this.links.get(link.name) ?? []);
-    this.bones.show(inOrder, this.floor.position.z);
+    this.bones.show(hasBodies ? [] : inOrder, this.floor.position.z);
     this.renderer.render(this.scene, this.camera);
-    this.drawLens(arrows);
+    this.drawLens(arrows, outline);
     const texts: Label[] = arrows.map((arrow) => ({
       place: arrow.tip,
       text: arrow.text,
@@ -268,7 +275,7 @@ export class ArmScene {
     this.canvas.dataset.frames = String(Number(this.canvas.dataset.frames ?? 0) + 1);
   }
 
-  private drawLens(arrows: readonly ForceArrow[]): void {
+  private drawLens(arrows: readonly ForceArrow[], outline: readonly THREE.Vector3[]): void {
     const keys = new Set(arrows.map((arrow) => arrow.key));
     for (const key of this.begun.keys()) if (!keys.has(key)) this.begun.delete(key);
     for (const key of keys) if (!this.begun.has(key)) this.begun.set(key, this.contactsBegun++);
@@ -278,7 +285,11 @@ export class ArmScene {
       undefined,
     );
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    const place = newest && this.lens.place(width);
+    const onCanvas = outline.map((point): [number, number] => {
+      const at = point.clone().project(this.camera);
+      return [((at.x + 1) / 2) * width, ((at.y + 1) / 2) * height];
+    });
+    const place = newest && this.lens.place(width, height, onCanvas);
     if (newest && place) this.lens.draw(this.scene, newest.tip, newest.normal, place, width, height);
     this.onLens(newest ? `${newest.text} on ${newest.link}` : "", place);
   }

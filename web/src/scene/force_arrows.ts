@@ -5,6 +5,7 @@ const HEAD = 0.012;
 const HEAD_RADIUS = 0.005;
 const SHAFT_RADIUS = 0.0018;
 
+const ALONG_VIEW = 0.85; // cosine
 const HALO_ABOVE_M = 0.0015; // the skin
 const HALO_LEAST_M = 0.006;
 
@@ -40,12 +41,18 @@ export class ForceArrows {
   private readonly halo = new THREE.TorusGeometry(1, 0.07, 8, 40);
   private readonly head = new THREE.ConeGeometry(HEAD_RADIUS, HEAD, 20).translate(0, -HEAD / 2, 0);
 
-  /** `metresPerNewton`: length of an arrow. */
-  show(arrows: readonly ForceArrow[], metresPerNewton: number): void {
+  /** `metresPerNewton`: length of an arrow. `eye`: where they are seen from; one that points at it hides no spot. */
+  show(arrows: readonly ForceArrow[], metresPerNewton: number, eye: THREE.Vector3): void {
     while (this.group.children.length < arrows.length) this.group.add(this.makeArrow());
     this.group.children.forEach((child, i) => {
       child.visible = i < arrows.length;
-      if (i < arrows.length) this.lay(child, arrows[i], metresPerNewton);
+      if (i >= arrows.length) return;
+      this.lay(child, arrows[i], metresPerNewton);
+      const { tip, force } = arrows[i];
+      const view = eye.clone().sub(tip).normalize();
+      const isAlongView = Math.abs(view.dot(force.clone().normalize())) > ALONG_VIEW;
+      const [arrow] = child.children;
+      for (const solid of arrow.children.slice(0, 2)) solid.visible = !isAlongView; // the ghost stays
     });
   }
 

@@ -23,11 +23,21 @@ export class Lens {
     this.camera.up.set(0, 0, 1);
   }
 
-  /** Undefined: there is no room for it. */
-  place(width: number): LensPlace | undefined {
+  /**
+   * On the right, above or below, where less of the arm is. `arm`: points around it, CSS pixels from the lower left
+   * corner. Undefined: there is no room.
+   */
+  place(width: number, height: number, arm: readonly [x: number, y: number][]): LensPlace | undefined {
     if (width < LEAST_WIDTH_PX) return undefined;
-    const own = SHARE * width;
-    return { x: width - own - MARGIN_PX, y: BOTTOM_PX, width: own, height: own / this.camera.aspect };
+    const own = { width: SHARE * width, height: (SHARE * width) / this.camera.aspect };
+    const places = [BOTTOM_PX, height - own.height - MARGIN_PX].map((y) => ({
+      x: width - own.width - MARGIN_PX,
+      y,
+      ...own,
+    }));
+    const hidden = ({ x, y }: LensPlace) =>
+      arm.filter(([px, py]) => px > x && px < x + own.width && py > y && py < y + own.height).length;
+    return hidden(places[1]) < hidden(places[0]) ? places[1] : places[0];
   }
 
   /** Draws after the whole picture. `at`: a point of the skin and its normal, base frame. */

@@ -5,6 +5,8 @@ import { useApp } from "../app_state";
 export function useRefusal(): string {
   const app = useApp();
   if (app.log.value) return "A log is played: go back to the live arm first.";
+  if (app.store.value.lookedAtS.value !== undefined)
+    return "The page shows a past moment: press Back to now first.";
   const caller = app.session.caller.value;
   if (!caller) return "Not connected.";
   if (app.session.mayOperate.value) return "";

@@ -46,6 +46,16 @@ export const MODEL_WORDS: Record<ForceModel, string> = {
   [ForceModel.AUTO]: "cheapest good enough",
 };
 
+/** What a model takes into account, in a sentence. */
+export const MODEL_NOTES: Record<ForceModel, string> = {
+  [ForceModel.UNSPECIFIED]: "",
+  [ForceModel.LINEAR]: "Small displacements of a skin without pressure: the quickest.",
+  [ForceModel.LITERAL]: "The thesis' formula (6.1); its forces are not right.",
+  [ForceModel.PRESSURISED]: "Small displacements about the inflated skin.",
+  [ForceModel.NONLINEAR]: "Displacements of any size, and pressure that follows the skin: the most exact.",
+  [ForceModel.AUTO]: "In each frame the quickest model that errs by less than 5 % on this skin.",
+};
+
 const SEVERITY: Record<LinkStatus, number> = {
   [LinkStatus.LOST]: 4,
   [LinkStatus.DEGRADED]: 3,

@@ -34,13 +34,23 @@ export function CameraView({ link }: { link: Link }) {
       trouble.value = "";
       preview.value = pictures;
     };
+    const keep = (pictures: StreamPreviewResponse) => {
+      app.pastImages.add(link.name, secondsOf(pictures.exposureUtcNs), pictures);
+      show(pictures);
+    };
     const lost = (reason: string) => (trouble.value = document.hidden ? "" : reason);
     if (feed instanceof ReplayFeed) void followLog(feed, link.name, life.signal, show, lost);
-    else void followLive(app.session, link.name, life.signal, show, lost);
+    else void followLive(app.session, link.name, life.signal, keep, lost);
     return () => life.abort();
   }, [link.name, feed, app.session.generation.value, live]);
 
-  const cameras = preview.value?.pictures ?? [];
+  const lookedAtS = app.store.value.lookedAtS.value;
+  const shown = lookedAtS === undefined ? preview.value : app.pastImages.at(link.name, lookedAtS);
+  const cameras = shown?.pictures ?? [];
+  const missing =
+    lookedAtS === undefined
+      ? trouble.value || "Waiting for images …"
+      : "No images of this moment: they are kept only while Cameras is open.";
   return (
     <div class="cameras">
       {recorded ? (
@@ -65,11 +75,8 @@ export function CameraView({ link }: { link: Link }) {
           </label>
         </div>
       )}
-      {trouble.value && <p class="empty">{trouble.value}</p>}
-      {preview.value && (
-        <p class="small numbers">taken {clockTime(secondsOf(preview.value.exposureUtcNs))}</p>
-      )}
-      {!trouble.value && cameras.length === 0 && <p class="empty">Waiting for pictures …</p>}
+      {cameras.length === 0 && <p class="empty">{missing}</p>}
+      {shown && <p class="small numbers">taken {clockTime(secondsOf(shown.exposureUtcNs))}</p>}
       <div class="pictures">
         {cameras.map((picture) => (
           <Picture
@@ -94,7 +101,7 @@ async function followLive(
   session: Session,
   link: string,
   stop: AbortSignal,
-  show: Show,
+  show: (pictures: StreamPreviewResponse) => void,
   lost: Lost,
 ): Promise<void> {
   await keepOpen(stop, {

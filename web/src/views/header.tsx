@@ -8,7 +8,7 @@ import { statusOf } from "../ui/words";
 import { KeysHelp } from "./keys_help";
 import { RecorderControl } from "./recorder_control";
 import { lengthOf } from "../model/vectors";
-import { newtons } from "../ui/format";
+import { clockTime, newtons } from "../ui/format";
 import { SignIn } from "./sign_in";
 
 export function Header() {
@@ -54,8 +54,9 @@ function Health() {
   store.beat.value;
   const { state } = app.feed.value.connection.value;
   const links = store.arm.value?.links ?? [];
+  // Also while a past moment is shown: what is wrong now must be seen.
   const unwell = links.filter(
-    (link) => statusOf(link, store.link(link.name).newest).status !== LinkStatus.OK,
+    (link) => statusOf(link, store.link(link.name).now.newest).status !== LinkStatus.OK,
   ).length;
   const alarms = links.filter((link) => store.levelOf(link.name) === ForceLevel.ALARM).length;
   const words = { connecting: "connecting …", lost: "connection lost", signIn: "not signed in", live: "" }[
@@ -74,10 +75,12 @@ function Health() {
       newtons: contact.isRingContact || !contact.forceN ? contact.normalForceN : lengthOf(contact.forceN),
     })),
   );
+  const unknown = links.filter((link) => !store.link(link.name).newest?.totalForceN).length;
+  const then = store.lookedAtS.value === undefined ? "" : `At ${clockTime(store.lookedAtS.value)}: `;
   return (
     <p class={`health ${kind}`} role="status">
       {text}
-      {state === "live" && `. ${touchSentence(touches)}`}
+      {state === "live" && `. ${then}${touchSentence(touches, unknown)}`}
       {alarms > 0 && (
         <strong class="bad"> {alarms === 1 ? "1 link" : `${alarms} links`} above the alarm force</strong>
       )}
@@ -85,12 +88,19 @@ function Health() {
   );
 }
 
-/** What goes on, in a sentence. */
-export function touchSentence(touches: readonly { link: string; newtons: number }[]): string {
-  if (touches.length === 0) return "Nothing is touched";
+/** What is touched, in a sentence. `unknown`: links whose forces are not known. */
+export function touchSentence(
+  touches: readonly { link: string; newtons: number }[],
+  unknown: number,
+): string {
+  const doubt =
+    unknown === 0 ? "" : `; the forces of ${unknown === 1 ? "1 link" : `${unknown} links`} are not known`;
+  if (touches.length === 0) return unknown === 0 ? "Nothing is touched" : `No touch is found${doubt}`;
   const strongest = touches.reduce((a, b) => (b.newtons > a.newtons ? b : a));
   const force = `${newtons(strongest.newtons)} on ${strongest.link}`;
-  return touches.length === 1 ? `One touch, ${force}` : `${touches.length} touches, strongest ${force}`;
+  return (
+    (touches.length === 1 ? `One touch, ${force}` : `${touches.length} touches, strongest ${force}`) + doubt
+  );
 }
 
 function ThemeChoice() {

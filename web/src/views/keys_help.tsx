@@ -8,9 +8,9 @@ const KEYS: [string, string][] = [
   ["Home", "the whole arm"],
   ["mouse on a simulated skin", "press it; drag: move; wheel: depth"],
   ["mouse beside it", "turn the arm; wheel: zoom"],
-  ["← → on a log's time line", "a second; page keys: ten; Home, End"],
+  ["← → on the time line", "a second back or on; page keys: ten; Home, End"],
   ["Tab", "from control to control"],
-  ["Esc", "close a window"],
+  ["Esc", "close a window; go back to now"],
   ["?", "this list"],
 ];
 

@@ -1,11 +1,16 @@
+import { useSignal } from "@preact/signals";
 import { PressureOrigin } from "../api/gen/taclink/v1/pressure_pb";
 import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
+import { ForceLevel } from "../api/gen/taclink/v1/events_pb";
 import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
 import type { Baseline } from "../api/gen/taclink/v1/tare_pb";
 import { selectedLink, useApp } from "../app_state";
 import { lengthOf } from "../model/vectors";
 import { duration, fixed, milliseconds, newtons } from "../ui/format";
+import { OperatorButton } from "../ui/operator_button";
 import { LEVEL_WORDS, MODEL_WORDS, severity, STATUS_SIGNS, STATUS_WORDS, statusOf } from "../ui/words";
+
+import { TareDialog } from "./tare_dialog";
 
 const PASCALS_PER_KPA = 1e3;
 
@@ -14,12 +19,14 @@ export function LinkTable() {
   const app = useApp();
   const store = app.store.value;
   store.beat.value;
+  const taring = useSignal(false);
+  const isPast = store.lookedAtS.value !== undefined;
   const links = store.arm.value?.links ?? [];
   const rows = links
     .map((link) => {
       const { newest } = store.link(link.name);
       const { status, reason } = statusOf(link, newest);
-      const level = store.levelOf(link.name);
+      const level = isPast ? ForceLevel.UNSPECIFIED : store.levelOf(link.name);
       return { link, status, reason, level, weight: severity(status, level, link.supervision) };
     })
     .sort((a, b) => b.weight - a.weight || a.link.index - b.link.index);
@@ -51,6 +58,12 @@ export function LinkTable() {
             ))}
           </tbody>
         </table>
+        {links.length > 1 && (
+          <p class="row">
+            <OperatorButton onClick={() => (taring.value = true)}>Tare all links …</OperatorButton>
+          </p>
+        )}
+        {taring.value && <TareDialog links={links} onClose={() => (taring.value = false)} />}
         {links.length === 0 && (
           <p class="empty">No link yet. The server's configuration names them under `links`.</p>
         )}
@@ -65,7 +78,8 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
   const record = app.store.value.link(link.name);
   const frame = record.newest;
   const others = (frame?.statusReasons ?? []).map((each) => each.text).filter((text) => text !== reason);
-  const statistics = link.statistics;
+  // Those are of now.
+  const statistics = app.store.value.lookedAtS.value === undefined ? link.statistics : undefined;
   const grid = link.model?.markers;
   const level_word = LEVEL_WORDS[level as keyof typeof LEVEL_WORDS];
   return (
@@ -88,7 +102,7 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
         <span class={`status s${status}`}>
           <span aria-hidden="true">{STATUS_SIGNS[status]}</span> {STATUS_WORDS[status]}
         </span>
-        {link.supervision > Supervision.RUNNING && <span class="status s5">worker</span>}
+        {link.supervision > Supervision.RUNNING && <span class="status s5"> worker</span>}
         {reason && (
           <div class="reason" title={[reason, ...others].join("\n")}>
             {reason}

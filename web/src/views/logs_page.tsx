@@ -1,12 +1,14 @@
 import { useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
-import type { Log } from "../api/gen/taclink/v1/recording_pb";
+import { useEffect, useRef } from "preact/hooks";
+import type { Log, StrongestContact } from "../api/gen/taclink/v1/recording_pb";
 import { messageOf } from "../api/session";
 import { useApp } from "../app_state";
 import { chooseLogs, durationNs, type LogKey, type LogOrder } from "../model/log_list";
 import { Dialog } from "../ui/dialog";
-import { bytes, dateTime, duration, secondsOf } from "../ui/format";
+import { colourTable } from "../skin/colour_map";
+import { bytes, dateTime, duration, fixed, newtons, secondsOf } from "../ui/format";
 import { OperatorButton, useRefusal } from "../ui/operator_button";
+import { FlatPainter } from "./flat_painter";
 
 const COLUMNS: [LogKey, string][] = [
   ["name", "Log"],
@@ -16,6 +18,12 @@ const COLUMNS: [LogKey, string][] = [
   ["frames", "Frames"],
   ["contacts", "Contacts"],
 ];
+const STRONG_N = 1;
+const SPARK_WIDTH = 120;
+const SPARK_HEIGHT = 28;
+const LEAST_RANGE_M = 1e-3;
+const STEPS = 255; // of StrongestContact.displacements
+const LEAD_S = 1; // that is shown before the strongest contact
 
 /** The logs of the server. */
 export function LogsPage() {
@@ -78,6 +86,8 @@ export function LogsPage() {
                   </button>
                 </th>
               ))}
+              <th scope="col">Force</th>
+              <th scope="col">Strongest</th>
               <th scope="col">Links</th>
               <th scope="col">
                 <span class="hidden-text">What to do</span>
@@ -143,6 +153,19 @@ function LogRow({ log, onDelete }: { log: Log; onDelete: () => void }) {
       <td class="numbers">{bytes(log.bytes)}</td>
       <td class="numbers">{String(log.frames)}</td>
       <td class="numbers">{log.contacts === undefined ? "–" : String(log.contacts)}</td>
+      <td>{log.summary && <Sparkline peaks={log.summary.peakForceN} />}</td>
+      <td>
+        {log.summary?.strongest && (
+          <button
+            type="button"
+            class="plain strongest"
+            aria-label={`Play ${log.name} at its strongest contact`}
+            onClick={() => app.play(log.name, secondsOf(log.summary!.strongest!.logUtcNs) - LEAD_S)}
+          >
+            <Strongest contact={log.summary.strongest} />
+          </button>
+        )}
+      </td>
       <td class="small">{log.links.join(", ")}</td>
       <td>
         <div class="row">
@@ -168,6 +191,55 @@ function LogRow({ log, onDelete }: { log: Log; onDelete: () => void }) {
         </div>
       </td>
     </tr>
+  );
+}
+
+/** Force over the log, drawn over the same range for all. */
+function Sparkline({ peaks }: { peaks: readonly number[] }) {
+  const known = peaks.filter((peak) => !Number.isNaN(peak));
+  if (known.length === 0) return null;
+  const strongest = Math.max(...known);
+  const top = Math.max(STRONG_N, strongest);
+  const width = SPARK_WIDTH / peaks.length;
+  return (
+    <svg
+      class="sparkline"
+      width={SPARK_WIDTH}
+      height={SPARK_HEIGHT}
+      role="img"
+      aria-label={`Force over time, at most ${newtons(strongest)}`}
+    >
+      {peaks.map((peak, i) => {
+        const height = Number.isNaN(peak) ? 0 : Math.max(1, (SPARK_HEIGHT * peak) / top);
+        return (
+          <rect x={i * width} y={SPARK_HEIGHT - height} width={Math.max(1, width - 0.5)} height={height} />
+        );
+      })}
+    </svg>
+  );
+}
+
+/** The skin at the strongest contact, laid flat, and where that is. */
+function Strongest({ contact }: { contact: StrongestContact }) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const { paths, rings, displacements, largestDisplacementM: largestM } = contact;
+  const isWhole = paths > 0 && rings > 0 && displacements.length === paths * rings;
+  useEffect(() => {
+    if (!isWhole) return;
+    const painter = new FlatPainter(canvas.current!, paths, rings, 2);
+    const lengthsM = Array.from(displacements, (step) => (largestM * step) / STEPS);
+    painter.paint(lengthsM, Math.max(LEAST_RANGE_M, largestM), colourTable("skin"));
+  }, [contact]);
+  const { angleRad } = contact;
+  const place =
+    angleRad === undefined ? "all around" : `${(((angleRad * 180) / Math.PI + 360) % 360).toFixed(0)}°`;
+  return (
+    <>
+      {isWhole && <canvas ref={canvas} aria-hidden="true" />}
+      <span class="numbers small">
+        {newtons(contact.forceN)} on {contact.link}, {place}, z {fixed(contact.zM * 1e3, 0)} mm
+      </span>
+    </>
   );
 }
 

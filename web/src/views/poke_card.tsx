@@ -1,9 +1,10 @@
 import { useSignal } from "@preact/signals";
-import { SourceKind } from "../api/gen/taclink/v1/arm_pb";
+import { SourceKind, type Link } from "../api/gen/taclink/v1/arm_pb";
 import { BodyShape } from "../api/gen/taclink/v1/simulation_pb";
 import { useApp } from "../app_state";
 import { feltOf } from "../model/felt";
 import { fixed, newtons } from "../ui/format";
+import { NumberField } from "../ui/number_field";
 
 const SHAPES: [BodyShape, string][] = [
   [BodyShape.FINGER, "finger"],
@@ -19,7 +20,9 @@ export function PokeCard({ link }: { link: string }) {
   const store = app.store.value;
   store.beat.value;
   const links = (store.arm.value?.links ?? []).filter((each) => each.source?.kind === SourceKind.SIMULATED);
-  if (links.length === 0 || app.log.value || !app.session.mayOperate.value) return null;
+  const isPast = store.lookedAtS.value !== undefined;
+  if (links.length === 0 || app.log.value || isPast || !app.session.mayOperate.value) return null;
+  const pressed = links.find((each) => each.name === link) ?? links[0];
   return (
     <section class="poke" aria-label="Press a simulated skin">
       <p>
@@ -62,7 +65,7 @@ export function PokeCard({ link }: { link: string }) {
           Let go of all
         </button>
       </div>
-      <Place link={links.some((each) => each.name === link) ? link : links[0].name} />
+      <Place key={pressed.name} link={pressed} />
       {links.map((each) => (
         <FeltLine link={each.name} />
       ))}
@@ -70,42 +73,65 @@ export function PokeCard({ link }: { link: string }) {
   );
 }
 
-// The same without a pointer.
-function Place({ link }: { link: string }) {
+// The same without a pointer, and what else can be changed in the scene.
+function Place({ link }: { link: Link }) {
   const app = useApp();
   const angleDeg = useSignal(0);
   const zMm = useSignal(90);
   const pressed = app.poker.place.value !== undefined;
   const toggle = () => {
     if (pressed) app.poker.letGo();
-    else app.poker.press({ link, angleRad: (angleDeg.value * Math.PI) / 180, zM: zMm.value / 1e3 });
+    else
+      app.poker.press({ link: link.name, angleRad: (angleDeg.value * Math.PI) / 180, zM: zMm.value / 1e3 });
   };
+  const lengthMm = Math.round((link.model?.lengthM ?? 0.2) * 1e3);
   return (
     <details>
       <summary>By numbers</summary>
       <div class="row">
-        <label>
-          angle{" "}
-          <input
-            type="number"
-            step="5"
-            value={String(angleDeg.value)}
-            onInput={(event) => (angleDeg.value = Number(event.currentTarget.value))}
-          />
-          °
-        </label>
-        <label>
-          z{" "}
-          <input
-            type="number"
-            step="5"
-            value={String(zMm.value)}
-            onInput={(event) => (zMm.value = Number(event.currentTarget.value))}
-          />{" "}
-          mm
-        </label>
+        <NumberField
+          label="angle"
+          unit="°"
+          value={0}
+          min={-360}
+          max={360}
+          step={5}
+          onNumber={(value) => (angleDeg.value = value)}
+        />
+        <NumberField
+          label="z"
+          unit="mm"
+          value={90}
+          min={0}
+          max={lengthMm}
+          step={5}
+          onNumber={(value) => (zMm.value = value)}
+        />
         <button type="button" aria-pressed={pressed} onClick={toggle}>
-          Press {link}
+          Press {link.name}
+        </button>
+      </div>
+      <div class="row">
+        <NumberField
+          label="pressure"
+          unit="kPa"
+          placeholder="scene"
+          min={0}
+          max={3}
+          step={0.1}
+          onNumber={(kpa) => app.poker.setPressure(link.name, kpa * 1e3)}
+        />
+        <NumberField
+          label="joint"
+          unit="°"
+          placeholder="scene"
+          min={-180}
+          max={180}
+          step={5}
+          onNumber={(deg) => app.poker.moveJoint(link.name, (deg * Math.PI) / 180)}
+        />
+        <button type="button" onClick={() => app.poker.followScene(link.name)}>
+          Follow the scene
         </button>
       </div>
     </details>

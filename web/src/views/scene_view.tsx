@@ -37,7 +37,8 @@ export function SceneView() {
       made.onScales = (now) => (scales.value = now);
       made.onLens = (text, place) => {
         const before = lens.peek();
-        if (before?.text === text && before.place.width === place?.width) return;
+        if (before?.text === text && before.place.width === place?.width && before.place.y === place.y)
+          return;
         lens.value = place && { text, place };
       };
       made.mayPress = (link) => mayPress(app, link);
@@ -112,7 +113,12 @@ function LensFrame({ text, place }: { text: string; place: LensPlace }) {
 function mayPress(app: AppState, link: string): boolean {
   const arm = app.store.value.arm.peek();
   const kind = arm?.links.find((each) => each.name === link)?.source?.kind;
-  return kind === SourceKind.SIMULATED && !app.log.peek() && app.session.mayOperate.peek();
+  return (
+    kind === SourceKind.SIMULATED &&
+    !app.log.peek() &&
+    app.store.value.lookedAtS.peek() === undefined &&
+    app.session.mayOperate.peek()
+  );
 }
 
 function Legend({ scales }: { scales: Scales | undefined }) {

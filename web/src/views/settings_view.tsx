@@ -5,19 +5,23 @@ import type { Camera } from "../api/gen/taclink/v1/camera_pb";
 import type { ForceLevelState } from "../api/gen/taclink/v1/events_pb";
 import { ForceModel, ForceModelSchema } from "../api/gen/taclink/v1/frame_pb";
 import type { CalibrationResult } from "../api/gen/taclink/v1/tactile_pb";
-import type { LinkTare } from "../api/gen/taclink/v1/tare_pb";
 import { messageOf } from "../api/session";
 import { useApp } from "../app_state";
 import { Dialog } from "../ui/dialog";
-import { duration, fixed } from "../ui/format";
+import { duration, fixed, newtons } from "../ui/format";
+import { NumberField } from "../ui/number_field";
 import { OperatorButton } from "../ui/operator_button";
-import { MODEL_WORDS } from "../ui/words";
+import { MODEL_NOTES, MODEL_WORDS } from "../ui/words";
+import { CameraView } from "./camera_view";
+import { Steps, TareDialog, TouchLine } from "./tare_dialog";
 
 /** All that can be chosen, the most exact ones first. */
 const MODELS = ForceModelSchema.values
   .slice(1)
   .reverse()
   .map(({ number }) => number as ForceModel);
+
+const MOST_FORCE_N = 1000;
 
 /** What can be done to a link. */
 export function SettingsView({ link }: { link: Link }) {
@@ -35,47 +39,23 @@ export function SettingsView({ link }: { link: Link }) {
 }
 
 function Baseline({ link }: { link: Link }) {
-  const app = useApp();
-  const busy = useSignal(false);
-  const refused = useSignal<LinkTare | undefined>(undefined);
+  const taring = useSignal(false);
   const calibrating = useSignal(false);
   const baseline = link.baseline;
-
-  const tare = async (force: boolean) => {
-    busy.value = true;
-    refused.value = undefined;
-    try {
-      const { links } = await app.session.tactile.tare({ links: [link.name], force }, { timeoutMs: 20_000 });
-      const answer = links[0];
-      if (answer?.accepted)
-        app.tell(`${link.name} is tared: the baseline moved by ${fixed(answer.shiftM * 1e3, 2)} mm.`);
-      else refused.value = answer;
-    } catch (error) {
-      app.tell(`Tare of ${link.name}: ${messageOf(error)}`, true);
-    }
-    busy.value = false;
-  };
-
   return (
     <fieldset>
       <legend>Baseline</legend>
+      <p class="small">The shape against which displacements and forces are measured.</p>
       <p class="small numbers">
         {baseline && baseline.origin
           ? `Taken ${duration(Date.now() / 1e3 - Number(baseline.takenUtcNs / 1_000_000n) / 1e3)} ago, drift ${fixed(baseline.driftM * 1e3, 2)} mm.${missing(baseline.missingMarkers.length)}`
           : "There is none yet."}
       </p>
       <div class="row">
-        <OperatorButton onClick={() => void tare(false)} disabled={busy.value}>
-          {busy.value ? "Taring …" : "Tare"}
-        </OperatorButton>
+        <OperatorButton onClick={() => (taring.value = true)}>Tare …</OperatorButton>
         <OperatorButton onClick={() => (calibrating.value = true)}>Calibrate …</OperatorButton>
       </div>
-      {refused.value && (
-        <div role="alert" class="refusal">
-          <p>{refused.value.reason}</p>
-          <OperatorButton onClick={() => void tare(true)}>Tare all the same</OperatorButton>
-        </div>
-      )}
+      {taring.value && <TareDialog links={[link]} onClose={() => (taring.value = false)} />}
       {calibrating.value && <Calibration link={link} onClose={() => (calibrating.value = false)} />}
     </fieldset>
   );
@@ -111,18 +91,26 @@ function Calibration({ link, onClose }: { link: Link; onClose: () => void }) {
     life.value?.abort();
     onClose();
   };
+  const step = result.value ? 3 : progress.value ? 2 : 1;
 
   return (
     <Dialog title={`Calibrate ${link.name}`} onClose={close}>
-      <p>Finds both cameras and the rest shape again. Nothing may touch the skin meanwhile.</p>
-      <label>
-        <input
-          type="checkbox"
-          checked={save.value}
-          onChange={(event) => (save.value = event.currentTarget.checked)}
-        />{" "}
-        also write the link's calibration file
-      </label>
+      <Steps names={["Free the skin", "Take pictures", "Check the result"]} now={step} />
+      {step === 1 && (
+        <>
+          <p>Finds both cameras and the rest shape again. Nothing may touch the skin until it has ended.</p>
+          <TouchLine link={link.name} />
+          <CameraView link={link} />
+          <label>
+            <input
+              type="checkbox"
+              checked={save.value}
+              onChange={(event) => (save.value = event.currentTarget.checked)}
+            />{" "}
+            also write the link's calibration file
+          </label>
+        </>
+      )}
       <div aria-live="polite">
         {progress.value && (
           <p>
@@ -132,7 +120,7 @@ function Calibration({ link, onClose }: { link: Link; onClose: () => void }) {
         )}
         {trouble.value && (
           <p role="alert" class="refusal">
-            {trouble.value}
+            {trouble.value} The previous calibration stays in use.
           </p>
         )}
         {result.value && <CalibrationFacts result={result.value} />}
@@ -185,6 +173,7 @@ function Model({ link }: { link: Link }) {
   return (
     <fieldset>
       <legend>Force model</legend>
+      <p class="small">{MODEL_NOTES[chosen.value ?? now]}</p>
       <div class="row">
         <label>
           <span class="hidden-text">Model</span>
@@ -228,10 +217,7 @@ function ThresholdForm({ link, state }: { link: Link; state: ForceLevelState }) 
     }
   };
   const field = (name: string, label: string, value: number | undefined) => (
-    <label>
-      {label}
-      <input name={name} type="number" min="0" step="any" defaultValue={String(value ?? 0)} /> N
-    </label>
+    <NumberField name={name} label={label} unit="N" value={value ?? 0} min={0} max={MOST_FORCE_N} />
   );
   return (
     <fieldset>
@@ -244,7 +230,10 @@ function ThresholdForm({ link, state }: { link: Link; state: ForceLevelState }) 
           Set
         </OperatorButton>
       </form>
-      <p class="small">0 switches a level off. They hold until the server ends.</p>
+      <p class="small">
+        Now {newtons(state.forceN)}. Above warning or alarm the level rises, and an event tells it; it falls
+        once the force is below by the hysteresis. 0 switches a level off. They hold until the server ends.
+      </p>
     </fieldset>
   );
 }
@@ -277,9 +266,15 @@ function Cameras({ link }: { link: Link }) {
       app.tell(`Cameras of ${link.name}: ${messageOf(error)}`, true);
     }
   };
+  const exposureS = link.cameras[0]?.exposureS;
+  const exposureMs = exposureS === undefined ? undefined : exposureS * 1e3;
   return (
     <fieldset>
       <legend>Cameras</legend>
+      <p class="small">
+        Markers must be bright and the skin dark, without blur: exposure below 10 ms where the arm moves fast.
+        Gain is in the camera's own units.
+      </p>
       <form onSubmit={submit} class="row">
         <label>
           <span class="hidden-text">Which</span>
@@ -289,15 +284,24 @@ function Cameras({ link }: { link: Link }) {
             <option value="bottom">bottom</option>
           </select>
         </label>
-        <label>
-          Exposure <input name="exposure" type="number" min="0" step="0.1" /> ms
-        </label>
+        <NumberField
+          name="exposure"
+          label="Exposure"
+          unit="ms"
+          placeholder={exposureMs === undefined ? "" : exposureMs.toFixed(1)}
+          min={0.1}
+          max={1000}
+        />
         <label>
           <input name="automatic" type="checkbox" /> automatic
         </label>
-        <label>
-          Gain <input name="gain" type="number" step="1" />
-        </label>
+        <NumberField
+          name="gain"
+          label="Gain"
+          unit=""
+          step={1}
+          placeholder={link.cameras[0]?.gain === undefined ? "" : String(link.cameras[0].gain)}
+        />
         <OperatorButton type="submit" onClick={() => undefined}>
           Set
         </OperatorButton>
@@ -333,6 +337,7 @@ function Worker({ link }: { link: Link }) {
   return (
     <fieldset>
       <legend>Worker</legend>
+      <p class="small">The threads that read the cameras and compute the forces of this link.</p>
       <p class="small">
         {link.supervision > Supervision.RUNNING ? link.supervisionReason : "Runs."} Restarted{" "}
         {String(link.statistics?.workerRestarts ?? 0n)} times.

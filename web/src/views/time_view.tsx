@@ -15,6 +15,9 @@ const REDRAW_MS = 125;
 const HOLD_S = 2.5;
 const MOST_CONTACTS = 8;
 const LEAST_TOP_N = 0.4;
+const DRAG_PX = 5; // less is a click
+const LATE_BINS = 60;
+const LEGEND_PX = 30;
 /** Told apart also by colour-blind people (Okabe and Ito), and by dashes from the ninth on. */
 const LINE_COLOURS = ["#56b4e9", "#e69f00", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7", "#999999"];
 
@@ -32,19 +35,25 @@ export function TimeView() {
   const link = selectedLink(app);
 
   useEffect(() => {
-    const chart = new ForceChart(host.current!, (from, to) => {
+    const onZoom = (from: number, to: number) => {
       paused.value ??= to;
       zoom.value = [from, to];
-    });
+    };
+    const chart = new ForceChart(host.current!, onZoom, (timeS) => app.seek(timeS));
     let drawn = "";
+    let stood: number | undefined;
     const draw = () => {
       if (document.hidden) return;
-      const end = paused.value ?? now(store);
+      const shownS = app.shownS();
+      // The curves stand still while one looks back.
+      if (store.lookedAtS.peek() === undefined) stood = undefined;
+      else stood ??= store.nowS();
+      const end = paused.value ?? stood ?? store.nowS();
       const [from, to] = zoom.value ?? [end - span.value, end];
-      const view = `${from} ${to}`;
+      const view = `${from} ${to} ${shownS}`;
       if (paused.value !== undefined && view === drawn) return; // what comes late would change it yet
       drawn = view;
-      if (Number.isFinite(from)) chart.show(collect(store, what.value, link, from, to), from, to);
+      if (Number.isFinite(from)) chart.show(collect(store, what.value, link, from, to), from, to, shownS);
     };
     draw();
     const timer = setInterval(draw, REDRAW_MS);
@@ -54,7 +63,7 @@ export function TimeView() {
     };
   }, [store, link, what.value, span.value]);
 
-  const pause = () => (paused.value = paused.value === undefined ? now(store) : undefined);
+  const pause = () => (paused.value = paused.value === undefined ? store.nowS() : undefined);
   const goOn = () => {
     zoom.value = undefined;
     paused.value = undefined;
@@ -84,7 +93,7 @@ export function TimeView() {
         <button type="button" aria-pressed={paused.value !== undefined} onClick={zoom.value ? goOn : pause}>
           {zoom.value ? "Show newest" : paused.value === undefined ? "Pause" : "Go on"}
         </button>
-        <span class="small hint">Drag over the curves to zoom.</span>
+        <span class="small hint">Click on the curves: show that moment. Drag: zoom.</span>
       </header>
       <div
         ref={host}
@@ -94,11 +103,6 @@ export function TimeView() {
       />
     </section>
   );
-}
-
-/** The arm's time now: it goes on between two messages. */
-function now(store: ArmStore): number {
-  return store.timeS + Math.min(1.5, (performance.now() - store.timeAtMs) / 1e3);
 }
 
 interface Curves {
@@ -132,12 +136,14 @@ class ForceChart {
   private plot: uPlot | undefined;
   private names = "";
   private curves: Curves | undefined;
+  private shownS: number | undefined;
   private top = LEAST_TOP_N;
   private readonly sizes: ResizeObserver;
 
   constructor(
     private readonly host: HTMLElement,
     private readonly onZoom: (from: number, to: number) => void,
+    private readonly onPick: (timeS: number) => void,
   ) {
     this.sizes = new ResizeObserver(() => this.plot?.setSize(this.size()));
     this.sizes.observe(host);
@@ -148,8 +154,10 @@ class ForceChart {
     this.plot?.destroy();
   }
 
-  show(curves: Curves, from: number, to: number): void {
+  /** `shownS`: the moment that the rest of the page shows; undefined: now. */
+  show(curves: Curves, from: number, to: number, shownS: number | undefined): void {
     this.curves = curves;
+    this.shownS = shownS;
     const names = curves.names.join("\n");
     if (!this.plot || names !== this.names) this.make(names);
     let top = LEAST_TOP_N;
@@ -162,12 +170,31 @@ class ForceChart {
       this.plot!.setScale("x", { min: from, max: to });
       this.plot!.setScale("y", { min: 0, max: this.top });
     });
+    this.showValues(shownS);
+  }
+
+  // In the legend: of the moment that is shown, where the pointer is not over the curves.
+  private showValues(shownS: number | undefined): void {
+    const plot = this.plot!;
+    if ((plot.cursor.left ?? -1) >= 0) return;
+    const newest = plot.data[0].length - 1;
+    let idx = shownS === undefined ? newest : plot.valToIdx(shownS);
+    // What is newest comes late, of each link at another time.
+    const drawn = plot.data.slice(1).filter((series) => series.some((value) => (value ?? null) !== null));
+    const isWhole = (at: number) => drawn.every((series) => (series[at] ?? null) !== null);
+    if (shownS === undefined) while (idx > newest - LATE_BINS && !isWhole(idx)) --idx;
+    plot.setLegend({ idx }, false);
+  }
+
+  // It has a row or several.
+  private legendHeight(): number {
+    return this.host.querySelector<HTMLElement>(".u-legend")?.offsetHeight ?? LEGEND_PX;
   }
 
   private size() {
     return {
       width: Math.max(200, this.host.clientWidth),
-      height: Math.max(120, this.host.clientHeight - 30),
+      height: Math.max(120, this.host.clientHeight - this.legendHeight()),
     };
   }
 
@@ -178,6 +205,7 @@ class ForceChart {
     const ink = style.getPropertyValue("--ink-soft").trim() || "#888";
     const line = style.getPropertyValue("--line").trim() || "#8884";
     const axis = { stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 } };
+    let pressedAt = NaN;
     this.plot = new uPlot(
       {
         ...this.size(),
@@ -195,10 +223,18 @@ class ForceChart {
         series: [{}, ...this.lines(names)],
         hooks: {
           draw: [(plot) => this.marks(plot)],
+          ready: [
+            (plot) =>
+              plot.over.addEventListener("click", (event) => {
+                if (Math.abs(event.offsetX - pressedAt) < DRAG_PX)
+                  this.onPick(plot.posToVal(event.offsetX, "x"));
+              }),
+            (plot) => plot.over.addEventListener("pointerdown", (event) => (pressedAt = event.offsetX)),
+          ],
           setSelect: [
             (plot) => {
               const { left, width } = plot.select;
-              if (width < 5) return;
+              if (width < DRAG_PX) return;
               this.onZoom(plot.posToVal(left, "x"), plot.posToVal(left + width, "x"));
               plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
             },
@@ -208,6 +244,7 @@ class ForceChart {
       this.curves!.data,
       this.host,
     );
+    this.plot.setSize(this.size());
   }
 
   private lines(names: string): uPlot.Series[] {
@@ -256,6 +293,15 @@ class ForceChart {
       );
       ctx.fillStyle = eventColour(event);
       ctx.fillRect(x - devicePixelRatio, bbox.top, 2 * devicePixelRatio, 8 * devicePixelRatio);
+    }
+    if (this.shownS !== undefined) {
+      ctx.fillStyle = getComputedStyle(this.host).getPropertyValue("--mark");
+      ctx.fillRect(
+        plot.valToPos(this.shownS, "x", true) - devicePixelRatio,
+        bbox.top,
+        2 * devicePixelRatio,
+        bbox.height,
+      );
     }
     ctx.restore();
   }

@@ -31,6 +31,7 @@ from taclink.messages.arm import Arm
 from taclink.messages.baseline import CalibrationResult, LinkTare, calibration_from
 from taclink.messages.events import EventPlace
 from taclink.messages.force_level import ForceLevelState
+from taclink.messages.history import ForceHistory
 from taclink.messages.others import Caller
 from taclink.messages.recording import Log, LogDescription, RecorderStatus
 from taclink.v1 import contacts_pb2, preview_pb2
@@ -120,6 +121,11 @@ class Client:
         request = preview_pb2.StreamPreviewRequest(link=link, max_rate_hz=max_rate_hz)
         return PreviewStream(self._connection, request, self._connection.timeout_s)
 
+    async def force_history(
+        self, links: str | Iterable[str] = (), *, span_s: float = 60
+    ) -> tuple[ForceHistory, ...]:
+        return await self._connection.ask(_calls.force_history(links, span_s))
+
     async def caller(self) -> Caller:
         return await self._connection.ask(_calls.caller())
 
@@ -131,9 +137,10 @@ class Client:
         *,
         force: bool = False,
         frames: int = 10,
+        undo: bool = False,
         timeout: float | None = None,
     ) -> tuple[LinkTare, ...]:
-        return await self._connection.ask(_calls.tare(links, force, frames, timeout))
+        return await self._connection.ask(_calls.tare(links, force, frames, undo, timeout))
 
     async def calibrate(
         self,
