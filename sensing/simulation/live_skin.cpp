@@ -137,7 +137,7 @@ SkinBalance LiveSkin::Predicted(double from_s, const HandledMotion& from, double
   return predicted;
 }
 
-// Leaves balance_ at the share of the way that it returns.
+// Goes on as far as the effort for a key allows. Returns the share of the way where balance_ is.
 double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to) {
   const int before = skin_.factorizations();
   const auto time_at = [&](double share) { return from_s + share * (to_s - from_s); };

@@ -27,7 +27,7 @@ mcap::TextMap MetadataOf(const mcap::Reader& reader, const char* name) {
   return {};
 }
 
-// A damaged one is left out: it is for a glance.
+// A damaged summary is ignored: the log can be read without it.
 void FillSummary(const mcap::Reader& reader, v1::Log& out) {
   for (const mcap::AttachmentIndex& index : reader.attachments()) {
     if (index.name != wire::log::kSummaryName) continue;

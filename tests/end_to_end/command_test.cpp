@@ -63,7 +63,7 @@ TEST_F(CommandTest, TheDoctorSaysWhatIsWellAndWhatMendsTheRest) {
   const Finished bad =
       Taclink({"doctor", "--server", "127.0.0.1:1", "--config", Write("bad.yaml", "arm: 3\n")});
   EXPECT_EQ(bad.exit_code, 1);
-  EXPECT_THAT(bad.out, HasSubstr("BAD   configuration"));
+  EXPECT_THAT(bad.out, HasSubstr("err   configuration"));
 }
 
 TEST_F(CommandTest, BadInputGivesOneLineAndAnExitCode) {

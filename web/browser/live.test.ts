@@ -168,7 +168,7 @@ describe("a link that measures nothing", () => {
     await own.start("--config", own.write("arm.yaml", configuration("two", { touched: held, still })));
     const visit = await Visit.open(browser, `${own.url}?link=touched`);
     const { page } = visit;
-    await page.locator(".lens", { hasText: /0\.[34]\d N on touched/ }).waitFor({ timeout: 30_000 });
+    await page.locator(".lens", { hasText: /touched 0\.[34]\d N/ }).waitFor({ timeout: 30_000 });
     expect(await page.locator(".small-map").allInnerTexts()).toEqual([
       expect.stringContaining("touched"),
       expect.stringContaining("still"),

@@ -2,7 +2,7 @@
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { launch, Visit } from "./page";
-import { configuration, free, Server } from "./server";
+import { configuration, free, pressed, Server, untouched } from "./server";
 
 const REPOSITORY = fileURLToPath(new URL("../..", import.meta.url));
 const WIDE = { width: 1600, height: 1000 };
@@ -20,15 +20,26 @@ async function open(url: string, viewport: { width: number; height: number }): P
   return visit;
 }
 
-/** Once a touch is drawn: in the header, beside the arm and on the canvas. */
+/** Once as many touches are drawn beside the arm as the header says, and no link is late. */
 async function touched(visit: Visit): Promise<void> {
-  await visit.page.locator(".health", { hasText: /^all .*touch/ }).waitFor({ timeout: 60_000 });
-  await visit.page.locator(".labels .label").first().waitFor({ timeout: 60_000 });
-  await visit.drawn();
+  await visit.page.waitForFunction(
+    () => {
+      const words = document.querySelector(".health")?.textContent ?? "";
+      const count = /One touch/.test(words) ? 1 : Number(/(\d+) touches/.exec(words)?.[1] ?? 0);
+      const labels = [...document.querySelectorAll<HTMLElement>(".label.force")].filter(
+        (each) => !each.hidden,
+      );
+      return (
+        /^all/.test(words) && count > 0 && labels.length === count && !document.querySelector(".status.s5")
+      );
+    },
+    undefined,
+    { timeout: 120_000, polling: "raf" },
+  );
 }
 
 /** A still link, inflated to 0.5 kPa, whose skin is pressed by mouse. */
-async function pressed(): Promise<void> {
+async function poked(): Promise<void> {
   const server = new Server();
   const scene = server.write("free.yaml", free());
   await server.start(
@@ -70,8 +81,12 @@ async function demo(): Promise<void> {
 
 async function twelve(): Promise<void> {
   const server = new Server();
+  const still = server.write("still.yaml", untouched());
+  const held = [0.2, 0.35, 0.5].map((forceN, i) =>
+    server.write(`held${i}.yaml`, pressed(4 + 5 * i, 4 + i, forceN)),
+  );
   const scenes = Object.fromEntries(
-    Array.from({ length: 12 }, (_, i) => [`link-${i + 1}`, i % 4 === 1 ? "press" : "rest"]),
+    Array.from({ length: 12 }, (_, i) => [`link-${i + 1}`, i % 4 === 1 ? held[(i - 1) / 4] : still]),
   );
   await server.start("--config", server.write("arm.yaml", configuration("twelve", scenes)));
   const visit = await open(server.url, WIDE);
@@ -80,7 +95,7 @@ async function twelve(): Promise<void> {
   await server.close();
 }
 
-const makers = { pressed, demo, twelve };
+const makers = { poked, demo, twelve };
 const chosen = process.argv.slice(2);
 for (const [name, make] of Object.entries(makers))
   if (chosen.length === 0 || chosen.includes(name)) await make();

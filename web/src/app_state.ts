@@ -143,9 +143,9 @@ export function useApp(): AppState {
   return useContext(AppContext)!;
 }
 
-/** The selected link, or the first one. */
+/** The selected link; while nobody has selected one, that which was touched last, or the first one. */
 export function selectedLink(app: AppState): string {
   const links = app.store.value.arm.value?.links ?? [];
-  const wanted = app.link.value;
+  const wanted = app.link.value || app.store.value.touchedLink.value;
   return links.some((link) => link.name === wanted) ? wanted : (links[0]?.name ?? "");
 }

@@ -194,7 +194,7 @@ Finding LookAtConfig(const std::string& file) {
 void Print(const Finding& finding, bool color) {
   const auto [sign, of] = finding.verdict == Verdict::kGood   ? std::pair{"ok  ", Color::kGreen}
                           : finding.verdict == Verdict::kNote ? std::pair{"note", Color::kYellow}
-                                                              : std::pair{"BAD ", Color::kRed};
+                                                              : std::pair{"err ", Color::kRed};
   fmt::print("{}  {:<14} {}\n", color ? Colored(sign, of) : sign, finding.what, Printable(finding.text));
   if (!finding.mend.empty()) fmt::print("                     -> {}\n", finding.mend);
 }
@@ -214,7 +214,7 @@ Result<void> RunDoctor(const DoctorOptions& options) {
   for (const Finding& finding : LookAtServer(options.server)) tell(finding);
   if (bad == 0) return {};
   return Error{ErrorCode::kFailedPrecondition,
-               fmt::format("{} of these {} to be mended", bad, bad == 1 ? "is" : "are")};
+               fmt::format("{} found", bad == 1 ? "1 problem was" : std::to_string(bad) + " problems were")};
 }
 
 }  // namespace
@@ -222,8 +222,8 @@ Result<void> RunDoctor(const DoctorOptions& options) {
 void AddDoctor(const Arguments& app, Selected& selected) {
   auto options = std::make_shared<DoctorOptions>();
   const Arguments command = app.AddCommand("doctor",
-                                           "Look at cameras, USB, ports, disk, clock, configuration and "
-                                           "server: what is well, and what mends the rest");
+                                           "Check cameras, USB, ports, disk, clock, configuration and "
+                                           "server, and name the command that corrects each problem");
   AddServerOption(command, options->server);
   command.AddOption("--config", options->config, "A server's configuration file, to check it too");
   command.OnChosen([options, &selected] { selected = [options] { return RunDoctor(*options); }; });

@@ -55,6 +55,8 @@ export class ArmStore {
   readonly arm = signal<Arm | undefined>(undefined);
   /** Newest first. */
   readonly events = signal<readonly Event[]>([]);
+  /** That was touched last; empty: none yet. */
+  readonly touchedLink = signal("");
   readonly contacts = signal<StreamContactsResponse | undefined>(undefined);
   /** Rises a few times a second while frames come: for text that follows them. */
   readonly beat = signal(0);
@@ -199,6 +201,7 @@ export class ArmStore {
   takeEvent(event: Event): void {
     this.events.value = [event, ...this.events.value].slice(0, EVENTS_KEPT);
     const detail = event.detail;
+    if (event.kind === EventKind.CONTACT_BEGIN) this.touchedLink.value = event.link;
     if (event.kind === EventKind.FORCE_LEVEL && detail.case === "forceLevel")
       this.levels.set(`${event.link}\n${detail.value.region}`, detail.value.level);
     this.announce();

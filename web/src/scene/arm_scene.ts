@@ -291,7 +291,7 @@ export class ArmScene {
     });
     const place = newest && this.lens.place(width, height, onCanvas);
     if (newest && place) this.lens.draw(this.scene, newest.tip, newest.normal, place, width, height);
-    this.onLens(newest ? `${newest.text} on ${newest.link}` : "", place);
+    this.onLens(newest?.text ?? "", place);
   }
 
   private longestArrowM(): number {
@@ -356,7 +356,7 @@ export class ArmScene {
           normal: new THREE.Vector3(normal.x, normal.y, normal.z).applyMatrix3(rotation),
           radiusM: Math.sqrt(contact.areaM2 / Math.PI),
           force: new THREE.Vector3(forceN.x, forceN.y, forceN.z).applyMatrix3(rotation),
-          text: `${(contact.isRingContact ? contact.normalForceN : newtons).toFixed(2)} N`,
+          text: `${link.name} ${(contact.isRingContact ? contact.normalForceN : newtons).toFixed(2)} N`,
         });
       }
     }

@@ -16,10 +16,15 @@ export function LinkPanel() {
   const links = app.store.value.arm.value?.links ?? [];
   const link = links.find((each) => each.name === name);
 
+  // What somebody looks into stays, whatever is touched.
+  const open = (chosen: Tab) => {
+    tab.value = chosen;
+    app.link.value = name;
+  };
   const steer = (event: KeyboardEvent) => {
     const step = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
     if (step === 0) return;
-    tab.value = TABS[(TABS.indexOf(tab.value) + step + TABS.length) % TABS.length];
+    open(TABS[(TABS.indexOf(tab.value) + step + TABS.length) % TABS.length]);
     document.getElementById(`tab-${tab.value}`)?.focus();
   };
   return (
@@ -42,7 +47,7 @@ export function LinkPanel() {
               aria-selected={tab.value === each}
               aria-controls="tab-content"
               tabIndex={tab.value === each ? 0 : -1}
-              onClick={() => (tab.value = each)}
+              onClick={() => open(each)}
             >
               {each}
             </button>

@@ -38,7 +38,9 @@ export function LinkTable() {
             <tr>
               <th scope="col">Link</th>
               <th scope="col">Status</th>
-              <th scope="col">Force</th>
+              <th scope="col">
+                <abbr title="Length of the sum of the contact forces: opposite ones cancel">Resultant</abbr>
+              </th>
               <th scope="col">Rate</th>
               <th scope="col">
                 <abbr title="From exposure to clients, median / 99th percentile">Latency</abbr>
@@ -110,7 +112,7 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
           </div>
         )}
       </td>
-      <td class={`numbers level${level}`}>
+      <td class={`numbers level${level}${frame && frame.contacts.length > 0 ? " touched" : ""}`}>
         {frame?.totalForceN && status !== LinkStatus.LOST ? newtons(lengthOf(frame.totalForceN)) : "–"}
         {level_word && <span class="level-word"> {level_word}</span>}
       </td>

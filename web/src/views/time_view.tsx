@@ -16,7 +16,7 @@ const HOLD_S = 2.5;
 const MOST_CONTACTS = 8;
 const LEAST_TOP_N = 0.4;
 const DRAG_PX = 5; // less is a click
-const LATE_BINS = 60;
+const LATE_BINS = 25;
 const LEGEND_PX = 30;
 /** Told apart also by colour-blind people (Okabe and Ito), and by dashes from the ninth on. */
 const LINE_COLOURS = ["#56b4e9", "#e69f00", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7", "#999999"];
@@ -177,13 +177,17 @@ class ForceChart {
   private showValues(shownS: number | undefined): void {
     const plot = this.plot!;
     if ((plot.cursor.left ?? -1) >= 0) return;
-    const newest = plot.data[0].length - 1;
-    let idx = shownS === undefined ? newest : plot.valToIdx(shownS);
-    // What is newest comes late, of each link at another time.
-    const drawn = plot.data.slice(1).filter((series) => series.some((value) => (value ?? null) !== null));
-    const isWhole = (at: number) => drawn.every((series) => (series[at] ?? null) !== null);
-    if (shownS === undefined) while (idx > newest - LATE_BINS && !isWhole(idx)) --idx;
-    plot.setLegend({ idx }, false);
+    plot.setLegend({ idx: shownS === undefined ? plot.data[0].length - 1 : plot.valToIdx(shownS) }, false);
+  }
+
+  // What is newest comes late, of each link at another time.
+  private valueAt(series: number, idx: number | null): number | undefined {
+    const values = this.plot!.data[series];
+    if (idx === null) return undefined;
+    const isNewest = idx === values.length - 1;
+    for (let at = idx; at >= 0 && at >= idx - (isNewest ? LATE_BINS : 0); --at)
+      if (values[at] !== null && values[at] !== undefined) return values[at]!;
+    return undefined;
   }
 
   // It has a row or several.
@@ -255,7 +259,8 @@ class ForceChart {
       dash: i >= LINE_COLOURS.length ? [6, 3] : undefined,
       width: 1.5,
       points: { show: false },
-      value: (_: uPlot, value: number | null) => newtons(value ?? undefined),
+      value: (_: uPlot, __: number, series: number, idx: number | null) =>
+        newtons(this.plot && this.valueAt(series, idx)),
     }));
   }
 
