@@ -38,6 +38,16 @@ test("what is older than the page can look is forgotten, and time that goes back
   expect(past.oldestS).toBe(5);
 });
 
+test("a frame that was exposed a little before the newest report loses nothing", () => {
+  const store = new ArmStore(true);
+  for (let i = 0; i <= 10; ++i) store.takeFrame(frame(100 + i, i));
+  // A report without a frame is of now, frames are of some time before.
+  store.takeFrame(create(LinkFrameSchema, { link: "upper", statusReason: "lost" }));
+  store.takeFrame(frame(109.9, 3));
+  store.takeFrame(frame(111.5, 4));
+  expect(store.oldestS).toBe(100);
+});
+
 test("many links share the room: each keeps fewer moments over the same time", () => {
   const past = new Past<Measurement>();
   for (let i = 0; i < 30 * PAST_S; ++i) past.add(i / 30, moment(i / 30), 16);

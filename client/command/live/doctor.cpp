@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "client/command/cli/commands.h"
@@ -23,8 +24,6 @@
 #include "client/cpp/taclink/recordings.h"
 #include "sensing/capture/camera_finder.h"
 #include "sensing/core/printable.h"
-
-extern char** environ;
 
 namespace taclink::command {
 namespace {
@@ -67,7 +66,7 @@ std::vector<Finding> LookAtCameras() {
       findings.push_back({Verdict::kBad, "camera", camera.node + ": no permission",
                           "sudo usermod -aG video $USER, and log in again"});
     else
-      findings.push_back({Verdict::kBad, "camera", camera.node + ": " + std::strerror(errno),
+      findings.push_back({Verdict::kBad, "camera", camera.node + ": " + std::generic_category().message(errno),
                           "end the program that uses it, or plug it in again"});
     if (!camera.usb_path.empty()) ++on_bus[camera.usb_path.substr(0, camera.usb_path.find('-'))];
   }
@@ -177,6 +176,7 @@ Finding LookAtConfig(const std::string& file) {
   const std::string config = "--config", check = "--check-config";
   const std::vector<std::string> words = {program, config, file, check};
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   std::fflush(stdout);

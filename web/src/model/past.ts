@@ -8,6 +8,7 @@ export const PAST_S = 300;
 const MOST_MOMENTS = 4000; // of all links together: some 60 MB
 const LEAST_PERIOD_S = 0.1;
 const MOMENT_HOLDS_S = 3;
+const CLOCK_BACK_S = 5; // less: a frame that was exposed before a report without one
 const MOST_IMAGE_BYTES = 64e6;
 const IMAGE_HOLDS_S = 2;
 
@@ -34,7 +35,7 @@ export class Past<T> {
   /** `links`: among how many the room is shared. */
   add(timeS: number, moment: T, links: number): void {
     const newest = this.times.at(-1) ?? -Infinity;
-    if (timeS < newest) this.clear();
+    if (timeS < newest - CLOCK_BACK_S) this.clear();
     else if (timeS - newest < Math.max(LEAST_PERIOD_S, (PAST_S * links) / MOST_MOMENTS)) return;
     this.times.push(timeS);
     this.moments.push(moment);

@@ -79,7 +79,7 @@ function Health() {
   const then = store.lookedAtS.value === undefined ? "" : `At ${clockTime(store.lookedAtS.value)}: `;
   return (
     <p class={`health ${kind}`} role="status">
-      {text}
+      {then ? `Now ${text}` : text}
       {state === "live" && `. ${then}${touchSentence(touches, unknown)}`}
       {alarms > 0 && (
         <strong class="bad"> {alarms === 1 ? "1 link" : `${alarms} links`} above the alarm force</strong>

@@ -34,13 +34,15 @@ function LiveBar() {
   });
   return (
     <section class={shownS === undefined ? "replay live" : "replay live back"} aria-label="Time line">
-      {shownS === undefined ? (
-        <strong class="live-word">● LIVE</strong>
-      ) : (
-        <button type="button" class="primary" onClick={() => app.seek(undefined)} title="Esc">
-          Back to now
-        </button>
-      )}
+      <span class="now-cell">
+        {shownS === undefined ? (
+          <strong class="live-word">● LIVE</strong>
+        ) : (
+          <button type="button" class="primary" onClick={() => app.seek(undefined)} title="Esc">
+            Back to now
+          </button>
+        )}
+      </span>
       <TimeLine
         spans={spans.filter((span) => span.toS >= fromS)}
         fromS={fromS}
@@ -48,7 +50,7 @@ function LiveBar() {
         positionS={shownS ?? toS}
         onSeek={(timeS) => app.seek(timeS < toS ? timeS : undefined)}
       />
-      <span class="numbers small">
+      <span class="numbers small ago-cell">
         {shownS === undefined
           ? `last ${duration(toS - fromS)}`
           : `${clockTime(shownS)}, ${duration(Math.max(0, toS - shownS))} ago`}
@@ -155,7 +157,9 @@ function TimeLine({ spans, fromS, toS, positionS, onSeek, isLooking }: TimeLineP
   const steer = (event: KeyboardEvent) => {
     const steps: Record<string, number> = {
       ArrowLeft: -1,
+      ArrowDown: -1,
       ArrowRight: 1,
+      ArrowUp: 1,
       PageDown: -10,
       PageUp: 10,
       Home: -Infinity,
