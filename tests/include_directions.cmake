@@ -76,7 +76,7 @@ folder(server/security sensing/core server/config server/process)
 folder(server/arm sensing/core sensing/capture server/config server/hub server/pressure server/attitude server/link
        server/events server/simulation)
 folder(server/messages wire server/events server/arm)
-folder(server/recording sensing/core mcap wire/log server/config server/process server/hub server/arm server/messages)
+folder(server/recording sensing/core mcap wire wire/log server/config server/process server/hub server/arm server/messages)
 folder(server/replay sensing/core sensing/capture mcap wire wire/log server/process server/link server/arm)
 folder(server/rpc/requests sensing/core server/config server/security)
 folder(server/rpc/streams sensing/core sensing/capture mcap wire wire/log server/hub server/link server/events server/security

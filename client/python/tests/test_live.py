@@ -274,10 +274,11 @@ def test_the_history_has_what_came_before(server: servers.Server, touched: None,
     assert len(pressed.exposure_utc_ns) == len(pressed.total_force_n) > 0
     assert np.all(np.diff(pressed.exposure_utc_ns) > 0)
     assert pressed.exposure_utc_ns[-1] >= newest.times.exposure_utc_ns - 10**9
-    assert np.nanmax(idle.total_force_n) < 0.05 < np.nanmax(pressed.total_force_n)
+    assert np.nanmax(pressed.total_force_n) > 0.05
     contact = pressed.contacts[-1]
     assert contact.samples[-1] < len(pressed.exposure_utc_ns) and np.all(np.diff(contact.samples) > 0)
-    assert np.nanmax(contact.force_n) == pytest.approx(np.nanmax(pressed.total_force_n), rel=0.2)
+    strongest_n = max(np.max(each.force_n) for each in pressed.contacts)
+    assert strongest_n == pytest.approx(np.nanmax(pressed.total_force_n), rel=0.2)
     (only,) = client.force_history("idle")
     assert only.link == "idle"
     with pytest.raises(taclink.NotFound):
