@@ -66,7 +66,8 @@ std::vector<Finding> LookAtCameras() {
       findings.push_back({Verdict::kBad, "camera", camera.node + ": no permission",
                           "sudo usermod -aG video $USER, and log in again"});
     else
-      findings.push_back({Verdict::kBad, "camera", camera.node + ": " + std::generic_category().message(errno),
+      findings.push_back({Verdict::kBad, "camera",
+                          camera.node + ": " + std::generic_category().message(errno),
                           "end the program that uses it, or plug it in again"});
     if (!camera.usb_path.empty()) ++on_bus[camera.usb_path.substr(0, camera.usb_path.find('-'))];
   }
