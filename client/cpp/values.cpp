@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "wire/enum_names.h"
+#include "wire/magnitude.h"
 
 namespace taclink::client {
 namespace {
@@ -23,6 +24,18 @@ Vector3 ToArray(const v1::Vector3& vector) {
 
 double Norm(const v1::Vector3& vector) {
   return std::hypot(vector.x(), vector.y(), vector.z());
+}
+
+double MagnitudeN(const v1::Contact& contact) {
+  return wire::MagnitudeN(contact);
+}
+
+double MagnitudeN(const v1::ContactEvent& contact) {
+  return wire::MagnitudeN(contact);
+}
+
+double TotalMagnitudeN(const v1::LinkFrame& frame) {
+  return wire::TotalMagnitudeN(frame);
 }
 
 std::vector<Vector3> Points(const google::protobuf::RepeatedField<float>& numbers) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -72,6 +73,10 @@ struct Contact {
   /// A polygon round the loaded region on the deformed outer surface, counter-clockwise seen from outside;
   /// convex on the unrolled skin, a ring contact's cut open on the other side of `normal`. Empty: not known.
   std::vector<Vec3> outline_mm;
+
+  /// How strongly it acts on the skin, N: normal_force_n or |force_n|, the larger one. What presses from
+  /// opposite sides cancels in the resultant; what drags on the skin is not in the normal force.
+  double magnitude_n() const { return std::max(normal_force_n, force_n.norm()); }
 };
 
 }  // namespace taclink

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 
 #include "sensing/core/link_state_fields.h"
 
@@ -64,6 +65,13 @@ bool AreContactsCertain(const LinkState& state) {
   return state.measured() && state.has_forces() &&
          std::ranges::none_of(state.reasons,
                               [](const Reason& reason) { return TraitsOf(reason.id).doubts_contacts; });
+}
+
+double LinkState::total_magnitude_n() const {
+  if (!has_forces()) return std::numeric_limits<double>::quiet_NaN();
+  double sum = 0;
+  for (const Contact& contact : contacts) sum += contact.magnitude_n();
+  return sum;
 }
 
 void LinkState::ClearMeasurement() {

@@ -146,6 +146,8 @@ struct LinkState {
   bool has_forces() const {
     return (status == LinkStatus::kOk || status == LinkStatus::kDegraded) && forces.converged;
   }
+  /// Sum of the contacts' magnitudes, N; NaN: the forces are not known.
+  double total_magnitude_n() const;
   /// All fields of the measurement back to their defaults (see link_state_fields.h); buffers stay.
   void ClearMeasurement();
 };

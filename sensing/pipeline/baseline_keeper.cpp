@@ -15,7 +15,7 @@ constexpr int64_t kMostWaitedNs = 3'000'000'000;
 
 double StrongestLoad(const LinkState& state) {
   double strongest = 0;
-  for (const Contact& contact : state.contacts) strongest = std::max(strongest, contact.force_n.norm());
+  for (const Contact& contact : state.contacts) strongest = std::max(strongest, contact.magnitude_n());
   for (const Vec3& force : state.forces.forces_n) strongest = std::max(strongest, force.norm());
   return strongest;
 }

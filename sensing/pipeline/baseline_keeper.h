@@ -34,8 +34,8 @@ class BaselineKeeper {
 
   /// Errors: kFailedPrecondition (one is under way).
   Result<void> BeginTare(const TareOptions& options);
-  /// Restores the baseline before the last tare; TakeTareEnd tells. Errors: kFailedPrecondition (a
-  /// tare is under way, or there was none since the rest shape was taken).
+  /// Restores the baseline before the last tare; TakeTareEnd returns the result. Errors: kFailedPrecondition
+  /// (a tare is under way, or there was none since the rest shape was taken).
   Result<void> UndoTare(std::optional<SkinStage>& skin);
   void CancelTare();
   /// Its end will say why.

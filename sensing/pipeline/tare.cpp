@@ -37,7 +37,7 @@ TareCollector::TareCollector(const LinkModel& model, const TareOptions& options)
 
 std::optional<Error> TareCollector::Objection(const LinkState& state) const {
   for (const Contact& contact : state.contacts) {
-    const double force_n = contact.force_n.norm();
+    const double force_n = contact.magnitude_n();
     if (force_n < touched_n_) continue;
     return Refused("touched: a contact of " + Number("%.2f", force_n) +
                    " N at z = " + Number("%.0f", contact.center_mm.z()) +

@@ -14,10 +14,11 @@ KeyContact::Numbers NumbersAt(const SkinKey& from, const SkinKey& to, size_t con
 
 }  // namespace
 
-Result<std::unique_ptr<SimulatedSkin>> NonlinearSkin::Make(const LinkModel& model, const Scene& scene) {
+Result<std::unique_ptr<SimulatedSkin>> NonlinearSkin::Make(const LinkModel& model, const Scene& scene,
+                                                           const SceneProgress& progress) {
   auto plans = PlanContacts(model, scene);
   if (!plans) return plans.error();
-  SceneSolver solver(model, scene, *plans);
+  SceneSolver solver(model, scene, *plans, {}, progress);
   auto solved = solver.Solve();
   if (!solved) return solved.error();
   return std::unique_ptr<SimulatedSkin>(new NonlinearSkin(model, scene, std::move(*plans), solver.mesh(),

@@ -17,7 +17,8 @@ namespace taclink {
 class NonlinearSkin final : public SimulatedSkin {
  public:
   /// Errors: those of SimulatedSkin::Make.
-  static Result<std::unique_ptr<SimulatedSkin>> Make(const LinkModel& model, const Scene& scene);
+  static Result<std::unique_ptr<SimulatedSkin>> Make(const LinkModel& model, const Scene& scene,
+                                                     const SceneProgress& progress = {});
 
   void Evaluate(double time_s, SkinTruth& truth) override;
   void Handle(const Handling& handling) override { handling_ = handling; }

@@ -66,10 +66,11 @@ SkinLoad Blend(const SkinLoad& from, const SkinLoad& to, const std::vector<doubl
 }  // namespace
 
 SceneSolver::SceneSolver(const LinkModel& model, const Scene& scene, std::vector<ContactPlan> plans,
-                         const SceneTolerance& tolerance)
+                         const SceneTolerance& tolerance, SceneProgress progress)
     : model_(model),
       scene_(scene),
       tolerance_(tolerance),
+      progress_(std::move(progress)),
       skin_(model, scene.contacts.size(), {.refinement = scene.refinement, .spacing_mm = SpacingMm(scene)}),
       loads_(model, scene, std::move(plans), skin_.mesh()),
       rest_(skin_.Rest().state),
@@ -180,6 +181,7 @@ Result<void> SceneSolver::SolvePart(PlayedPart& part) {
   coarse.swap(part.keys);
   part.keys.push_back(coarse.front());
   for (size_t i = 0; i + 1 < coarse.size(); ++i) {
+    if (progress_) progress_(coarse[i].time_s / scene_.duration_s);
     if (auto good = Refine(part.part, coarse[i], coarse[i + 1], part.keys); !good) return good.error();
   }
   return {};

@@ -8,6 +8,7 @@
 #include "sensing/core/result.h"
 #include "sensing/simulation/played_scene.h"
 #include "sensing/simulation/scene.h"
+#include "sensing/simulation/simulated_skin.h"
 
 namespace taclink {
 
@@ -30,7 +31,7 @@ struct SolvedScene {
 class SceneSolver {
  public:
   SceneSolver(const LinkModel& model, const Scene& scene, std::vector<ContactPlan> plans,
-              const SceneTolerance& tolerance = {});
+              const SceneTolerance& tolerance = {}, SceneProgress progress = {});
 
   Result<SolvedScene> Solve();
 
@@ -77,6 +78,7 @@ class SceneSolver {
   LinkModel model_;
   Scene scene_;
   SceneTolerance tolerance_;
+  SceneProgress progress_;
   DiscSkin skin_;
   SceneLoads loads_;
   ShellState rest_;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -11,13 +12,17 @@
 
 namespace taclink {
 
+/// Is told how much of a scene is solved, from 0 to 1.
+using SceneProgress = std::function<void(double share)>;
+
 /// A skin on which a scene plays. All that takes long is done at construction.
 class SimulatedSkin {
  public:
   /// The skin that the scene asks for. Errors: kInvalidArgument (a contact that is not on this model),
   /// kFailedPrecondition (the nonlinear skin has no equilibrium for what the scene does, or leaves it in a
   /// jump); with the scene's file and line.
-  static Result<std::unique_ptr<SimulatedSkin>> Make(const LinkModel& model, const Scene& scene);
+  static Result<std::unique_ptr<SimulatedSkin>> Make(const LinkModel& model, const Scene& scene,
+                                                     const SceneProgress& progress = {});
 
   virtual ~SimulatedSkin() = default;
 

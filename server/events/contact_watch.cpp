@@ -35,7 +35,7 @@ ContactWatch::Track& ContactWatch::TrackOf(const Contact& contact) {
 
 bool ContactWatch::UpdateIsDue(const Track& track, int64_t now_ns) const {
   if (now_ns - track.told_ns < Ns(1 / options_.update_rate_hz)) return false;
-  const double change_n = std::abs(track.contact.force_n.norm() - track.told_n);
+  const double change_n = std::abs(track.contact.magnitude_n() - track.told_n);
   return change_n >= std::max(kLeastChangeN, kLeastChangePart * track.told_n) ||
          (track.contact.center_mm - track.told_mm).norm() >= kLeastMoveMm;
 }
@@ -43,7 +43,7 @@ bool ContactWatch::UpdateIsDue(const Track& track, int64_t now_ns) const {
 void ContactWatch::Tell(EventKind kind, Track& track, int64_t now_ns, std::vector<Told>& told) const {
   const Contact& contact = track.contact;
   track.told_ns = now_ns;
-  track.told_n = contact.force_n.norm();
+  track.told_n = contact.magnitude_n();
   track.told_mm = contact.center_mm;
   told.push_back({kind,
                   {.id = track.id,
@@ -62,7 +62,7 @@ void ContactWatch::Match(const Contact& contact, int64_t now_ns) {
   track.seen = true;
   track.contact = contact;
   track.contact.markers.clear();
-  const double force_n = contact.force_n.norm();
+  const double force_n = contact.magnitude_n();
   track.peak_n = std::max(track.peak_n, force_n);
   if (force_n >= options_.end_n) track.strong_ns = now_ns;
 }
@@ -96,7 +96,7 @@ void ContactWatch::Take(const LinkState& state, std::vector<Told>& told) {
   for (Track& track : tracks_) {
     if (track.begun && track.seen && UpdateIsDue(track, now_ns)) {
       Tell(EventKind::kContactUpdate, track, now_ns, told);
-    } else if (!track.begun && track.seen && is_certain && track.contact.force_n.norm() >= options_.begin_n) {
+    } else if (!track.begun && track.seen && is_certain && track.contact.magnitude_n() >= options_.begin_n) {
       track.begun = true;
       track.begin_ns = now_ns;
       Tell(EventKind::kContactBegin, track, now_ns, told);

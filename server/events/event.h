@@ -36,7 +36,7 @@ struct ContactDetail {
   uint64_t id = 0;  ///< the contact's in the frame that began it; lasts
   Vec3 center_mm = Vec3::Zero(), normal = Vec3::Zero(), force_n = Vec3::Zero();
   double normal_force_n = 0;
-  double peak_n = 0;       ///< largest force until now
+  double peak_n = 0;       ///< largest magnitude until now
   double duration_s = 0;   ///< since it began
   std::string end_reason;  ///< of an end: "released" or "new baseline"
 };
@@ -44,7 +44,7 @@ struct ContactDetail {
 struct ForceLevelDetail {
   std::string region;  ///< empty: the whole link
   ForceLevel level = ForceLevel::kNormal, previous = ForceLevel::kNormal;
-  double force_n = 0;       ///< of the strongest contact there
+  double force_n = 0;       ///< magnitude of the strongest contact there
   Thresholds thresholds;    ///< that were in force
   uint64_t contact_id = 0;  ///< in the frame; 0: none
   Vec3 center_mm = Vec3::Zero();

@@ -9,14 +9,16 @@ std::vector<bool> MarkersOf(const Region& region, const MarkerGrid& grid) {
 }
 
 double ForceWatch::ForceOf(const Contact& contact, const LinkState& state) const {
-  if (markers_.empty()) return contact.force_n.norm();
-  Vec3 within = Vec3::Zero();
+  if (markers_.empty()) return contact.magnitude_n();
+  double within = 0, all = 0;
   for (const int marker : contact.markers) {
     const auto m = static_cast<size_t>(marker);
-    if (m < markers_.size() && markers_[m] && m < state.forces.forces_n.size())
-      within += state.forces.forces_n[m];
+    if (m >= markers_.size() || m >= state.forces.forces_n.size()) continue;
+    const double load = state.forces.forces_n[m].norm();
+    all += load;
+    if (markers_[m]) within += load;
   }
-  return within.norm();
+  return all > 0 ? within / all * contact.magnitude_n() : 0;
 }
 
 ForceLevel ForceWatch::LevelAt(double force_n) const {

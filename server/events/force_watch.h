@@ -9,8 +9,8 @@
 
 namespace taclink::server {
 
-/// Which force level a link, or a region of it, is at. What counts is the strongest contact, as far as it
-/// lies there. While nothing is measured the level stays.
+/// Which force level a link, or a region of it, is at. What counts is the magnitude of the strongest
+/// contact, by the share of its load that lies there. While nothing is measured the level stays.
 class ForceWatch {
  public:
   /// No region: the whole link.

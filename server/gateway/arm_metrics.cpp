@@ -102,12 +102,12 @@ void AddArmMetrics(const Arm& arm, MetricsText& metrics) {
                        ? static_cast<double>(latest->state().contacts.size())
                        : std::nan("");
           });
-  AddEach(arm, metrics.Gauge("taclink_link_total_force_newtons", "Size of the sum of all contact forces"),
+  AddEach(arm,
+          metrics.Gauge("taclink_link_total_magnitude_newtons",
+                        "Sum of the contacts' magnitudes; NaN: not known"),
           [&](size_t link) {
             const auto latest = arm.hub().Latest(link);
-            if (!latest) return std::nan("");
-            const LinkState& state = latest->state();
-            return state.has_forces() ? state.total_force_n.norm() : std::nan("");
+            return latest ? latest->state().total_magnitude_n() : std::nan("");
           });
   AddStatus(arm, metrics);
   AddSupervision(arm, metrics);

@@ -1,6 +1,7 @@
 #include "server/hub/deadband.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace taclink::server {
 namespace {
@@ -16,13 +17,17 @@ bool Below(const Vec3& change, double limit) {
   return change.squaredNorm() < limit * limit;
 }
 
+// A change of its magnitude alone counts, too: the resultant of a ring contact is always about zero.
 bool ForcesWithin(double force_n, const LinkState& before, const LinkState& now) {
   for (const Contact& contact : now.contacts) {
     const Contact* old = Find(before, contact.id);
-    if (!Below(old ? Vec3(contact.force_n - old->force_n) : contact.force_n, force_n)) return false;
+    const Vec3 change = old ? Vec3(contact.force_n - old->force_n) : contact.force_n;
+    const double magnitude_n = contact.magnitude_n() - (old ? old->magnitude_n() : 0);
+    if (!Below(change, force_n) || !(std::abs(magnitude_n) < force_n)) return false;
   }
-  return std::all_of(before.contacts.begin(), before.contacts.end(),
-                     [&](const Contact& old) { return Find(now, old.id) || Below(old.force_n, force_n); });
+  return std::ranges::all_of(before.contacts, [&](const Contact& old) {
+    return Find(now, old.id) != nullptr || old.magnitude_n() < force_n;
+  });
 }
 
 bool MarkersWithin(double move_mm, const LinkState& before, const LinkState& now) {

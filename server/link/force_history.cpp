@@ -12,7 +12,7 @@ void Write(const LinkState& state, double total_n, ForceSample& out) {
   out.contacts = 0;
   for (const Contact& contact : state.contacts) {
     if (out.contacts == ForceSample::kMostContacts) return;
-    out.contacts_n[out.contacts++] = {contact.id, contact.force_n.norm()};
+    out.contacts_n[out.contacts++] = {contact.id, contact.magnitude_n()};
   }
 }
 
@@ -20,8 +20,7 @@ void Write(const LinkState& state, double total_n, ForceSample& out) {
 
 void ForceHistory::Add(const LinkState& state) {
   if (state.times.exposure_utc_ns == 0) return;
-  const double total_n =
-      state.has_forces() ? state.total_force_n.norm() : std::numeric_limits<double>::quiet_NaN();
+  const double total_n = state.total_magnitude_n();
   const int64_t bin = state.times.exposure_utc_ns / kBinNs;
   const std::lock_guard lock(mutex_);
   if (!ring_.empty() && bin == bin_) {

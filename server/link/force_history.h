@@ -15,13 +15,14 @@ namespace taclink::server {
 struct ForceSample {
   static constexpr size_t kMostContacts = 8;
 
-  int64_t exposure_utc_ns = 0;                                             ///< since 1970-01-01
-  double total_n = std::numeric_limits<double>::quiet_NaN();               ///< NaN: not measured
-  std::array<std::pair<uint64_t, double>, kMostContacts> contacts_n = {};  ///< ids and forces; the first ones
+  int64_t exposure_utc_ns = 0;                                ///< since 1970-01-01
+  double total_n = std::numeric_limits<double>::quiet_NaN();  ///< LinkState::total_magnitude_n
+  std::array<std::pair<uint64_t, double>, kMostContacts> contacts_n =
+      {};  ///< ids and magnitudes; the first ones
   size_t contacts = 0;
 };
 
-/// The forces of the last minutes of a link: of each kBinNs the frame with the largest total force. One
+/// The forces of the last minutes of a link: of each kBinNs the frame with the largest total magnitude. One
 /// thread adds, any may read.
 class ForceHistory {
  public:

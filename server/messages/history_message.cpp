@@ -19,15 +19,15 @@ void Fill(const std::vector<ForceSample>& samples, v1::LinkForceHistory& out) {
   std::map<uint64_t, v1::ContactForceHistory*> contacts;
   for (size_t i = 0; i < samples.size(); ++i) {
     out.add_exposure_utc_ns(samples[i].exposure_utc_ns);
-    out.add_total_force_n(static_cast<float>(samples[i].total_n));
-    for (const auto& [id, force_n] : std::span(samples[i].contacts_n).first(samples[i].contacts)) {
+    out.add_total_magnitude_n(static_cast<float>(samples[i].total_n));
+    for (const auto& [id, magnitude_n] : std::span(samples[i].contacts_n).first(samples[i].contacts)) {
       v1::ContactForceHistory*& contact = contacts[id];
       // A link that was started again numbers its contacts from 1.
       const bool is_other =
           contact != nullptr && samples[i].exposure_utc_ns - NewestNs(*contact, out) > kApartNs;
       if (contact == nullptr || is_other) (contact = out.add_contacts())->set_id(id);
       contact->add_samples(static_cast<uint32_t>(i));
-      contact->add_force_n(static_cast<float>(force_n));
+      contact->add_magnitude_n(static_cast<float>(magnitude_n));
     }
   }
 }

@@ -49,14 +49,13 @@ void LogDigest::Take(const std::string& link, const LinkModel& model, const Link
       static_cast<size_t>(std::max<int64_t>(0, log_utc_ns - begin_utc_ns_) / kSecondNs), kMostSeconds - 1);
   if (peaks_n_.size() <= second) peaks_n_.resize(second + 1, kNoPeak);
   if (!state.has_forces()) return;
-  peaks_n_[second] = Larger(peaks_n_[second], static_cast<float>(state.total_force_n.norm()));
+  peaks_n_[second] = Larger(peaks_n_[second], static_cast<float>(state.total_magnitude_n()));
   for (const Contact& contact : state.contacts) {
-    const double force_n = contact.is_ring_contact ? contact.normal_force_n : contact.force_n.norm();
-    if (!(force_n > strongest_.force_n())) continue;
+    if (!(contact.magnitude_n() > strongest_.magnitude_n())) continue;
     strongest_.Clear();
     strongest_.set_link(link);
     strongest_.set_log_utc_ns(log_utc_ns);
-    strongest_.set_force_n(force_n);
+    strongest_.set_magnitude_n(contact.magnitude_n());
     strongest_.set_is_ring_contact(contact.is_ring_contact);
     if (!contact.is_ring_contact)
       strongest_.set_angle_rad(std::atan2(contact.center_mm.y(), contact.center_mm.x()));
@@ -72,9 +71,9 @@ v1::LogSummary LogDigest::Summary() const {
     float peak_n = kNoPeak;
     for (size_t i = part * peaks_n_.size() / parts; i < (part + 1) * peaks_n_.size() / parts; ++i)
       peak_n = Larger(peak_n, peaks_n_[i]);
-    summary.add_peak_force_n(peak_n);
+    summary.add_peak_magnitude_n(peak_n);
   }
-  if (strongest_.force_n() > 0) *summary.mutable_strongest() = strongest_;
+  if (strongest_.magnitude_n() > 0) *summary.mutable_strongest() = strongest_;
   return summary;
 }
 

@@ -1,8 +1,7 @@
 """Pages say what reports hold: check_accuracy.py ROOT
 
-docs/measurements.md's table of forces is that of tests/accuracy/report.csv; README's numbers are those of the report, of
-docs/reports/vision-accuracy.md and of docs/measurements.md's table of time; README is short. Every number of
-docs/guides/judge.md is that of the report that STATED names for it.
+docs/measurements.md's table of forces is that of tests/accuracy/report.csv. What STATED names of README and of
+docs/guides/judge.md has the numbers of its report; the latter states no other numbers. README is short.
 """
 
 import collections
@@ -12,7 +11,9 @@ import re
 import sys
 
 root = pathlib.Path(sys.argv[1])
+README = "README.md"
 README_LINES = 90
+JUDGE = "docs/guides/judge.md"
 ROWS = {  # of the report, and in the table
     "exact": "exact",
     "noise": "0.1 mm of noise",
@@ -39,65 +40,76 @@ def cells(number):
 UNDISTURBED = r"### Nothing is wrong with the link .*?\| all \| "
 MEDIAN_P99 = rf"([\d.]+) \| {CELL}([\d.]+) \| "
 
-# What docs/guides/judge.md states; the report; where that has the numbers. Both texts with single spaces.
-STATED = (
-    ("fitted to {} probe forces", CALCULIX, r"to the (\w+) probe forces under pressure"),
-    ("these forces with {} % mean error, {} % at worst", MEASUREMENTS, r"MPa\): ([\d.]+) % mean error, ([\d.]+) % at worst"),
-    ("{} % mean error, {} % at worst", CALCULIX, r"with it, and the largest \| \*\*([\d.]+) %\*\*, ([\d.]+) % \|"),
-    ("on another day differed by {} to {} %", CALCULIX, r"same push on another day differed by (\d+) to (\d+) %"),
-    ("In one real image {} of {} markers", MEASUREMENTS, r"real picture of a barrel link (\d+) of (\d+) markers"),
-    ("within {} % or {} N, each center within {} mm, and nothing else is above {} N", MEASUREMENTS,
-     r"within (\d+) % or ([\d.]+) N as a vector .*?, each center within (\d+) mm, and nothing else is above ([\d.]+) N"),
-    ("Images of {} solids:", MEASUREMENTS, r"Markers of (\d+) scenes of three-dimensional solids"),
-    ("solids: {} hold, {} are reported, {} are silently wrong", MEASUREMENTS,
-     r"\| images of the solids \| (\d+) \| (\d+) \| (\d+) \|"),
-    ("Markers with {} mm of noise: {} hold, {} are silently wrong", MEASUREMENTS,
-     rf"\| ([\d.]+) mm of noise \| (\d+) \| {CELL}(\d+) \|"),
-    ("without a fault: {1} % of {0} frames are right", WHOLE, rf"Of the {COUNT} undisturbed frames ([\d.]+) % are right"),
-    ("{} of {} `ok` frames are silently wrong", WHOLE,
-     rf"of both skins, {COUNT} of {COUNT} `ok` frames \([\d.]+ %\) are silently wrong"),
-    ("With injected faults: {} of {} are, {} of these", WHOLE,
-     rf"With a fault it is {COUNT} of {COUNT}: {COUNT} are the swapped barrel"),
-    ("within {} % down to {} mm, a {} too small from {} mm on", WHOLE,
-     r"forces are within (\d+) % down to dents of (\d+) mm \(.*?\), and a (\w+) too small from (\d+) mm on"),
-    ("Squeezes all around: {} % of frames", WHOLE, r"Of hugs and squeezes all around, ([\d.]+) % \("),
-    ("without a fault, {} % of force vectors", WHOLE, rf"{UNDISTURBED}{cells(5)}([\d.]+) % \|"),
-    ("Contact centers: {} mm median error, {} mm at the", FORCE,
-     rf"### All scenes, noise of .*?\| auto \| cylinder \| default \| {cells(5)}([\d.]+) / ([\d.]+) \|"),
-    ("95th percentile, with {} mm of noise;", FORCE, r"### All scenes, noise of ([\d.]+) mm "),
-    ("{} mm (cylinder)", VISION, r"\| tracked \| cylinder \| ([\d.]+) \|"),
-    ("{} mm (barrel)", VISION, r"\| tracked \| barrel \| ([\d.]+) \|"),
-    ("over {} rendered scenes", VISION, r"(\d+) scenes, \d+ stereo pairs after the rest frames"),
-    ("at worst {} mm, beside a deep dent", MEASUREMENTS, r"the worst marker of all is ([\d.]+) mm off, beside a deep dent"),
-    ("on a shared {}-core machine", MEASUREMENTS, r"On a shared (\d+)-core machine"),
-    ("untouched {} and {} ms", MEASUREMENTS, rf"\| untouched \| {MEDIAN_P99}"),
-    ("slow press {} and {} ms", MEASUREMENTS, rf"\| a press, slowly \| {MEDIAN_P99}"),
-    ("stroke at {} mm/s {} and {} ms", MEASUREMENTS, rf"\| a stroke at (100) mm/s \| {MEDIAN_P99}"),
-    ("short taps {} and {} ms", MEASUREMENTS, rf"\| taps of a tenth of a second \| {MEDIAN_P99}"),
-    ("{} links {} and {} ms with {} % of the exposures skipped", MEASUREMENTS,
-     rf"\| (\w+) links \(.*?\) \| {MEDIAN_P99}{CELL}(\d+) % \|"),
-    ("is found {} times in {}", WHOLE, r"those that were found: it says (\d+) of (\d+)"),
-    ("{} % were found without a fault", WHOLE, rf"{UNDISTURBED}{cells(6)}([\d.]+) % \|"),
-    ("{} % with faults", WHOLE, rf"### Faults .*?\| all \| {cells(6)}([\d.]+) % \|"),
-    ("there, {2} N of a body of {0} to {1} mm", WHOLE,
-     r"A body of (\d+) to (\d+) mm that presses between the clamp and the first ring with ([\d.]+) N on a slack skin"),
-    ("up to {} of the force is not found", WHOLE, r"up to (\w+) of its force is not found"),
-    ("With a modulus {} % too high at {} kPa, {} % of frames are `ok`, but only {} % are right", WHOLE,
-     rf"\| E configured (\d+) % too high, ([\d.]+) kPa \| {CELL}([\d.]+) % \| {CELL}([\d.]+) % \|"),
-    ("On a slack skin that becomes {} K warmer", WHOLE, r"A skin that is (\d+) K warmer"),
-    ("only {} % of frames are right, though `ok`", WHOLE, r"but only (\d+) % of its frames are right"),
-    ("A failed camera is reported within a {}", "docs/faults.md", r"it says so within a (\w+) and names the camera"),
-)
+SOLIDS = r"Markers of (\d+) scenes of three-dimensional solids"
+SOLIDS_ROW = r"\| images of the solids \| (\d+) \| (\d+) \| (\d+) \|"
+CYLINDER, BARREL = (rf"\| tracked \| {skin} \| ([\d.]+) \|" for skin in ("cylinder", "barrel"))
+SCENES = r"(\d+) scenes, \d+ stereo pairs after the rest frames"
+PRESS, UNTOUCHED = (rf"\| {row} \| {MEDIAN_P99}" for row in ("a press, slowly", "untouched"))
+
+# By page what it states; the report; where that has the numbers. All texts with single spaces.
+STATED = {
+    README: (
+        ("of {} scenes of three-dimensional solids", MEASUREMENTS, SOLIDS),
+        ("forces of {} hold", MEASUREMENTS, SOLIDS_ROW),
+        ("{2} are silently wrong", MEASUREMENTS, SOLIDS_ROW),
+        ("{} mm (cylinder)", VISION, CYLINDER),
+        ("{} mm (barrel)", VISION, BARREL),
+        ("over {} rendered scenes", VISION, SCENES),
+        ("{} ms median", MEASUREMENTS, PRESS),
+        ("{} ms untouched", MEASUREMENTS, UNTOUCHED),
+    ),
+    JUDGE: (
+        ("fitted to {} probe forces", CALCULIX, r"to the (\w+) probe forces under pressure"),
+        ("these forces with {} % mean error, {} % at worst", MEASUREMENTS, r"MPa\): ([\d.]+) % mean error, ([\d.]+) % at worst"),
+        ("{} % mean error, {} % at worst", CALCULIX, r"with it, and the largest \| \*\*([\d.]+) %\*\*, ([\d.]+) % \|"),
+        ("on another day differed by {} to {} %", CALCULIX, r"same push on another day differed by (\d+) to (\d+) %"),
+        ("In one real image {} of {} markers", MEASUREMENTS, r"real picture of a barrel link (\d+) of (\d+) markers"),
+        ("within {} % or {} N, each center within {} mm, and nothing else is above {} N", MEASUREMENTS,
+         r"within (\d+) % or ([\d.]+) N as a vector .*?, each center within (\d+) mm, and nothing else is above ([\d.]+) N"),
+        ("Images of {} solids:", MEASUREMENTS, SOLIDS),
+        ("solids: {} hold, {} are reported, {} are silently wrong", MEASUREMENTS, SOLIDS_ROW),
+        ("Markers with {} mm of noise: {} hold, {} are silently wrong", MEASUREMENTS,
+         rf"\| ([\d.]+) mm of noise \| (\d+) \| {CELL}(\d+) \|"),
+        ("without a fault: {1} % of {0} frames are right", WHOLE, rf"Of the {COUNT} undisturbed frames ([\d.]+) % are right"),
+        ("{} of {} `ok` frames are silently wrong", WHOLE,
+         rf"of both skins, {COUNT} of {COUNT} `ok` frames \([\d.]+ %\) are silently wrong"),
+        ("With injected faults: {} of {} are silently wrong, {} with", WHOLE,
+         rf"With a fault it is {COUNT} of {COUNT}: {COUNT} are the swapped barrel"),
+        ("within {} % down to {} mm, a {} too small from {} mm on", WHOLE,
+         r"forces are within (\d+) % down to dents of (\d+) mm \(.*?\), and a (\w+) too small from (\d+) mm on"),
+        ("Squeezes all around: {} % of frames", WHOLE, r"Of hugs and squeezes all around, ([\d.]+) % \("),
+        ("without a fault, {} % of force vectors", WHOLE, rf"{UNDISTURBED}{cells(5)}([\d.]+) % \|"),
+        ("Contact centers: {} mm median error, {} mm at the", FORCE,
+         rf"### All scenes, noise of .*?\| auto \| cylinder \| default \| {cells(5)}([\d.]+) / ([\d.]+) \|"),
+        ("95th percentile, with {} mm of noise;", FORCE, r"### All scenes, noise of ([\d.]+) mm "),
+        ("{} mm (cylinder)", VISION, CYLINDER),
+        ("{} mm (barrel)", VISION, BARREL),
+        ("over {} rendered scenes", VISION, SCENES),
+        ("at worst {} mm, beside a deep dent", MEASUREMENTS, r"the worst marker of all is ([\d.]+) mm off, beside a deep dent"),
+        ("on a shared {}-core machine", MEASUREMENTS, r"On a shared (\d+)-core machine"),
+        ("untouched {} and {} ms", MEASUREMENTS, UNTOUCHED),
+        ("slow press {} and {} ms", MEASUREMENTS, PRESS),
+        ("stroke at {} mm/s {} and {} ms", MEASUREMENTS, rf"\| a stroke at (100) mm/s \| {MEDIAN_P99}"),
+        ("short taps {} and {} ms", MEASUREMENTS, rf"\| taps of a tenth of a second \| {MEDIAN_P99}"),
+        ("{} links {} and {} ms with {} % of the exposures skipped", MEASUREMENTS,
+         rf"\| (\w+) links \(.*?\) \| {MEDIAN_P99}{CELL}(\d+) % \|"),
+        ("is found {} times in {}", WHOLE, r"those that were found: it says (\d+) of (\d+)"),
+        ("{} % were found without a fault", WHOLE, rf"{UNDISTURBED}{cells(6)}([\d.]+) % \|"),
+        ("{} % with faults", WHOLE, rf"### Faults .*?\| all \| {cells(6)}([\d.]+) % \|"),
+        ("there, {2} N of a body of {0} to {1} mm", WHOLE,
+         r"A body of (\d+) to (\d+) mm that presses between the clamp and the first ring with ([\d.]+) N on a slack skin"),
+        ("up to {} of the force is not found", WHOLE, r"up to (\w+) of its force is not found"),
+        ("With a modulus {} % too high at {} kPa, {} % of frames are `ok`, but only {} % are right", WHOLE,
+         rf"\| E configured (\d+) % too high, ([\d.]+) kPa \| {CELL}([\d.]+) % \| {CELL}([\d.]+) % \|"),
+        ("On a slack skin that becomes {} K warmer", WHOLE, r"A skin that is (\d+) K warmer"),
+        ("only {} % of frames are right, though `ok`", WHOLE, r"but only (\d+) % of its frames are right"),
+        ("A failed camera is reported within a {}", "docs/faults.md", r"it says so within a (\w+) and names the camera"),
+    ),
+}
 
 
 def page(name):
     return (root / name).read_text(encoding="utf-8")
-
-
-def number(name, pattern):
-    """The number that a page gives; none: empty."""
-    found = re.search(pattern, page(name), re.M)
-    return found.group(1) if found else ""
 
 
 with open(root / "tests/accuracy/report.csv", encoding="utf-8") as file:
@@ -112,39 +124,24 @@ for name, label in ROWS.items():
     if not re.search("^" + re.escape(line) + "$", table, re.M):
         wrong.append(f"docs/measurements.md lacks the line: {line}")
 
-scenes = sum(count for (name, _), count in counts.items() if name == "images")
-vision = r"^\| tracked \| {} \| ([\d.]+) \|"
-time = r"^\| {} \| ([\d.]+) \|"
-readme = " ".join(page("README.md").split())
-for phrase in (
-    f"of {scenes} scenes of three-dimensional solids",
-    f"forces of {counts['images', 'holds']} hold",
-    f"{counts['images', 'silent']} are silently wrong",
-    number("docs/reports/vision-accuracy.md", vision.format("cylinder")) + " mm (cylinder)",
-    number("docs/reports/vision-accuracy.md", vision.format("barrel")) + " mm (barrel)",
-    number("docs/measurements.md", time.format("a press, slowly")) + " ms median",
-    number("docs/measurements.md", time.format("untouched")) + " ms untouched",
-):
-    if phrase not in readme:
-        wrong.append(f"README lacks: {phrase}")
-if (lines := page("README.md").count("\n")) > README_LINES:
+if (lines := page(README).count("\n")) > README_LINES:
     wrong.append(f"README has {lines} lines: more than {README_LINES}; move reference text to docs")
 
-judge = page("docs/guides/judge.md")
-judge = " ".join(re.sub(r"\]\([^)]*\)", "]", judge).split())  # without the targets of links
-checked = [False] * len(judge)
-for stated, report, pattern in STATED:
-    found = re.search(pattern, " ".join(page(report).split()))
-    phrase = stated.format(*map(str.strip, found.groups())) if found else ""
-    place = judge.find(phrase) if found else -1
-    if not found:
-        wrong.append(f"{report} lacks what docs/guides/judge.md states of it: {stated}")
-    elif place < 0:
-        wrong.append(f"docs/guides/judge.md lacks, as {report} has it: {phrase}")
-    else:
-        checked[place : place + len(phrase)] = [True] * len(phrase)
-for found in re.finditer(r"(?<!\w)\d", judge):
-    if not checked[found.start()]:
-        wrong.append(f"docs/guides/judge.md states a number that STATED lacks: {judge[found.start() - 30 : found.end() + 30]}")
+for name, statements in STATED.items():
+    text = " ".join(re.sub(r"\]\([^)]*\)", "]", page(name)).split())  # without the targets of links
+    checked = [False] * len(text)
+    for stated, report, pattern in statements:
+        found = re.search(pattern, " ".join(page(report).split()))
+        phrase = stated.format(*map(str.strip, found.groups())) if found else ""
+        place = text.find(phrase) if found else -1
+        if not found:
+            wrong.append(f"{report} lacks what {name} states of it: {stated}")
+        elif place < 0:
+            wrong.append(f"{name} lacks, as {report} has it: {phrase}")
+        else:
+            checked[place : place + len(phrase)] = [True] * len(phrase)
+    for found in re.finditer(r"(?<!\w)\d", text if name == JUDGE else ""):
+        if not checked[found.start()]:
+            wrong.append(f"{name} states a number that STATED lacks: {text[found.start() - 30 : found.end() + 30]}")
 print(*wrong or ["the pages say what the reports hold"], sep="\n")
 sys.exit(bool(wrong))

@@ -233,15 +233,15 @@ TEST_F(LinkCallsTest, TheHistoryHasTheFramesOfBefore) {
   const v1::LinkForceHistory& link = history.links(0);
   EXPECT_EQ(link.link(), "upper");
   EXPECT_EQ(link.exposure_utc_ns(0), kBegin + 500'000'000);
-  EXPECT_THAT(link.total_force_n(), ElementsAre(0.1F, 0.2F, 0.3F, 0.4F));
+  EXPECT_THAT(link.total_magnitude_n(), ElementsAre(0.1F, 0.2F, 0.3F, 0.4F));
   ASSERT_EQ(link.contacts_size(), 1);
   EXPECT_EQ(link.contacts(0).id(), 7u);
   EXPECT_THAT(link.contacts(0).samples(), ElementsAre(0, 1, 2, 3));
-  EXPECT_THAT(link.contacts(0).force_n(), ElementsAre(0.1F, 0.2F, 0.3F, 0.4F));
+  EXPECT_THAT(link.contacts(0).magnitude_n(), ElementsAre(0.1F, 0.2F, 0.3F, 0.4F));
   request.set_span_s(0.7);
   history.Clear();
   ASSERT_TRUE(ask().ok());
-  EXPECT_THAT(history.links(0).total_force_n(), ElementsAre(0.3F, 0.4F));
+  EXPECT_THAT(history.links(0).total_magnitude_n(), ElementsAre(0.3F, 0.4F));
   request.set_span_s(301);
   EXPECT_EQ(ask().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   request.set_span_s(3);

@@ -161,11 +161,11 @@ TEST_F(RecordingTest, ItsSummaryShowsWhenAndWhereItWasPressedMost) {
   ASSERT_TRUE(logs.ok() && logs->logs_size() == 1);
   ASSERT_TRUE(logs->logs(0).has_summary());
   const v1::LogSummary& summary = logs->logs(0).summary();
-  EXPECT_THAT(summary.peak_force_n(), ElementsAre(0.2F, 0.9F));
+  EXPECT_THAT(summary.peak_magnitude_n(), ElementsAre(0.2F, 0.9F));
   const v1::StrongestContact& strongest = summary.strongest();
   EXPECT_EQ(strongest.link(), "upper");
   EXPECT_EQ(strongest.log_utc_ns(), kUtc + 1'000'000'000);
-  EXPECT_NEAR(strongest.force_n(), 0.9, 1e-12);
+  EXPECT_NEAR(strongest.magnitude_n(), 0.9, 1e-12);
   EXPECT_FALSE(strongest.is_ring_contact());
   EXPECT_NEAR(strongest.angle_rad(), 0, 1e-12);
   EXPECT_NEAR(strongest.z_m(), 0.009, 1e-12);

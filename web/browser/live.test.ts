@@ -256,9 +256,11 @@ describe("the time line", () => {
     // Back to when it was pressed: pictures, numbers and arrow are of then, and stay.
     const track = page.locator(".track");
     await track.focus();
+    const shown = () => track.getAttribute("aria-valuetext");
     for (let second = 0; second < 20 && (await forceN()) < 0.05; ++second) {
+      const before = await shown();
       await page.keyboard.press("ArrowLeft");
-      await page.waitForTimeout(250);
+      await expect.poll(shown).not.toBe(before);
     }
     const thenN = await forceN();
     expect(thenN).toBeGreaterThan(0.05);

@@ -29,7 +29,7 @@ class Progress {
 /// "14 s", "3 min 20 s", "2 h 5 min".
 std::string TimeLeftText(double seconds);
 
-/// Seconds that are left where a share from 0 to 1 took so many.
+/// Time that the rest takes at the same speed, s; `share`: what is done, from 0 to 1, in `spent_s`.
 double SecondsLeft(double share, double spent_s);
 
 }  // namespace taclink::command

@@ -28,7 +28,7 @@ std::string ContactText(const v1::ContactEvent& contact) {
   if (!contact.end_reason().empty())
     return fmt::format("contact {}: {} after {:.2f} s, at most {:.3f} N", contact.contact_id(),
                        contact.end_reason(), contact.duration_s(), contact.peak_force_n());
-  return fmt::format("contact {}: {:.3f} N at {}", contact.contact_id(), client::Norm(contact.force_n()),
+  return fmt::format("contact {}: {:.3f} N at {}", contact.contact_id(), client::MagnitudeN(contact),
                      Place(contact.center_m()));
 }
 
@@ -79,7 +79,7 @@ Json ContactDetail(const v1::Event& event) {
   const v1::ContactEvent& contact = event.contact();
   Json json = {{"frame", event.frame_sequence()},
                {"contact_id", contact.contact_id()},
-               {"force_n", client::Norm(contact.force_n())},
+               {"force_n", client::MagnitudeN(contact)},
                {"center_mm", ToJson(contact.center_m(), kMmPerMetre)},
                {"force_vector_n", ToJson(contact.force_n())},
                {"peak_force_n", contact.peak_force_n()},

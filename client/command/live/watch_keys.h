@@ -20,7 +20,7 @@ class WatchKeys {
   bool ends() const { return ends_; }
   /// What came of the last key, or what is asked; for people. Empty: nothing.
   const std::string& message() const { return message_; }
-  /// What keys there are; empty: there is no keyboard.
+  /// One line that lists the keys; empty: input is not a terminal.
   std::string Help() const;
 
  private:

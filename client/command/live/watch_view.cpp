@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "client/command/cli/terminal_style.h"
 #include "client/cpp/taclink/values.h"
@@ -45,18 +44,15 @@ double RoundUp(double value) {
   return top;
 }
 
-double TotalN(const v1::LinkFrame& frame) {
-  return frame.has_total_force_n() ? client::Norm(frame.total_force_n())
-                                   : std::numeric_limits<double>::quiet_NaN();
-}
-
 std::string Force(const v1::Contact& contact) {
   const v1::Vector3& f = contact.force_n();
-  return fmt::format("{:5.2f} N ({:5.2f}, {:5.2f}, {:5.2f})", client::Norm(f), f.x(), f.y(), f.z());
+  return fmt::format("{:5.2f} N ({:5.2f}, {:5.2f}, {:5.2f})", client::MagnitudeN(contact), f.x(), f.y(),
+                     f.z());
 }
 
 std::string Total(const v1::LinkFrame& frame) {
-  return frame.has_total_force_n() ? fmt::format("{:.2f} N", client::Norm(frame.total_force_n())) : "-";
+  const double total_n = client::TotalMagnitudeN(frame);
+  return std::isnan(total_n) ? "-" : fmt::format("{:.2f} N", total_n);
 }
 
 }  // namespace
@@ -79,14 +75,14 @@ void LiveView::Count(LinkView& view, steady_clock::time_point now) const {
   }
   if (now - view.sampled < kSample) return;
   view.sampled = now;
-  view.forces_n.push_back(TotalN(view.frame));
+  view.forces_n.push_back(client::TotalMagnitudeN(view.frame));
   if (view.forces_n.size() > kSamples) view.forces_n.pop_front();
 }
 
 std::string LiveView::Row(const LinkView& view, size_t name_width, double top_n) const {
   const v1::LinkFrame& frame = view.frame;
   const std::string status = fmt::format("{:<11}", client::Name(frame.status()));
-  const std::string bar = Bar(TotalN(frame) / top_n, kBarCharacters);
+  const std::string bar = Bar(client::TotalMagnitudeN(frame) / top_n, kBarCharacters);
   const std::string latency = view.latency_s ? fmt::format("{:.1f} ms", *view.latency_s * 1e3) : "-";
   return fmt::format("{:<{}}  {} {:>7} {} {:<{}}  {:5.1f}/s {:>8}  {}+{}  {}", Printable(frame.link()),
                      name_width, color_ ? Colored(status, ColorOf(frame.status())) : status, Total(frame),
@@ -99,9 +95,7 @@ std::vector<LiveView::Touch> LiveView::TouchesByForce() const {
   std::vector<Touch> touches;
   for (const auto& [index, view] : links_) {
     for (const v1::Contact& contact : view.frame.contacts())
-      touches.push_back(
-          {&view.frame, &contact,
-           contact.is_ring_contact() ? contact.normal_force_n() : client::Norm(contact.force_n())});
+      touches.push_back({&view.frame, &contact, client::MagnitudeN(contact)});
   }
   std::ranges::sort(touches, [](const Touch& a, const Touch& b) { return a.force_n > b.force_n; });
   return touches;
@@ -151,7 +145,7 @@ std::vector<std::string> ChangeLog::Take(const v1::LinkFrame& frame) {
   }
   std::map<uint64_t, double> now_told;
   for (const auto& contact : frame.contacts()) {
-    const double force_n = client::Norm(contact.force_n());
+    const double force_n = client::MagnitudeN(contact);
     const auto told = log.told_force_n.find(contact.id());
     const bool is_new = told == log.told_force_n.end();
     const double least = is_new ? 0 : std::max(kLeastChangeN, kRelativeChange * told->second);

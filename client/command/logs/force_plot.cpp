@@ -119,7 +119,7 @@ int ForcePlot::ColumnOf(double time_s) const {
   return static_cast<int>(std::clamp(XOf(time_s) - kLeft, 0.0, kPlotWidth));
 }
 
-void ForcePlot::AddFrame(const std::string& link, double time_s, std::optional<double> total_force_n,
+void ForcePlot::AddFrame(const std::string& link, double time_s, std::optional<double> total_n,
                          const std::vector<ContactForce>& contacts) {
   Panel& panel = PanelOf(link);
   if (++panel.frames == kExactFrames + 1) {
@@ -132,7 +132,7 @@ void ForcePlot::AddFrame(const std::string& link, double time_s, std::optional<d
     panel.least = std::min(panel.least, force_n);
     panel.most = std::max(panel.most, force_n);
   };
-  add(panel.total, total_force_n.value_or(NAN));
+  add(panel.total, total_n.value_or(NAN));
   for (const ContactForce& contact : contacts) {
     auto known = panel.contacts.find(contact.id);
     if (known == panel.contacts.end()) {
@@ -145,7 +145,7 @@ void ForcePlot::AddFrame(const std::string& link, double time_s, std::optional<d
     }
     if (known->second.last_frame + 1 != panel.frames) known->second.trace.Add(time_s, NAN);
     known->second.last_frame = panel.frames;
-    add(known->second.trace, contact.normal_force_n);
+    add(known->second.trace, contact.magnitude_n);
   }
 }
 

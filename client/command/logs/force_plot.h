@@ -21,14 +21,14 @@ class ForcePlot {
 
   struct ContactForce {
     uint64_t id = 0;
-    double normal_force_n = 0;
+    double magnitude_n = 0;
   };
 
   /// `start_s` < `end_s`: the time axis.
   ForcePlot(std::string title, double start_s, double end_s);
 
-  /// In order of time. No `total_force_n`: nothing was measured.
-  void AddFrame(const std::string& link, double time_s, std::optional<double> total_force_n,
+  /// In order of time. `total_n`: sum of the contacts' magnitudes; none: nothing was measured.
+  void AddFrame(const std::string& link, double time_s, std::optional<double> total_n,
                 const std::vector<ContactForce>& contacts);
   void AddContactBegin(const std::string& link, double time_s);
   void AddContactEnd(const std::string& link, double time_s);

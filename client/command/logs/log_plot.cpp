@@ -11,6 +11,7 @@
 #include "client/command/logs/log_output.h"
 #include "client/command/logs/log_tools.h"
 #include "client/command/logs/log_visitor.h"
+#include "wire/magnitude.h"
 
 namespace taclink::command {
 namespace {
@@ -42,10 +43,9 @@ Result<void> Fill(LogSource& source, const LogPart& part, ForcePlot& plot) {
   visitor.frame = [&](const v1::LinkFrame& frame, int64_t utc_ns) {
     std::vector<ForcePlot::ContactForce> contacts;
     for (const v1::Contact& contact : frame.contacts())
-      contacts.push_back({contact.id(), contact.normal_force_n()});
+      contacts.push_back({contact.id(), wire::MagnitudeN(contact)});
     std::optional<double> total_n;
-    const v1::Vector3& force = frame.total_force_n();
-    if (IsMeasured(frame)) total_n = std::hypot(force.x(), force.y(), force.z());
+    if (IsMeasured(frame)) total_n = wire::TotalMagnitudeN(frame);
     plot.AddFrame(frame.link(), at(utc_ns), total_n, contacts);
     return Result<void>();
   };

@@ -60,7 +60,10 @@ Result<void> Simulate(const SimulateOptions& options) {
   if (!scene) return scene.error();
   const auto model = LoadLinkModel(options.model.empty() ? scene->model : options.model);
   if (!model) return model.error();
-  auto skin = SimulatedSkin::Make(*model, *scene);
+  auto skin = [&] {
+    Progress progress("the scene's equilibria");
+    return SimulatedSkin::Make(*model, *scene, [&](double share) { progress.Show(share); });
+  }();
   if (!skin) return skin.error();
 
   const std::filesystem::path folder(options.out);

@@ -25,6 +25,11 @@ using Covariance3 = std::array<double, 6>;
 Vector3 ToArray(const v1::Vector3& vector);
 /// Euclidean norm, in the unit of the vector.
 double Norm(const v1::Vector3& vector);
+/// How strongly a contact acts on the skin, N: normal_force_n or |force_n|, the larger one (see v1::Contact).
+double MagnitudeN(const v1::Contact& contact);
+double MagnitudeN(const v1::ContactEvent& contact);
+/// Sum over the contacts, N; NaN: the forces are not known.
+double TotalMagnitudeN(const v1::LinkFrame& frame);
 /// Groups of three numbers, such as LinkFrame.positions_m, as one point each. Fewer than three numbers at the
 /// end are ignored.
 std::vector<Vector3> Points(const google::protobuf::RepeatedField<float>& numbers);

@@ -14,9 +14,8 @@ import taclink.aio
 
 async def print_frames(client: taclink.aio.Client) -> None:
     async for frame in client.frames(max_rate_hz=2):
-        total_n = np.linalg.norm(frame.total_force_n)
         late = "" if frame.latency_s is None else f"  {frame.latency_s * 1e3:.1f} ms old"
-        print(f"{frame.link:<12} {frame.status:<12} {len(frame.contacts)} contacts  {total_n:.2f} N{late}", flush=True)
+        print(f"{frame.link:<12} {frame.status:<12} {len(frame.contacts)} contacts  {frame.total_magnitude_n:.2f} N{late}", flush=True)
 
 
 async def print_events(client: taclink.aio.Client) -> None:

@@ -17,7 +17,7 @@ SHOWN_S = 20.0
 
 
 class Forces:
-    """The newest forces of each link: time since the start, s, and size of the total force, N."""
+    """The newest forces of each link: time since the start, s, and the sum of the contact magnitudes, N."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -32,7 +32,7 @@ class Forces:
             return  # a sign of life without a picture
         time_s = (frame.times.exposure_utc_ns - self._start_ns) * 1e-9
         with self._lock:
-            self._by_link[frame.link].append((time_s, float(np.linalg.norm(frame.total_force_n))))
+            self._by_link[frame.link].append((time_s, frame.total_magnitude_n))
 
     def draw(self, axes: Any) -> None:
         axes.clear()
@@ -40,7 +40,7 @@ class Forces:
             for link, points in sorted(self._by_link.items()):
                 axes.plot(*zip(*points), label=link)
         end_s = self.age_s()
-        axes.set(xlabel="time, s", ylabel="total force, N", xlim=(max(0.0, end_s - SHOWN_S), max(end_s, 1.0)))
+        axes.set(xlabel="time, s", ylabel="force, N", xlim=(max(0.0, end_s - SHOWN_S), max(end_s, 1.0)))
         axes.set_ylim(bottom=0)
         if axes.has_data():
             axes.legend(loc="upper left")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
 from common import connect, options, run
 
 import taclink
@@ -27,7 +26,7 @@ def replay(client: taclink.Client, log: str) -> None:
         for message in messages:
             match message.content:
                 case taclink.Frame() as frame:
-                    force_n = np.linalg.norm(frame.total_force_n)
+                    force_n = frame.total_magnitude_n
                     print(f"{message.log_utc_ns}  {frame.link:<12} frame {frame.sequence}  {force_n:5.2f} N")
                 case taclink.Event() as event:
                     print(f"{message.log_utc_ns}  {event.link:<12} {event.kind}")

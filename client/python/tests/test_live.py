@@ -271,14 +271,14 @@ def test_the_history_has_what_came_before(server: servers.Server, touched: None,
     newest = next(iter(client.frames("pressed")))
     pressed, idle = client.force_history(span_s=30)
     assert (pressed.link, idle.link) == ("pressed", "idle")
-    assert len(pressed.exposure_utc_ns) == len(pressed.total_force_n) > 0
+    assert len(pressed.exposure_utc_ns) == len(pressed.total_magnitude_n) > 0
     assert np.all(np.diff(pressed.exposure_utc_ns) > 0)
     assert pressed.exposure_utc_ns[-1] >= newest.times.exposure_utc_ns - 10**9
-    assert np.nanmax(pressed.total_force_n) > 0.05
+    assert np.nanmax(pressed.total_magnitude_n) > 0.05
     contact = pressed.contacts[-1]
     assert contact.samples[-1] < len(pressed.exposure_utc_ns) and np.all(np.diff(contact.samples) > 0)
-    strongest_n = max(np.max(each.force_n) for each in pressed.contacts)
-    assert strongest_n == pytest.approx(np.nanmax(pressed.total_force_n), rel=0.2)
+    strongest_n = max(np.max(each.magnitude_n) for each in pressed.contacts)
+    assert strongest_n == pytest.approx(np.nanmax(pressed.total_magnitude_n), rel=0.2)
     (only,) = client.force_history("idle")
     assert only.link == "idle"
     with pytest.raises(taclink.NotFound):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import itertools
+import math
 from dataclasses import FrozenInstanceError
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ import taclink.aio
 from taclink import _channel, _reconnect, errors, names
 from taclink._streams import FrameState
 from taclink.messages import arrays, contacts, frame
-from taclink.v1 import contacts_pb2, frame_pb2, tactile_pb2
+from taclink.v1 import contacts_pb2, frame_pb2, geometry_pb2, tactile_pb2
 
 # Members that say what the first number means.
 FIRST = {"NONE", "OFF", "CONFIGURED", "UNSPECIFIED", "UNKNOWN"}
@@ -200,3 +201,14 @@ def test_both_clients_have_the_same_methods(name: str) -> None:
 def test_all_that_is_public_exists_and_is_sorted() -> None:
     assert sorted(taclink.__all__) == taclink.__all__
     assert all(hasattr(taclink, name) for name in taclink.__all__)
+
+
+def test_forces_from_opposite_sides_do_not_cancel_in_the_magnitude() -> None:
+    message = frame_pb2.LinkFrame(total_force_n=geometry_pb2.Vector3())
+    for side in (0.7, -0.7):
+        message.contacts.add(force_n=geometry_pb2.Vector3(x=side), normal_force_n=0.75)
+    message.contacts.add(force_n=geometry_pb2.Vector3(y=0.5), normal_force_n=0.1)  # drags
+    pressed = frame.frame_from(message)
+    assert [contact.magnitude_n for contact in pressed.contacts] == pytest.approx([0.75, 0.75, 0.5])
+    assert pressed.total_magnitude_n == pytest.approx(2.0)
+    assert math.isnan(frame.frame_from(frame_pb2.LinkFrame()).total_magnitude_n)

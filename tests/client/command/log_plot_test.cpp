@@ -116,7 +116,7 @@ TEST(ForcePlot, SaysWhereNothingWasMeasured) {
 TEST(ForcePlot, NamesAreEscapedAndWhatIsNotDrawnIsSaid) {
   command::ForcePlot plot("a<b> & \"c\"", 0, 10);
   for (size_t i = 0; i < command::ForcePlot::kMostContacts + 3; ++i)
-    plot.AddFrame("<x>", 10.0 * static_cast<double>(i) / 6000, 1, {{.id = i, .normal_force_n = 1}});
+    plot.AddFrame("<x>", 10.0 * static_cast<double>(i) / 6000, 1, {{.id = i, .magnitude_n = 1}});
   EXPECT_THAT(plot.Svg(),
               AllOf(HasSubstr("a&lt;b&gt; &amp;"), HasSubstr("&lt;x&gt; (3 more contacts are not drawn")));
 }

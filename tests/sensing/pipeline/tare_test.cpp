@@ -360,5 +360,26 @@ TEST_F(TareCollectorTest, AForceThatWasNotNeededIsNotReported) {
   EXPECT_FALSE(tare.forced());
 }
 
+// A cuff that presses alike all around: its resultant is about zero.
+TEST_F(TareCollectorTest, ARingContactIsATouch) {
+  const LinkModel model = LoadLinkModel("cylinder").value();
+  const auto count = static_cast<size_t>(model.markers.count());
+  LinkState state;
+  state.status = LinkStatus::kOk;
+  state.shape.positions_mm.assign(count, Vec3(30, 0, 50));
+  for (CameraCounts& camera : state.cameras) camera.labelled = model.markers.count();
+  LabelledMarkers labels;
+  for (auto& camera : labels.cameras) camera.resize(count);
+  const std::vector<Vec3> off_mm(count, Vec3::Zero());
+  const auto add = [&] { return TareCollector(model, {.frames = 2}).Add(state, labels, off_mm, {}); };
+  ASSERT_TRUE(add().ok());
+  Contact& ring = state.contacts.emplace_back();
+  ring.is_ring_contact = true;
+  ring.normal_force_n = 0.5;
+  const auto refused = add();
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message, HasSubstr("touched: a contact of 0.50 N"));
+}
+
 }  // namespace
 }  // namespace taclink

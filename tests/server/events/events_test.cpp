@@ -17,6 +17,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAre;
 
 MarkerGrid Grid() {
   MarkerGrid grid;
@@ -233,6 +234,20 @@ TEST_F(LinkWatchTest, LevelsHaveHysteresis) {
   Frame({}, false);
   EXPECT_EQ(watch_.forces()[0].level(), ForceLevel::kAlarm) << "stays while nothing is measured";
   EXPECT_THAT(levels(0.1), ElementsAre(ForceLevel::kNormal));
+}
+
+// Its resultant is about zero: forces from opposite sides cancel.
+TEST_F(LinkWatchTest, ARingContactCountsByItsNormalForce) {
+  Contact ring = MakeContact(1, 1.5, 20, {4, 5, 6, 7});
+  ring.is_ring_contact = true;
+  ring.force_n = Vec3(0.001, 0, 0);
+  const auto begin = Frame({ring});
+  EXPECT_THAT(Kinds(begin), UnorderedElementsAre("contact_begin", "force_level", "force_level"));
+  EXPECT_EQ(watch_.forces()[0].level(), ForceLevel::kAlarm);
+  EXPECT_DOUBLE_EQ(watch_.forces()[0].force_n(), 1.5);
+  EXPECT_DOUBLE_EQ(watch_.forces()[1].force_n(), 0.75) << "half of its markers are in the region";
+  Frame({});
+  EXPECT_EQ(watch_.forces()[0].level(), ForceLevel::kNormal);
 }
 
 TEST_F(LinkWatchTest, ARegionCountsWhatLiesInIt) {

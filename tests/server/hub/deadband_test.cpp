@@ -49,6 +49,19 @@ TEST(Deadband, AContactThatComesOrGoesChangesByItsForce) {
   EXPECT_FALSE(Within(deadband, Touched(0.2), other)) << "another contact of the same force";
 }
 
+TEST(Deadband, ARingContactCountsByItsNormalForce) {
+  const Deadband deadband{.force_n = 0.1};
+  const auto ring = [](double normal_force_n) {
+    LinkState state = Touched(1e-3);
+    state.contacts[0].normal_force_n = normal_force_n;
+    return state;
+  };
+  EXPECT_TRUE(Within(deadband, ring(1), ring(1.09)));
+  EXPECT_FALSE(Within(deadband, ring(1), ring(1.11)));
+  EXPECT_FALSE(Within(deadband, Touched(0), ring(0.2)));
+  EXPECT_FALSE(Within(deadband, ring(0.2), Touched(0)));
+}
+
 TEST(Deadband, AnotherStatusIsNews) {
   const Deadband deadband{.force_n = 10, .move_mm = 10};
   EXPECT_FALSE(Within(deadband, Touched(1), Touched(1, 0, LinkStatus::kDegraded)));

@@ -47,6 +47,22 @@ TEST(ForceHistoryTest, KeepsTheStrongestFrameOfEachBin) {
   EXPECT_EQ(history.newest_utc_ns(), kBegin + ForceHistory::kBinNs);
 }
 
+// A squeeze: the resultants cancel, what presses does not.
+TEST(ForceHistoryTest, OppositeContactsDoNotCancel) {
+  ForceHistory history;
+  LinkState state = Pressed(kBegin, 0.75);
+  state.contacts.push_back(state.contacts[0]);
+  state.contacts[1].id = 8;
+  state.contacts[1].force_n *= -1;
+  state.total_force_n.setZero();
+  Contact& ring = state.contacts.emplace_back();
+  ring.id = 9;
+  ring.normal_force_n = 0.5;
+  history.Add(state);
+  EXPECT_THAT(Totals(history), ElementsAre(2.0));
+  EXPECT_THAT(history.Since(0)[0].contacts_n[2], Pair(9u, 0.5));
+}
+
 TEST(ForceHistoryTest, WhatIsNotMeasuredIsNoForce) {
   ForceHistory history;
   LinkState lost;

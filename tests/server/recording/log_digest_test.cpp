@@ -38,11 +38,11 @@ class LogDigestTest : public ::testing::Test {
 };
 
 TEST_F(LogDigestTest, WhatIsNotMeasuredIsNoForce) {
-  EXPECT_EQ(digest_.Summary().peak_force_n_size(), 0);
+  EXPECT_EQ(digest_.Summary().peak_magnitude_n_size(), 0);
   digest_.Take("upper", model_, LinkState(), kBegin);
   Take(0.25, kBegin + 2 * kSecond);
   const v1::LogSummary summary = digest_.Summary();
-  EXPECT_THAT(summary.peak_force_n(),
+  EXPECT_THAT(summary.peak_magnitude_n(),
               ElementsAre(NanSensitiveFloatEq(kNan), NanSensitiveFloatEq(kNan), 0.25F));
   EXPECT_EQ(summary.strongest().log_utc_ns(), kBegin + 2 * kSecond);
 }
@@ -50,8 +50,8 @@ TEST_F(LogDigestTest, WhatIsNotMeasuredIsNoForce) {
 TEST_F(LogDigestTest, ALongLogHasSixtyPartsWithItsPeaks) {
   for (int i = 0; i < 600; ++i) Take(i == 317 ? 9 : 1, kBegin + i * kSecond);
   const v1::LogSummary summary = digest_.Summary();
-  ASSERT_EQ(summary.peak_force_n_size(), 60);
-  for (int part = 0; part < 60; ++part) EXPECT_EQ(summary.peak_force_n(part), part == 31 ? 9 : 1) << part;
+  ASSERT_EQ(summary.peak_magnitude_n_size(), 60);
+  for (int part = 0; part < 60; ++part) EXPECT_EQ(summary.peak_magnitude_n(part), part == 31 ? 9 : 1) << part;
 }
 
 TEST_F(LogDigestTest, ARingContactCountsByWhatItPresses) {
@@ -60,7 +60,7 @@ TEST_F(LogDigestTest, ARingContactCountsByWhatItPresses) {
   Take(2, kBegin + kSecond, true);
   const v1::StrongestContact strongest = digest_.Summary().strongest();
   EXPECT_TRUE(strongest.is_ring_contact());
-  EXPECT_EQ(strongest.force_n(), 2);
+  EXPECT_EQ(strongest.magnitude_n(), 2);
   EXPECT_FALSE(strongest.has_angle_rad());
   EXPECT_EQ(strongest.displacements()[0], '\xff');
   EXPECT_EQ(strongest.displacements()[1], '\x80');
@@ -70,10 +70,10 @@ TEST_F(LogDigestTest, AClockThatWasSetLosesNothing) {
   Take(0.3, kBegin);
   Take(0.5, kBegin - 3600 * kSecond);
   Take(0.4, kBegin + int64_t{30} * 24 * 3600 * kSecond);
-  EXPECT_EQ(digest_.Summary().peak_force_n(0), 0.5F);
-  EXPECT_EQ(digest_.Summary().peak_force_n(59), 0.4F);
+  EXPECT_EQ(digest_.Summary().peak_magnitude_n(0), 0.5F);
+  EXPECT_EQ(digest_.Summary().peak_magnitude_n(59), 0.4F);
   digest_.Clear();
-  EXPECT_EQ(digest_.Summary().peak_force_n_size(), 0);
+  EXPECT_EQ(digest_.Summary().peak_magnitude_n_size(), 0);
   EXPECT_FALSE(digest_.Summary().has_strongest());
 }
 

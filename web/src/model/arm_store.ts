@@ -9,7 +9,7 @@ import type { LinkForceHistory } from "../api/gen/taclink/v1/history_pb";
 import type { LinkStreamCounts } from "../api/gen/taclink/v1/tactile_pb";
 import { ForceHistory, type Sample } from "./force_history";
 import { Past, type Measurement, type Poses } from "./past";
-import { lengthOf } from "./vectors";
+import { magnitudeN, totalMagnitudeN } from "./magnitude";
 
 const EVENTS_KEPT = 500;
 const MOST_EXTRAPOLATED_S = 1.5;
@@ -118,13 +118,13 @@ export class ArmStore {
     }
     if (utcNs > 0n) {
       const timeS = Number(utcNs / 1000n) / 1e6;
-      const total = measured && frame.totalForceN ? lengthOf(frame.totalForceN) : NaN;
+      const total = measured ? totalMagnitudeN(frame) : NaN;
       record.history.add(
         timeS,
         total,
         frame.contacts.map((contact) => ({
           id: contact.id.toString(),
-          forceN: contact.forceN ? lengthOf(contact.forceN) : 0,
+          forceN: magnitudeN(contact),
         })),
       );
       this.takeTime(timeS);
@@ -256,12 +256,12 @@ function withoutCovariances(frame: LinkFrame): LinkFrame {
   return { ...frame, displacementCovariancesM2: [] };
 }
 
-function samplesOf({ exposureUtcNs, totalForceN, contacts }: LinkForceHistory): Sample[] {
+function samplesOf({ exposureUtcNs, totalMagnitudeN, contacts }: LinkForceHistory): Sample[] {
   const samples = exposureUtcNs.map((ns, i): Sample => {
-    const total = totalForceN[i] ?? NaN;
+    const total = totalMagnitudeN[i] ?? NaN;
     return [Number(ns / 1000n) / 1e6, Number.isNaN(total) ? null : total, []];
   });
-  for (const { id, samples: places, forceN } of contacts)
-    for (const [i, place] of places.entries()) samples[place]?.[2].push([id.toString(), forceN[i]]);
+  for (const { id, samples: places, magnitudeN } of contacts)
+    for (const [i, place] of places.entries()) samples[place]?.[2].push([id.toString(), magnitudeN[i]]);
   return samples;
 }

@@ -1,4 +1,4 @@
-import { Code } from "@connectrpc/connect";
+import { Code, ConnectError } from "@connectrpc/connect";
 import { signal } from "@preact/signals";
 import { keepOpen, sleep } from "../api/keep_open";
 import { Detail } from "../api/gen/taclink/v1/frame_pb";
@@ -127,8 +127,11 @@ export class LiveFeed implements Feed {
         { signal: stop, timeoutMs: 10_000 },
       );
       this.store.takeHistory(links);
-    } catch {
-      // An older server, or the connection: the frames say so.
+    } catch (error) {
+      // A server without a history, or a lost connection, which the frame stream reports.
+      const { code } = ConnectError.from(error);
+      if (stop.aborted || code === Code.Unimplemented || code === Code.Unavailable) return;
+      console.error("The curves begin now, for the server's history cannot be read:", error);
     }
   }
 

@@ -46,7 +46,7 @@ export class Past<T> {
     }
   }
 
-  /** The newest moment until then; undefined: there is none, or it is old, for a link says something each second. */
+  /** The newest moment until then; undefined: there is none, or it is older than the second in which each link reports at least once. */
   at(timeS: number): T | undefined {
     const index = firstFrom(this.times, timeS + 1e-6) - 1;
     return index >= 0 && timeS - this.times[index] <= MOMENT_HOLDS_S ? this.moments[index] : undefined;

@@ -8,7 +8,7 @@ import { messageOf, type Session } from "../api/session";
 import { secondsOf } from "../ui/format";
 import type { ArmStore } from "./arm_store";
 import type { Connection, Feed } from "./feed";
-import { lengthOf } from "./vectors";
+import { magnitudeN } from "./magnitude";
 
 /** When something touched a link, s since 1970-01-01 UTC. */
 export interface ContactSpan {
@@ -226,10 +226,10 @@ export class ReplayFeed implements Feed {
       const timeS = secondsOf(message.value.utcNs);
       if (Number.isNaN(beginS)) beginS = timeS;
       if (timeS > beginS + ALL_LINKS_TOLD_S) break; // each message has the links that came until then
-      for (const { link, linkContactId: id, wrench } of message.value.contacts) {
+      for (const { link, linkContactId: id, wrench, normalForceN } of message.value.contacts) {
         const key = keyOf(link, id);
         if (found.has(key)) continue;
-        const peakN = wrench?.forceN ? lengthOf(wrench.forceN) : 0;
+        const peakN = magnitudeN({ normalForceN, forceN: wrench?.forceN });
         found.set(key, { link, id, fromS: beginS, toS: beginS, peakN });
       }
     }

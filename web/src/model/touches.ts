@@ -1,7 +1,7 @@
 import { EventKind, type Event } from "../api/gen/taclink/v1/events_pb";
 import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
 import { secondsOf } from "../ui/format";
-import { lengthOf } from "./vectors";
+import { magnitudeN } from "./magnitude";
 
 /** One contact from its begin to its end, as its events tell. */
 export interface Touch {
@@ -23,7 +23,7 @@ export function touchesOf(events: readonly Event[]): Touch[] {
   const open = new Map<string, { touch: Touch; lastS: number }>();
   for (const event of [...events].reverse()) {
     if (event.detail.case !== "contact") continue;
-    const { contactId, forceN, peakForceN, durationS, endReason } = event.detail.value;
+    const { contactId, peakForceN, durationS, endReason } = event.detail.value;
     const key = `${event.link} ${contactId}`;
     const timeS = secondsOf(event.times?.exposureUtcNs || event.times?.raisedUtcNs || 0n);
     const before = open.get(key);
@@ -43,7 +43,7 @@ export function touchesOf(events: readonly Event[]): Touch[] {
       touches.push(touch);
     }
     open.set(key, { touch, lastS: timeS });
-    touch.peakN = Math.max(touch.peakN, peakForceN, forceN ? lengthOf(forceN) : 0);
+    touch.peakN = Math.max(touch.peakN, peakForceN, magnitudeN(event.detail.value));
     touch.isDoubted ||= event.frameStatus !== LinkStatus.UNSPECIFIED && event.frameStatus !== LinkStatus.OK;
     if (event.kind !== EventKind.CONTACT_END) continue;
     touch.durationS = durationS;

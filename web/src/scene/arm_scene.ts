@@ -2,6 +2,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Arm } from "../api/gen/taclink/v1/arm_pb";
 import type { ArmStore } from "../model/arm_store";
+import { magnitudeN } from "../model/magnitude";
 import { lengthOf } from "../model/vectors";
 import { colourTable, StickyRange, type ColourMapName } from "../skin/colour_map";
 import { QUANTITIES, type Quantity } from "../skin/fields";
@@ -356,7 +357,7 @@ export class ArmScene {
           normal: new THREE.Vector3(normal.x, normal.y, normal.z).applyMatrix3(rotation),
           radiusM: Math.sqrt(contact.areaM2 / Math.PI),
           force: new THREE.Vector3(forceN.x, forceN.y, forceN.z).applyMatrix3(rotation),
-          text: `${link.name} ${(contact.isRingContact ? contact.normalForceN : newtons).toFixed(2)} N`,
+          text: `${link.name} ${magnitudeN(contact).toFixed(2)} N`,
         });
       }
     }

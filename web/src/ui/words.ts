@@ -2,7 +2,7 @@ import type { DescEnum } from "@bufbuild/protobuf";
 import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
 import { EventKind, EventKindSchema, ForceLevel, type Event } from "../api/gen/taclink/v1/events_pb";
 import { ForceModel, LinkStatus, type LinkFrame } from "../api/gen/taclink/v1/frame_pb";
-import { lengthOf } from "../model/vectors";
+import { magnitudeN } from "../model/magnitude";
 import { newtons } from "./format";
 
 /** The name of a value as the protocol has it: "force model" of EVENT_KIND_FORCE_MODEL. */
@@ -92,7 +92,7 @@ function detailText(event: Event): string {
   const { detail } = event;
   switch (detail.case) {
     case "contact": {
-      const force = detail.value.forceN ? newtons(lengthOf(detail.value.forceN)) : "";
+      const force = newtons(magnitudeN(detail.value));
       const id = `#${detail.value.contactId}`;
       if (event.kind === EventKind.CONTACT_BEGIN) return `contact ${id} began, ${force}`;
       if (event.kind === EventKind.CONTACT_UPDATE) return `contact ${id} is ${force}`;

@@ -7,7 +7,7 @@ import { useApp, type Theme } from "../app_state";
 import { statusOf } from "../ui/words";
 import { KeysHelp } from "./keys_help";
 import { RecorderControl } from "./recorder_control";
-import { lengthOf } from "../model/vectors";
+import { magnitudeN } from "../model/magnitude";
 import { clockTime, newtons } from "../ui/format";
 import { SignIn } from "./sign_in";
 
@@ -72,7 +72,7 @@ function Health() {
   const touches = links.flatMap((link) =>
     (store.link(link.name).newest?.contacts ?? []).map((contact) => ({
       link: link.name,
-      newtons: contact.isRingContact || !contact.forceN ? contact.normalForceN : lengthOf(contact.forceN),
+      newtons: magnitudeN(contact),
     })),
   );
   const unknown = links.filter((link) => !store.link(link.name).newest?.totalForceN).length;

@@ -2,7 +2,7 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import type { Link } from "../api/gen/taclink/v1/arm_pb";
 import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
 import { selectedLink, useApp } from "../app_state";
-import { lengthOf } from "../model/vectors";
+import { totalMagnitudeN } from "../model/magnitude";
 import { colourTable, inkOn } from "../skin/colour_map";
 import { isKnown, MarkerFields, QUANTITIES } from "../skin/fields";
 import { sameShape } from "../skin/same_shape";
@@ -50,8 +50,7 @@ function SmallMap({ link }: { link: Link }) {
     for (const contact of shape.contacts) painter.outline(outlineFlat(contact.outlineM, grid));
   }, [beat, fields, app.quantity.value, app.colourMap.value]);
 
-  const force =
-    newest?.totalForceN && status !== LinkStatus.LOST ? newtons(lengthOf(newest.totalForceN)) : "–";
+  const force = newest && status !== LinkStatus.LOST ? newtons(totalMagnitudeN(newest)) : "–";
   return (
     <button
       type="button"

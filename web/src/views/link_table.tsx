@@ -5,7 +5,7 @@ import { ForceLevel } from "../api/gen/taclink/v1/events_pb";
 import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
 import type { Baseline } from "../api/gen/taclink/v1/tare_pb";
 import { selectedLink, useApp } from "../app_state";
-import { lengthOf } from "../model/vectors";
+import { totalMagnitudeN } from "../model/magnitude";
 import { duration, fixed, milliseconds, newtons } from "../ui/format";
 import { OperatorButton } from "../ui/operator_button";
 import { LEVEL_WORDS, MODEL_WORDS, severity, STATUS_SIGNS, STATUS_WORDS, statusOf } from "../ui/words";
@@ -39,7 +39,9 @@ export function LinkTable() {
               <th scope="col">Link</th>
               <th scope="col">Status</th>
               <th scope="col">
-                <abbr title="Length of the sum of the contact forces: opposite ones cancel">Resultant</abbr>
+                <abbr title="Sum of what all contacts press or drag with; opposite ones do not cancel">
+                  Force
+                </abbr>
               </th>
               <th scope="col">Rate</th>
               <th scope="col">
@@ -113,7 +115,7 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
         )}
       </td>
       <td class={`numbers level${level}${frame && frame.contacts.length > 0 ? " touched" : ""}`}>
-        {frame?.totalForceN && status !== LinkStatus.LOST ? newtons(lengthOf(frame.totalForceN)) : "–"}
+        {frame && status !== LinkStatus.LOST ? newtons(totalMagnitudeN(frame)) : "–"}
         {level_word && <span class="level-word"> {level_word}</span>}
       </td>
       <td class="numbers">{statistics?.rateHz ? `${fixed(statistics.rateHz, 1)}/s` : "–"}</td>

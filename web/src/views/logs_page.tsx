@@ -153,7 +153,7 @@ function LogRow({ log, onDelete }: { log: Log; onDelete: () => void }) {
       <td class="numbers">{bytes(log.bytes)}</td>
       <td class="numbers">{String(log.frames)}</td>
       <td class="numbers">{log.contacts === undefined ? "–" : String(log.contacts)}</td>
-      <td>{log.summary && <Sparkline peaks={log.summary.peakForceN} />}</td>
+      <td>{log.summary && <Sparkline peaks={log.summary.peakMagnitudeN} />}</td>
       <td>
         {log.summary?.strongest && (
           <button
@@ -237,7 +237,7 @@ function Strongest({ contact }: { contact: StrongestContact }) {
     <>
       {isWhole && <canvas ref={canvas} aria-hidden="true" />}
       <span class="numbers small">
-        {newtons(contact.forceN)} on {contact.link}, {place}, z {fixed(contact.zM * 1e3, 0)} mm
+        {newtons(contact.magnitudeN)} on {contact.link}, {place}, z {fixed(contact.zM * 1e3, 0)} mm
       </span>
     </>
   );

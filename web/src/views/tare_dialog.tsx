@@ -6,9 +6,9 @@ import { useApp } from "../app_state";
 import { Dialog } from "../ui/dialog";
 import { fixed, newtons } from "../ui/format";
 import { OperatorButton } from "../ui/operator_button";
-import { lengthOf } from "../model/vectors";
+import { totalMagnitudeN } from "../model/magnitude";
 
-/** Where one is on a way of several steps. */
+/** The steps of a procedure, numbered from 1, with the current one marked. */
 export function Steps({ names, now }: { names: readonly string[]; now: number }) {
   return (
     <ol class="steps">
@@ -33,7 +33,7 @@ export function TouchLine({ link }: { link: string }) {
       </p>
     );
   const contacts = frame.contacts.length;
-  const force = `, ${newtons(lengthOf(frame.totalForceN))}`;
+  const force = `, ${newtons(totalMagnitudeN(frame))}`;
   return (
     <p class={contacts > 0 ? "numbers bad" : "numbers"} role="status">
       {link}:{" "}

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from taclink.messages.arrays import (
     ByteArray,
@@ -53,6 +56,14 @@ class Contact:
     major_axis_m: FloatArray  # (3,), as long as the load's standard deviation along it
     minor_axis_m: FloatArray  # (3,)
     outline_m: FloatArray  # (k, 3), polygon on the deformed skin; no rows below detail geometry
+
+    @property
+    def magnitude_n(self) -> float:
+        """How strongly it acts on the skin: normal_force_n or |force_n|, the larger one, N.
+
+        What presses from opposite sides cancels in the resultant; what drags on the skin is not in the normal force.
+        """
+        return max(self.normal_force_n, float(np.linalg.norm(self.force_n)))
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -218,6 +229,13 @@ class Frame:
     marker_sources: ByteArray  # (markers,), of MarkerSource
     detection_limits_n: FloatArray  # (markers,), as detection_limit_n
     force_converged: bool
+
+    @property
+    def total_magnitude_n(self) -> float:
+        """Sum of the contacts' magnitudes, N; NaN: no forces are known."""
+        if np.isnan(self.total_force_n).any():
+            return math.nan
+        return sum(contact.magnitude_n for contact in self.contacts)
 
     @property
     def latency_s(self) -> float | None:

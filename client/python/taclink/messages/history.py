@@ -14,22 +14,22 @@ class ContactForceHistory:
 
     id: int  # Contact.id
     samples: IntArray  # (k,), which samples of the link have it
-    force_n: FloatArray  # (k,), N
+    magnitude_n: FloatArray  # (k,), N; see Contact
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, slots=True)
 class ForceHistory:
-    """One link: of each 0.1 s in which a frame came, the frame with the largest total force."""
+    """One link: of each 0.1 s in which a frame came, the frame with the largest sum of contact magnitudes."""
 
     link: str
     exposure_utc_ns: IntArray  # (n,), oldest first
-    total_force_n: FloatArray  # (n,), N; NaN: not measured
+    total_magnitude_n: FloatArray  # (n,), N, sum of the contacts' magnitudes; NaN: forces were not known
     contacts: tuple[ContactForceHistory, ...]
 
 
 def _contact_from(message: history_pb2.ContactForceHistory) -> ContactForceHistory:
     return ContactForceHistory(
-        id=message.id, samples=whole_numbers(message.samples), force_n=numbers(message.force_n)
+        id=message.id, samples=whole_numbers(message.samples), magnitude_n=numbers(message.magnitude_n)
     )
 
 
@@ -38,7 +38,7 @@ def histories_from(message: history_pb2.GetForceHistoryResponse) -> tuple[ForceH
         ForceHistory(
             link=link.link,
             exposure_utc_ns=whole_numbers(link.exposure_utc_ns),
-            total_force_n=numbers(link.total_force_n),
+            total_magnitude_n=numbers(link.total_magnitude_n),
             contacts=tuple(map(_contact_from, link.contacts)),
         )
         for link in message.links
