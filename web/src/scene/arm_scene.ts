@@ -11,6 +11,7 @@ import type { SkinPlace } from "../model/poker";
 import { ArmBodies } from "./arm_bodies";
 import { Bones } from "./bones";
 import { ForceArrows, type ForceArrow } from "./force_arrows";
+import { sizeOf } from "../ui/element_size";
 import { fitView } from "./fit_view";
 import { Labels, type Label } from "./labels";
 import { Lens, type LensPlace } from "./lens";
@@ -272,7 +273,8 @@ export class ArmScene {
         kind: "link",
         marked: link.name === this.selected,
       });
-    this.labels.show(texts, outline, this.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    const { width, height } = sizeOf(this.canvas);
+    this.labels.show(texts, outline, this.camera, width, height);
     this.canvas.dataset.frames = String(Number(this.canvas.dataset.frames ?? 0) + 1);
   }
 
@@ -285,7 +287,7 @@ export class ArmScene {
       (best, arrow) => (best && since(best) > since(arrow) ? best : arrow),
       undefined,
     );
-    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const { width, height } = sizeOf(this.canvas);
     const onCanvas = outline.map((point): [number, number] => {
       const at = point.clone().project(this.camera);
       return [((at.x + 1) / 2) * width, ((at.y + 1) / 2) * height];

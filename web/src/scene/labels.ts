@@ -12,12 +12,18 @@ const GAP_PX = 26; // between the arm and its labels
 const LINE_PX = 24; // between labels, top to top
 const MARGIN_PX = 8;
 
-interface Laid {
+interface LabelElement {
   element: HTMLElement;
   line: SVGLineElement;
+  /** Of the text as it is now, px; to ask the element itself makes the browser lay out the page. Digits are equally wide. */
+  width: number;
+}
+
+interface Laid extends LabelElement {
   anchor: [x: number, y: number];
   y: number;
   isRight: boolean;
+  own: LabelElement;
 }
 
 /**
@@ -25,8 +31,7 @@ interface Laid {
  * left; forces stand on its right, each with a line to the spot that it is about.
  */
 export class Labels {
-  private readonly elements: HTMLElement[] = [];
-  private readonly lines: SVGLineElement[] = [];
+  private readonly elements: LabelElement[] = [];
   private readonly svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
 
   constructor(private readonly host: HTMLElement) {
@@ -34,7 +39,7 @@ export class Labels {
   }
 
   dispose(): void {
-    for (const element of this.elements) element.remove();
+    for (const { element } of this.elements) element.remove();
     this.svg.remove();
   }
 
@@ -47,8 +52,9 @@ export class Labels {
     height: number,
   ): void {
     while (this.elements.length < labels.length) {
-      this.elements.push(this.host.appendChild(document.createElement("span")));
-      this.lines.push(this.svg.appendChild(document.createElementNS("http://www.w3.org/2000/svg", "line")));
+      const element = this.host.appendChild(document.createElement("span"));
+      const line = this.svg.appendChild(document.createElementNS("http://www.w3.org/2000/svg", "line"));
+      this.elements.push({ element, line, width: NaN });
     }
     const screen = (point: THREE.Vector3): [number, number, number] => {
       const at = point.clone().project(camera);
@@ -58,16 +64,22 @@ export class Labels {
     const left = Math.max(0, Math.min(...across) - GAP_PX);
     const right = Math.min(width, Math.max(...across) + GAP_PX);
     const laid: Laid[] = [];
-    this.elements.forEach((element, i) => {
+    this.elements.forEach((own, i) => {
+      const { element, line } = own;
       const label = labels[i];
       const [x, y, depth] = label ? screen(label.place) : [0, 0, 2];
       element.hidden = depth > 1 || x < 0 || x > width || y < 0 || y > height;
-      this.lines[i].style.display = element.hidden ? "none" : "";
+      line.style.display = element.hidden ? "none" : "";
       if (element.hidden || !label) return;
-      element.className = `label ${label.kind}${label.marked ? " marked" : ""}`;
+      const style = `label ${label.kind}${label.marked ? " marked" : ""}`;
+      if (widthKey(element.textContent) !== widthKey(label.text) || element.className !== style)
+        own.width = NaN;
       if (element.textContent !== label.text) element.textContent = label.text;
-      laid.push({ element, line: this.lines[i], anchor: [x, y], y, isRight: label.kind === "force" });
+      if (element.className !== style) element.className = style;
+      laid.push({ ...own, own, anchor: [x, y], y, isRight: label.kind === "force" });
     });
+    for (const each of laid)
+      if (Number.isNaN(each.width)) each.width = each.own.width = each.element.offsetWidth;
     for (const isRight of [false, true]) {
       const side = laid.filter((each) => each.isRight === isRight);
       spread(side, height);
@@ -75,9 +87,11 @@ export class Labels {
     }
   }
 
-  private place({ element, line, anchor, y, isRight }: Laid, edge: number, width: number): void {
-    const own = element.offsetWidth;
-    const x = isRight ? Math.min(edge, width - own - MARGIN_PX) : Math.max(edge - own, MARGIN_PX);
+  private place(laid: Laid, edge: number, width: number): void {
+    const { element, line, anchor, y, isRight } = laid;
+    const x = isRight
+      ? Math.min(edge, width - laid.width - MARGIN_PX)
+      : Math.max(edge - laid.width, MARGIN_PX);
     element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(0, -50%)`;
     // Link names need no line: they stand beside their link.
     line.style.display = isRight ? "" : "none";
@@ -86,6 +100,10 @@ export class Labels {
     line.setAttribute("x2", anchor[0].toFixed(1));
     line.setAttribute("y2", anchor[1].toFixed(1));
   }
+}
+
+function widthKey(text: string): string {
+  return text.replace(/\d/g, "0");
 }
 
 // One below the other, each as near to its spot as there is room.

@@ -1,5 +1,6 @@
 import type { MarkerRange } from "../api/gen/taclink/v1/events_pb";
 import { paintFlat } from "../skin/unroll";
+import { sizeOf } from "../ui/element_size";
 
 const FINE = 6; // pixels of the picture a cell, before the browser scales it
 const HATCH_GROUND = "#4a525c";
@@ -17,6 +18,8 @@ export class FlatPainter {
   ink = "#ffffff";
   private readonly picture: ImageData;
   private readonly buffer = document.createElement("canvas");
+  private readonly bufferContext = this.buffer.getContext("2d")!;
+  private readonly context: CanvasRenderingContext2D;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -27,10 +30,7 @@ export class FlatPainter {
     this.buffer.width = paths * fine;
     this.buffer.height = rings * fine;
     this.picture = new ImageData(this.buffer.width, this.buffer.height);
-  }
-
-  private get context(): CanvasRenderingContext2D {
-    return this.canvas.getContext("2d")!;
+    this.context = canvas.getContext("2d")!;
   }
 
   /** Stripes: nothing is known here. */
@@ -51,8 +51,9 @@ export class FlatPainter {
   }
 
   private fit(): void {
-    const width = Math.round(this.canvas.clientWidth * devicePixelRatio);
-    const height = Math.round(this.canvas.clientHeight * devicePixelRatio);
+    const box = sizeOf(this.canvas);
+    const width = Math.round(box.width * devicePixelRatio);
+    const height = Math.round(box.height * devicePixelRatio);
     if (this.canvas.width !== width) this.canvas.width = width;
     if (this.canvas.height !== height) this.canvas.height = height;
   }
@@ -69,7 +70,7 @@ export class FlatPainter {
       table,
       range,
     );
-    this.buffer.getContext("2d")!.putImageData(this.picture, 0, 0);
+    this.bufferContext.putImageData(this.picture, 0, 0);
     this.context.imageSmoothingEnabled = true;
     this.context.drawImage(this.buffer, 0, 0, this.canvas.width, this.canvas.height);
   }

@@ -40,8 +40,10 @@ function SmallMap({ link }: { link: Link }) {
   const selected = selectedLink(app) === link.name;
 
   // A few times a second is enough for so small a picture.
+  const painting = useRef<FlatPainter>();
+  useEffect(() => void (painting.current = undefined), [grid.paths, grid.rings]);
   useEffect(() => {
-    const painter = new FlatPainter(canvas.current!, grid.paths, grid.rings, 2);
+    const painter = (painting.current ??= new FlatPainter(canvas.current!, grid.paths, grid.rings, 2));
     const quantity = app.quantity.value;
     if (!shape || !isKnown(shape, quantity)) return painter.hatch();
     const { range, scale } = QUANTITIES[quantity];
