@@ -14,8 +14,10 @@ constexpr double kGoneN = 1e-6;       // a body that presses less has left
 constexpr double kSphereShare = 0.3;  // of its diameter, where a sphere touches first
 // Of the way to a key that has no equilibrium at once.
 constexpr double kLeastStep = 1.0 / 16;
-// For a key: frames of the link wait for it. Most keys need 1 to 4; each takes about 15 ms.
-constexpr int kMostFactorizations = 15;
+// Frames of the link wait for a key. Most keys need 1 to 4 factorizations of about 15 ms; one that needs more
+// uses those of keys before and after it.
+constexpr int kFactorizationsPerKey = 10, kMostSaved = 15;
+constexpr double kStepGrowth = 1.5;  // less than twice: a try that fails costs more than one that holds
 constexpr double kRateShare = 1e-3;  // of the way to a key, for rates
 constexpr double kMostPredictedMm = 8;
 constexpr double kSameMpa = 1e-7, kSameRad = 2e-3, kSameRadps = 2e-2;
@@ -42,6 +44,7 @@ LiveSkin::LiveSkin(const LinkModel& model, const Scene& scene, std::vector<Conta
 bool LiveSkin::Begin(double time_s, const SkinNodes& nodes, std::span<const KeyContact> contacts) {
   trouble_.clear();
   step_ = 1;
+  effort_ = 0;
   balance_ = skin_.NearTo(nodes.mids_mm, nodes.directors);
   for (size_t i = 0; i < contacts.size(); ++i) {
     if (contacts[i].on) balance_.depth_mm[i] = contacts[i].value[6];
@@ -137,17 +140,17 @@ SkinBalance LiveSkin::Predicted(double from_s, const HandledMotion& from, double
   return predicted;
 }
 
-// Goes on as far as the effort for a key allows. Returns the share of the way where balance_ is.
+// Goes on as far as the effort that is left allows. Returns the share of the way where balance_ is.
 double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to) {
   const int before = skin_.factorizations();
   const auto time_at = [&](double share) { return from_s + share * (to_s - from_s); };
   double reached = 0;
-  while (reached < 1 && skin_.factorizations() - before < kMostFactorizations) {
+  while (reached < 1 && skin_.factorizations() - before < effort_) {
     const double next = std::min(reached + step_, 1.0);
     const HandledMotion here = Between(from, to, reached), there = Between(from, to, next);
     if (Balance(time_at(next), there, Predicted(time_at(reached), here, time_at(next), there))) {
       reached = next;
-      step_ = std::min(2 * step_, 1.0);
+      step_ = std::min(kStepGrowth * step_, 1.0);
     } else if (step_ > kLeastStep) {
       step_ /= 2;
     } else {
@@ -166,11 +169,15 @@ bool LiveSkin::NextKey(double time_s, const Handling& wanted) {
   const HandledMotion before = motion_;
   const double span_s = time_s - from_.time_s;
   motion_ = MovedOn(model_, before, wanted.bodies, GoalAt(time_s, wanted), span_s);
+  effort_ = std::min(effort_ + kFactorizationsPerKey, kMostSaved);
+  const bool tries = effort_ > 0;
+  const int spent_before = skin_.factorizations();
   const double reached = Reach(from_.time_s, before, time_s, motion_);
-  trouble_.clear();
+  effort_ -= skin_.factorizations() - spent_before;
+  if (tries) trouble_.clear();
   if (reached < 1) {
     motion_ = Between(before, motion_, reached);
-    if (reached == 0 && step_ <= kLeastStep)
+    if (tries && reached == 0 && step_ <= kLeastStep)
       trouble_ = "what presses stays where it is: the skin has no equilibrium further on, it would snap";
     if (!Balance(time_s, motion_, balance_)) {
       trouble_ = "what pressed was taken off: the skin has no equilibrium under it";

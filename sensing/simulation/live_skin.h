@@ -71,6 +71,7 @@ class LiveSkin {
   bool is_balance_newest_ = false;  // of what skin_ has solved, or tried to
   HandledMotion motion_;
   double step_ = 1;  // of the way to a key, that a try for the next one takes
+  int effort_ = 0;   // factorizations that the user's bodies may take now; negative: they wait
   Key from_, to_;
   std::string trouble_;
 };

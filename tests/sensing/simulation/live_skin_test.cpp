@@ -140,6 +140,28 @@ TEST(LiveSkinTest, SeveralBodiesComeAndGoOneByOne) {
   }
 }
 
+// So hard that the skin would snap: they stop, and nevertheless go when nobody presses any more.
+TEST(LiveSkinTest, BodiesThatCannotGoOnDoNotStay) {
+  const LinkModel model = Model("cylinder");
+  HandledSkin skin(model, SceneOf(Pressure(0.5)));
+  std::vector<PressedBody> bodies;
+  const auto press = [&](BodyShape shape, double angle_deg, double z_mm) {
+    bodies.push_back({.id = 1 + bodies.size(),
+                      .shape = shape,
+                      .at = {RadFromDeg(angle_deg), z_mm},
+                      .depth_mm = std::nullopt,
+                      .force_n = 1});
+  };
+  press(BodyShape::kFinger, 0, 40);
+  press(BodyShape::kSphere, 180, 100);
+  press(BodyShape::kDisc, 45, 80);
+  press(BodyShape::kHand, 20, 110);
+  skin.Play({.bodies = bodies}, 4);
+  ASSERT_GE(skin.truth().contacts.size(), 4u);
+  ASSERT_FALSE(skin.truth().trouble.empty()) << "else this tests nothing";
+  EXPECT_EQ(skin.Play({}, 4).contacts.size(), 0u);
+}
+
 TEST(LiveSkinTest, AHandPressesFromBothSides) {
   const LinkModel model = Model("barrel");
   HandledSkin skin(model, SceneOf(Pressure(0.5)));
