@@ -184,7 +184,8 @@ struct Thresholds;
 /// Errors: kInvalidArgument (not 0 <= hysteresis < warning <= alarm, absurd).
 Result<void> CheckThresholds(const Thresholds& thresholds);
 
-/// Of the strongest contact's magnitude (Contact::magnitude_n). A level is entered at its threshold and left below it by `hysteresis_n`.
+/// Of the strongest contact's magnitude (Contact::magnitude_n). A level is entered at its threshold and left
+/// below it by `hysteresis_n`.
 struct Thresholds {
   double warning_n = 0, alarm_n = 0, hysteresis_n = 0.05;
   void Describe(FieldVisitor& visit) {

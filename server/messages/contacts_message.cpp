@@ -57,13 +57,16 @@ void FillJoints(const std::vector<JointLoad>& loads, v1::StreamContactsResponse&
   if (!known) out.clear_joint_torque_sigmas();
 }
 
-// All at one time, so that bodies which touch stay together.
-void FillFrames(const std::vector<std::shared_ptr<const LinkContacts>>& newest, const ArmPoses& poses,
-                v1::StreamContactsResponse& out) {
+// All at one time, so that links and bodies which touch stay together.
+void FillDrawn(const std::vector<std::shared_ptr<const LinkContacts>>& newest, const ArmPoses& poses,
+               v1::StreamContactsResponse& out) {
   int64_t time_ns = 0;
   for (const auto& link : newest)
     if (link) time_ns = std::max(time_ns, link->times.exposure_monotonic_ns);
-  if (time_ns == 0) return;
+  if (time_ns == 0 || poses.kinematics() == nullptr) return;
+  for (int link = 0; link < out.links_size(); ++link)
+    wire::Fill(poses.At(static_cast<size_t>(link), time_ns).base_from_link,
+               *out.mutable_links(link)->mutable_drawn_base_from_link());
   const std::vector<LinkPose> drawn = poses.DrawnFrames(time_ns);
   for (size_t i = 0; i < drawn.size(); ++i) {
     v1::FramePose& pose = *out.add_frame_poses();
@@ -113,7 +116,7 @@ void Fill(const std::vector<std::shared_ptr<const LinkContacts>>& newest,
   if (std::ranges::any_of(out.links(), is_unknown)) out.clear_joint_torque_sigmas();
   for (const JointInfo& joint : joints) out.add_joint_names(joint.name);
   out.set_validity(ToWire(worst));
-  FillFrames(newest, poses, out);
+  FillDrawn(newest, poses, out);
 }
 
 }  // namespace taclink::server

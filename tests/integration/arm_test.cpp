@@ -223,6 +223,21 @@ TEST_F(ArmTest, BodiesMoveWithTheJoints) {
   EXPECT_NEAR(contacts.frame_poses(0).base_from_frame().translation_m().y(), 0.55, 1e-12);
 }
 
+// Contacts are where the link was at their exposure; for drawing, all links are where they are at the newest
+// one.
+TEST_F(ArmTest, LinksWithOlderFramesAreDrawnWithTheOthers) {
+  Joints({0, 0}, milliseconds(-100));
+  Joints({kPi / 2, 0});
+  server_->Publish(0, 5, Now() - 40 * kMs, Now() - 50 * kMs);
+  server_->Publish(1, 8, Now(), Now());
+  const auto contacts = NextOf(*Contacts());
+  ASSERT_EQ(contacts.links_size(), 2);
+  // Turned by half a right angle, with the link's 20 mm beside the wrist.
+  EXPECT_NEAR(contacts.links(0).base_from_link().translation_m().y(), (0.55 - 0.02) * std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(contacts.links(0).drawn_base_from_link().translation_m().y(), 0.55, 1e-12);
+  EXPECT_NEAR(contacts.links(1).drawn_base_from_link().translation_m().z(), 0.25, 1e-12);
+}
+
 TEST_F(ArmTest, CallsEndWithTheServer) {
   const auto reader = Contacts();
   NextOf(*reader);

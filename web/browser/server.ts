@@ -70,6 +70,14 @@ export class Server {
     });
   }
 
+  /** Stops the process where it is, and lets it go on. A page notices after some seconds. */
+  pause(): void {
+    this.process?.kill("SIGSTOP");
+  }
+  resume(): void {
+    this.process?.kill("SIGCONT");
+  }
+
   async close(): Promise<void> {
     await this.kill();
     rmSync(this.folder, { recursive: true, force: true });

@@ -148,9 +148,11 @@ export class ArmStore {
   takeContacts(contacts: StreamContactsResponse): void {
     const links = new Map<string, Pose>();
     for (const link of contacts.links) {
-      if (!link.baseFromLink) continue;
-      links.set(link.link, link.baseFromLink);
-      this.link(link.link).now.pose = link.baseFromLink;
+      // All of one moment, or an arm that moves would be drawn in pieces.
+      const pose = link.drawnBaseFromLink ?? link.baseFromLink;
+      if (!pose) continue;
+      links.set(link.link, pose);
+      this.link(link.link).now.pose = pose;
       this.changed(link.link);
     }
     if (this.keepsPast)

@@ -62,11 +62,12 @@ function SmallMap({ link }: { link: Link }) {
       onClick={() => (app.link.value = link.name)}
     >
       <canvas ref={canvas} aria-hidden="true" />
-      <span>
+      <span class="caption">
         <span class={`status s${status}`} aria-label={STATUS_WORDS[status]}>
           {STATUS_SIGNS[status]}
-        </span>{" "}
-        {link.name} <span class="numbers">{force}</span>
+        </span>
+        <span class="name">{link.name}</span>
+        <span class="numbers">{force}</span>
       </span>
     </button>
   );

@@ -119,8 +119,9 @@ function collect(store: ArmStore, what: What, link: string, fromS: number, toS: 
     const at = secondsOf(event.times?.exposureUtcNs || event.times?.raisedUtcNs || 0n);
     return at >= fromS && at <= toS && event.kind !== EventKind.CONTACT_UPDATE;
   });
-  const thresholds = arm?.links.find((each) => each.name === link)?.forceLevels[0]?.thresholds;
   if (what === "contacts") {
+    // Each contact is compared with them, not what all of them press together.
+    const thresholds = arm?.links.find((each) => each.name === link)?.forceLevels[0]?.thresholds;
     const contacts = store.link(link).history.contactsIn(fromS, toS, BINS, MOST_CONTACTS);
     const names = [...contacts.keys()].map((id) => `#${id}`);
     const own = events.filter((event) => event.link === link);
@@ -128,7 +129,7 @@ function collect(store: ArmStore, what: What, link: string, fromS: number, toS: 
   }
   const names = arm?.links.map((each) => each.name) ?? [];
   const series = names.map((name) => store.link(name).history.totalsIn(fromS, toS, BINS, HOLD_S));
-  return { names, data: [times, ...series], thresholds, events };
+  return { names, data: [times, ...series], thresholds: undefined, events };
 }
 
 /** The chart; made again when there are other curves. */
