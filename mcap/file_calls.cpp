@@ -1,8 +1,10 @@
 #include "mcap/file_calls.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 
 namespace taclink::mcap {
@@ -29,6 +31,14 @@ off_t FileCalls::Seek(int file, off_t offset) {
   return ::lseek(file, offset, SEEK_SET);
 }
 int FileCalls::Rename(const std::string& from, const std::string& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return -1;
+  // NFS and others have no such call. Another program may create `to` between the two calls.
+  struct stat there{};
+  if (::lstat(to.c_str(), &there) == 0) {
+    errno = EEXIST;
+    return -1;
+  }
   return std::rename(from.c_str(), to.c_str());
 }
 int FileCalls::Status(int file, struct stat& out) {
@@ -39,6 +49,9 @@ int FileCalls::Status(const std::string& path, struct stat& out) {
 }
 int FileCalls::Access(const std::string& path, int mode) {
   return ::access(path.c_str(), mode);
+}
+int FileCalls::Lock(int file) {
+  return ::flock(file, LOCK_EX | LOCK_NB);
 }
 
 FileCalls& FileCalls::System() {

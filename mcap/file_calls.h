@@ -20,10 +20,12 @@ class FileCalls {
   virtual int SyncFolder(int folder);  ///< fsync
   virtual int Truncate(int file, off_t length);
   virtual off_t Seek(int file, off_t offset);
+  /// Replaces nothing: EEXIST where `to` exists.
   virtual int Rename(const std::string& from, const std::string& to);
   virtual int Status(int file, struct stat& out);
   virtual int Status(const std::string& path, struct stat& out);  ///< lstat
   virtual int Access(const std::string& path, int mode);
+  virtual int Lock(int file);  ///< flock, exclusive, without waiting
 
   /// The system's own.
   static FileCalls& System();

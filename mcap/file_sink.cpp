@@ -18,6 +18,7 @@ Error FileError(int number, const std::string& doing, const std::string& path) {
   const std::string what = doing + " '" + path + "': " + std::generic_category().message(number);
   switch (number) {
     case EEXIST:
+    case EWOULDBLOCK:  // a new file that another program has locked first
       return {ErrorCode::kFailedPrecondition, what + "; choose another name or move the old file away"};
     case ENOENT:
     case ENOTDIR:
@@ -72,6 +73,12 @@ int WriteAll(FileCalls& calls, int file, std::span<iovec> pieces) {
 Result<std::unique_ptr<FileSink>> FileSink::Create(const std::string& path, FileCalls& calls) {
   const int file = calls.Open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
   if (file < 0) return FileError(errno, "can't create", path);
+  while (calls.Lock(file) != 0) {
+    if (errno == EINTR) continue;
+    if (errno != EWOULDBLOCK) break;  // a file system without locks
+    calls.Close(file);
+    return FileError(EWOULDBLOCK, "can't lock", path);
+  }
   return std::unique_ptr<FileSink>(new FileSink(path, file, calls));
 }
 

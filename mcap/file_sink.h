@@ -8,13 +8,14 @@
 
 namespace taclink::mcap {
 
-/// A new file, which others than owner and group may not read. Errors name the path, what the system said,
-/// and what to do.
+/// A new file, which others than owner and group may not read. It is locked (flock) until this object is
+/// destroyed, where its file system has locks: who finds it unlocked may take it for left behind. Errors name
+/// the path, what the system said, and what to do.
 class FileSink : public ByteSink {
  public:
-  /// Errors: kFailedPrecondition (the file is there already), kNotFound (its folder is not),
-  /// kPermissionDenied, kResourceExhausted (the disk is full), kUnavailable (what else the system says).
-  /// `calls` must outlive it.
+  /// Errors: kFailedPrecondition (the file exists, or another process has locked it), kNotFound (its folder
+  /// is not), kPermissionDenied, kResourceExhausted (the disk is full), kUnavailable (what else the system
+  /// says). `calls` must outlive it.
   static Result<std::unique_ptr<FileSink>> Create(const std::string& path,
                                                   FileCalls& calls = FileCalls::System());
   ~FileSink() override;

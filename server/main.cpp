@@ -193,7 +193,7 @@ Result<void> Run(const Options& options, const Config& config) {
   if (!gateway) return gateway.error();
   const std::jthread watch = (*security)->Watch();
   PingSystemd(arm, systemd);
-  recorder.Open();  // before the first frame
+  if (options.replay.empty()) recorder.Open();  // before the first frame
   arm.Start();
   Reloader reloader(config);
   AddReloads(reloader, **server, arm);

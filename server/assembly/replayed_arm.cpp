@@ -132,7 +132,8 @@ Result<ReplayedArm> BuildReplayedArm(const ReplayedLog& log, const Config& confi
   const auto& statistics = log.reader->statistics();
   const auto schedule =
       std::make_shared<ReplaySchedule>(static_cast<int64_t>(statistics.message_start_ns),
-                                       static_cast<int64_t>(statistics.message_end_ns), clock);
+                                       static_cast<int64_t>(statistics.message_end_ns), clock,
+                                       LogGaps(*log.reader));
   auto poses = BuildPoses(log, config);
   if (!poses) return poses.error();
   std::vector<LinkParts> links;

@@ -20,8 +20,9 @@ constexpr int64_t kArmPeriodNs = 1'000'000'000;
 
 }  // namespace
 
-ArmRecorder::ArmRecorder(Arm& arm, double scene_rate_hz, Write write)
+ArmRecorder::ArmRecorder(Arm& arm, const LogClock& log_clock, double scene_rate_hz, Write write)
     : arm_(arm),
+      log_clock_(log_clock),
       write_(std::move(write)),
       link_names_(arm.link_names()),
       joints_(arm.poses().joints().joints()),
@@ -77,7 +78,7 @@ void ArmRecorder::TakeEvents() {
     v1::Event message;
     Fill(event, event.link ? link_names_[*event.link] : std::string(), message);
     write_({.kind = TopicKind::kEvents}, message,
-           {.log_utc_ns = event.raised_utc_ns, .sequence = event.sequence});
+           {.log_utc_ns = log_clock_.Utc(event.raised_ns), .sequence = event.sequence});
     ++events_;
     if (event.kind == EventKind::kContactBegin) ++contacts_begun_;
   }
@@ -86,7 +87,6 @@ void ArmRecorder::TakeEvents() {
 // One message for all joints that have a state of the same instant.
 void ArmRecorder::TakeJoints() {
   if (joints_.empty()) return;
-  const int64_t utc_offset_ns = arm_.clock().UtcNs() - arm_.clock().MonotonicNs();
   std::map<int64_t, v1::JointSample> samples;
   for (size_t joint = 0; joint < joints_.size(); ++joint) {
     for (const JointSample& state : arm_.poses().joints().After(joint, joint_times_[joint])) {
@@ -100,7 +100,7 @@ void ArmRecorder::TakeJoints() {
   for (auto& [time_ns, sample] : samples) {
     if (sample.velocities_size() != sample.positions_size()) sample.clear_velocities();
     sample.set_monotonic_ns(time_ns);
-    sample.set_utc_ns(time_ns + utc_offset_ns);
+    sample.set_utc_ns(log_clock_.Utc(time_ns));
     write_({.kind = TopicKind::kJoints}, sample, {.log_utc_ns = sample.utc_ns()});
   }
 }
@@ -111,7 +111,7 @@ void ArmRecorder::TakeArm() {
   arm_ns_ = now_ns;
   v1::Arm message;
   Fill(arm_, message);
-  write_({.kind = TopicKind::kArm}, message, {.log_utc_ns = arm_.clock().UtcNs()});
+  write_({.kind = TopicKind::kArm}, message, {.log_utc_ns = log_clock_.NowUtc()});
 }
 
 }  // namespace taclink::server

@@ -8,6 +8,7 @@
 
 #include "server/arm/arm.h"
 #include "server/hub/rate_limit.h"
+#include "server/recording/log_clock.h"
 #include "taclink/v1/contacts.pb.h"
 #include "wire/log/log_writer.h"
 
@@ -22,8 +23,8 @@ class ArmRecorder {
   using Write = std::function<void(const Topic& topic, const google::protobuf::Message& message,
                                    const wire::log::Stamp& stamp)>;
 
-  /// Events and joint states from now on. The arm must outlive it.
-  ArmRecorder(Arm& arm, double scene_rate_hz, Write write);
+  /// Events and joint states from now on. The arm and `log_clock`, which gives log times, must outlive it.
+  ArmRecorder(Arm& arm, const LogClock& log_clock, double scene_rate_hz, Write write);
 
   /// A new log has begun: what does not change is told again.
   void BeginLog();
@@ -43,6 +44,7 @@ class ArmRecorder {
 
   // Constant after construction.
   Arm& arm_;
+  const LogClock& log_clock_;
   const Write write_;
   const std::vector<std::string> link_names_;
   const std::vector<JointInfo> joints_;

@@ -10,11 +10,14 @@
 #include <cstring>
 #include <ctime>
 #include <filesystem>
+#include <set>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include "mcap/file_sink.h"
 #include "mcap/recover.h"
+#include "server/recording/file_lock.h"
 
 namespace taclink::server {
 namespace {
@@ -107,10 +110,15 @@ std::vector<LogFileEntry> LogFolder::List() const {
     log.bytes = at->file_size(gone);
     if (!gone) logs.push_back(std::move(log));
   }
-  // A log that is closed at this very moment may show twice, or an open one beside its recovered twin.
-  std::sort(logs.begin(), logs.end(), [](const auto& a, const auto& b) {
-    return a.name != b.name ? a.name < b.name : a.open < b.open;
+  const auto ranks = LogOrder(path_, calls_).Ranks();
+  const auto rank = [&ranks](const LogFileEntry& log) {
+    const auto at = ranks.find(log.name);
+    return at == ranks.end() ? uint64_t{0} : at->second;
+  };
+  std::sort(logs.begin(), logs.end(), [&rank](const auto& a, const auto& b) {
+    return std::tuple(rank(a), a.name, a.open) < std::tuple(rank(b), b.name, b.open);
   });
+  // A log that is closed at this very moment may show twice, or an open one beside its recovered twin.
   logs.erase(
       std::unique(logs.begin(), logs.end(), [](const auto& a, const auto& b) { return a.name == b.name; }),
       logs.end());
@@ -163,6 +171,10 @@ std::vector<std::string> LogFolder::EnforceQuota(uint64_t quota_bytes) const {
     bytes -= log.bytes;
     deleted.push_back(log.name);
   }
+  if (deleted.empty()) return deleted;
+  std::set<std::string> existing;
+  for (const LogFileEntry& log : List()) existing.insert(log.name);
+  LogOrder(path_, calls_).Compact(existing);
   return deleted;
 }
 
@@ -183,9 +195,16 @@ std::vector<LogFileEntry> LogFolder::Unfinished() const {
   return logs;
 }
 
-std::string LogFolder::Recover(const std::string& name, const std::stop_token& stop) const {
+std::optional<std::string> LogFolder::Recover(const std::string& name, const std::stop_token& stop) const {
   const std::string part = PartPath(name), fresh = FinalPath(name) + std::string(kRecovering);
   std::error_code ignored;
+  const auto lock = FileLock::TryTake(part, calls_);
+  if (!lock && lock.error().code != ErrorCode::kUnavailable) return std::nullopt;
+  if (!lock)
+    return lock.error().message +
+           ". It may be one that another server is writing, and stays as it is: if it is not, use 'taclink "
+           "log "
+           "recover'";
   fs::remove(fresh, ignored);  // of a recovery that was cut off
   const auto failed = [&](const Error& error) {
     fs::remove(fresh, ignored);
@@ -205,11 +224,8 @@ std::string LogFolder::Recover(const std::string& name, const std::stop_token& s
   if (nothing && (*source)->size() > 0)
     return failed({ErrorCode::kInvalidArgument, "nothing in it is intact"});
   if (const auto synced = (*sink)->Sync(); !synced) return failed(synced.error());
-  std::error_code error;
-  if (fs::exists(FinalPath(name), error))
-    return failed({ErrorCode::kFailedPrecondition, FinalPath(name) + " is there already"});
-  fs::rename(fresh, FinalPath(name), error);
-  if (error) return failed(FromSystem(fresh, error));
+  if (calls_.Rename(fresh, FinalPath(name)) != 0)
+    return failed(FromSystem(fresh, {errno, std::generic_category()}));
   if (const auto synced = SyncFolder(calls_, path_); !synced) return failed(synced.error());
   fs::remove(part, ignored);
   return name + " was not closed; made whole: " + report->scan.Text();

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "mcap/file_calls.h"
 #include "sensing/core/result.h"
+#include "server/recording/log_order.h"
 
 namespace taclink::server {
 
@@ -33,7 +35,8 @@ class LogFolder {
   const std::string& path() const { return path_; }
   mcap::FileCalls& calls() const { return calls_; }
 
-  /// Oldest first, as the names tell it.
+  /// In the order in which they were begun (LogOrder). Before those are logs that were not recorded here,
+  /// such as copied ones, by name.
   std::vector<LogFileEntry> List() const;
   /// Errors: kNotFound, kInvalidArgument (no name of a log).
   Result<LogFileEntry> Find(const std::string& name) const;
@@ -41,20 +44,25 @@ class LogFolder {
   std::string PathOf(const LogFileEntry& log) const;
   std::string FinalPath(const std::string& name) const { return path_ + "/" + name; }
   std::string PartPath(const std::string& name) const { return FinalPath(name) + ".part"; }
-  /// From ".part" to the final name, safe from a power cut. Errors: the system's.
+  /// From ".part" to the final name, safe from a power cut. Errors: the system's; a log that has the final
+  /// name already is not replaced.
   Result<void> Finish(const std::string& name) const;
   /// Errors: kNotFound, kFailedPrecondition (open), or the system's.
   Result<void> Delete(const std::string& name) const;
+  /// A log of this name is about to be begun: it is the newest. Errors: kUnavailable.
+  Result<void> Begin(const std::string& name) const { return LogOrder(path_, calls_).Append(name); }
   /// Deletes the oldest that are not open until all together are below `quota_bytes`. Returns their names.
   std::vector<std::string> EnforceQuota(uint64_t quota_bytes) const;
   /// Free space for this user; 0: not known.
   uint64_t FreeBytes() const;
 
-  /// Logs that are open: before a recording begins, those that an earlier run left so.
+  /// Logs that are open: those that are being written, by this server or another, and those that a killed
+  /// server has left so.
   std::vector<LogFileEntry> Unfinished() const;
-  /// Makes such a log whole: what is intact goes to a log under its final name. Returns what came of it, for
-  /// people.
-  std::string Recover(const std::string& name, const std::stop_token& stop = {}) const;
+  /// Makes a log whole that nobody writes any more: what is intact goes to a log under its final name.
+  /// Returns what came of it, for people; none: it is being written (its file is locked), or another server
+  /// has made it whole meanwhile. It stays untouched where the file system has no locks.
+  std::optional<std::string> Recover(const std::string& name, const std::stop_token& stop = {}) const;
 
  private:
   const std::string path_;

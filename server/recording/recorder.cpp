@@ -70,7 +70,7 @@ void Recorder::Open() {
       SetUpThread("log-mender", {});
       for (const LogFileEntry& log : unfinished) {
         if (stop.stop_requested()) return;
-        SPDLOG_WARN("recording: {}", folder.Recover(log.name, stop));
+        if (const auto outcome = folder.Recover(log.name, stop)) SPDLOG_WARN("recording: {}", *outcome);
       }
     });
   }

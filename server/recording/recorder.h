@@ -23,8 +23,9 @@ class Recorder {
   /// Ends the recording that is under way, if any.
   void Close();
 
-  /// Looks at the folder, begins to mend logs that an earlier run left open, and begins the recording that
-  /// the configuration asks for. What fails is logged: sensing goes on without it.
+  /// Looks at the folder, begins to recover logs that a killed server has left open, and begins the recording
+  /// that the configuration asks for. What fails is logged: sensing goes on without it. Not for a server that
+  /// plays a log: it changes nothing in the folder unless an operator records.
   void Open();
   /// Errors: kFailedPrecondition (one is under way, no folder), kInvalidArgument, kNotFound (no such link),
   /// or what the folder says.

@@ -1,5 +1,6 @@
 #include "server/recording/recording.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -35,6 +36,14 @@ uint64_t Megabytes(double mb) {
   return static_cast<uint64_t>(mb * 1e6);
 }
 
+// The first of them; an event has room for some.
+std::string NamesOf(const std::vector<std::string>& logs) {
+  constexpr size_t kMost = 8;
+  std::string out;
+  for (size_t i = 0; i < std::min(logs.size(), kMost); ++i) out += (i == 0 ? "" : ", ") + logs[i];
+  return logs.size() > kMost ? fmt::format("{} and {} more", out, logs.size() - kMost) : out;
+}
+
 mcap::WriterOptions ToWriter(const RecordingOrder& order) {
   mcap::WriterOptions options{.compression = order.compression};
   if (order.pictures) options.chunk_bytes = kPictureChunkBytes;
@@ -50,6 +59,7 @@ Recording::Recording(Arm& arm, const RecordingConfig& config, const LogFolder& f
       order_(std::move(order)),
       preamble_(std::move(preamble)),
       folder_(folder),
+      log_clock_(arm.clock()),
       losses_(arm.links().size()),
       dropped_(arm.links().size(), 0) {}
 
@@ -60,11 +70,11 @@ Result<std::unique_ptr<Recording>> Recording::Start(Arm& arm, const RecordingCon
   auto file = out->NewFile();
   if (!file) return file.error();
   out->file_ = std::move(*file);
-  out->synced_ns_ = out->looked_ns_ = out->quota_ns_ = out->file_begun_ns_ = arm.clock().MonotonicNs();
+  out->synced_ns_ = out->looked_ns_ = out->quota_ns_ = arm.clock().MonotonicNs();
   out->status_.set_started_utc_ns(out->file_->started_utc_ns());
   out->status_.set_pictures(order.pictures);
   out->others_ = std::make_unique<ArmRecorder>(
-      arm, config.scene_rate_hz,
+      arm, out->log_clock_, config.scene_rate_hz,
       [self = out.get()](const auto& topic, const auto& message, const auto& stamp) {
         self->Wrote(self->file_->writer().Write(topic, message, stamp));
       });
@@ -111,10 +121,12 @@ void Recording::Run(const std::stop_token& stop) {
     std::unique_lock lock(mutex);
     if (subscription_->waiting() == 0) stopped.wait_for(lock, stop, kPoll, [] { return false; });
     Guarded([&] {
+      FollowClock();
       Drain(kRoundNs);
       LookIfDue();
       SyncIfDue();
       SplitIfDue();
+      EnforceQuotaIfDue();
     });
     UpdateStatus();
   }
@@ -172,18 +184,12 @@ void Recording::NoteDrops() {
   if (!std::exchange(is_behind_, true)) TellTrouble("behind", kBehind);
 }
 
-int64_t Recording::UtcOf(const LinkState& state) const {
-  const FrameTimes& times = state.times;
-  if (times.exposure_utc_ns != 0 && !state.replayed)
-    return times.exposure_utc_ns + (times.published_ns - times.exposure_monotonic_ns);
-  return arm_.clock().UtcNs() - (arm_.clock().MonotonicNs() - times.published_ns);
-}
-
 void Recording::TakeFrame(const Publication& publication, const PicturesPtr& pictures) {
   const LinkState& state = publication.state();
   const std::string& link = arm_.links()[publication.link()].name;
-  const wire::log::Stamp stamp{
-      .log_utc_ns = UtcOf(state), .publish_utc_ns = state.times.exposure_utc_ns, .sequence = state.sequence};
+  const wire::log::Stamp stamp{.log_utc_ns = log_clock_.Utc(state.times.published_ns),
+                               .publish_utc_ns = state.times.exposure_utc_ns,
+                               .sequence = state.sequence};
   TellLosses(publication.link(), state.sequence);
   wire::log::LogWriter& writer = file_->writer();
   for (size_t i = 0; pictures && i < pictures->raw.size(); ++i) {
@@ -205,7 +211,7 @@ void Recording::TakeFrame(const Publication& publication, const PicturesPtr& pic
 void Recording::TellLosses(size_t link, uint64_t next_sequence) {
   auto loss = losses_.Untold(link, next_sequence);
   if (!loss) return;
-  const int64_t utc_ns = arm_.clock().UtcNs();
+  const int64_t utc_ns = log_clock_.NowUtc();
   loss->set_link(arm_.links()[link].name);
   loss->set_utc_ns(utc_ns);
   const auto written = file_->writer().Write({.kind = TopicKind::kLosses}, *loss, {.log_utc_ns = utc_ns});
@@ -290,18 +296,35 @@ bool Recording::Sync() {
   return false;
 }
 
+// Times before and after a step are on two time lines, and a log has one.
+void Recording::FollowClock() {
+  const auto step_ns = log_clock_.Step();
+  if (!step_ns) return;
+  SPDLOG_WARN("recording: the clock was set by {:+.3f} s; another log begins",
+              static_cast<double>(*step_ns) * 1e-9);
+  if (const auto next = NextFile(); !next) SetTrouble(split_trouble_, next.error().message);
+}
+
 void Recording::SplitIfDue() {
-  const int64_t now_ns = arm_.clock().MonotonicNs();
-  const int64_t age_ns = now_ns - file_begun_ns_;  // the wall clock may be set meanwhile
   const bool large = config_.split_mb > 0 && file_->bytes() >= Megabytes(config_.split_mb);
-  const bool old = config_.split_s > 0 && static_cast<double>(age_ns) >= config_.split_s * 1e9;
+  const bool old = config_.split_s > 0 && static_cast<double>(log_clock_.AgeNs()) >= config_.split_s * 1e9;
   if ((large || old) && trouble_.text.empty() && place_trouble_.text.empty()) {
     if (const auto next = NextFile(); !next) SetTrouble(split_trouble_, next.error().message);
   }
+}
+
+void Recording::EnforceQuotaIfDue() {
+  const int64_t now_ns = arm_.clock().MonotonicNs();
   if (config_.quota_mb <= 0 || now_ns - quota_ns_ < kQuotaPeriodNs) return;
   quota_ns_ = now_ns;
-  for (const std::string& name : folder_.EnforceQuota(Megabytes(config_.quota_mb)))
-    SPDLOG_INFO("recording: {} deleted for recording.quota_mb", name);
+  const auto deleted = folder_.EnforceQuota(Megabytes(config_.quota_mb));
+  if (deleted.empty()) return;
+  const std::string what = fmt::format("{} deleted: the logs of {} exceeded recording.quota_mb ({})",
+                                       NamesOf(deleted), folder_.path(), config_.quota_mb);
+  SPDLOG_INFO("recording: {}", what);
+  arm_.events().Post(
+      EventKind::kRecording, std::nullopt,
+      {.who = "server", .outcome = what, .values = {{"logs_deleted", static_cast<double>(deleted.size())}}});
 }
 
 // Errors: as LogFile::Create; the log that is there goes on.
@@ -311,7 +334,7 @@ Result<void> Recording::NextFile() {
   const std::unique_ptr<LogFile> last = std::exchange(file_, std::move(*next));
   CloseFile(*last);
   losses_.NextLog();
-  file_begun_ns_ = arm_.clock().MonotonicNs();
+  log_clock_.Begin();
   chunks_ = 0;
   frames_before_ = losses_.written();
   bytes_ += last->bytes();

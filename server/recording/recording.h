@@ -14,6 +14,7 @@
 #include "server/config/options.h"
 #include "server/hub/rate_limit.h"
 #include "server/recording/arm_recorder.h"
+#include "server/recording/log_clock.h"
 #include "server/recording/log_digest.h"
 #include "server/recording/log_file.h"
 #include "server/recording/log_folder.h"
@@ -67,12 +68,13 @@ class Recording {
   void SyncIfDue();
   bool Sync();
   void SplitIfDue();
+  void FollowClock();
+  void EnforceQuotaIfDue();
   Result<void> NextFile();
   void CloseFile(LogFile& file);
   void SetTrouble(Trouble& trouble, const std::string& text);
   void TellTrouble(const std::string& kind, const std::string& trouble);
   void UpdateStatus();
-  int64_t UtcOf(const LinkState& state) const;
 
   // Constant after construction.
   Arm& arm_;
@@ -85,6 +87,7 @@ class Recording {
   std::unique_ptr<Subscription> subscription_;
   std::unique_ptr<ArmRecorder> others_;
   std::unique_ptr<LogFile> file_;
+  LogClock log_clock_;
   LossBook losses_;
   LogDigest digest_;                                 // of file_
   std::vector<uint64_t> dropped_;                    // by link, as counted
@@ -92,7 +95,7 @@ class Recording {
   uint64_t chunks_ = 0;                              // of file_, that losses_ knows of
   int part_ = 0;
   int failures_ = 0;  // syncs in a row
-  int64_t synced_ns_ = 0, looked_ns_ = 0, quota_ns_ = 0, file_begun_ns_ = 0;
+  int64_t synced_ns_ = 0, looked_ns_ = 0, quota_ns_ = 0;
   int64_t written_utc_ns_ = 0;  // what was published until then is with the writer
   Trouble trouble_{.kind = "write", .text = {}}, place_trouble_{.kind = "place", .text = {}},
       split_trouble_{.kind = "split", .text = {}};

@@ -51,6 +51,7 @@ Result<std::unique_ptr<LogPlayer>> LogPlayer::Open(std::shared_ptr<const mcap::R
 
 LogPlayer::LogPlayer(std::shared_ptr<const mcap::Reader> reader, PlayerOptions options)
     : reader_(std::move(reader)),
+      gaps_(*reader_),
       options_(std::move(options)),
       head_utc_ns_(options_.from_utc_ns),
       position_utc_ns_(options_.from_utc_ns),
@@ -139,7 +140,7 @@ PlayerStep LogPlayer::AtEnd(int64_t now_ns) {
     if (now_ns < due) return {.kind = PlayerStep::Kind::kWait, .due_ns = due};
     if (again) {
       const PlayerStep step = BeginAnew();
-      anchor_ = {options_.from_utc_ns, due};
+      anchor_ = {gaps_.PlayedNs(options_.from_utc_ns), due};
       return step;
     }
   } else if (again) {
@@ -161,12 +162,12 @@ PlayerStep LogPlayer::BeginAnew() {
 
 int64_t LogPlayer::Due(int64_t log_utc_ns) const {
   const Anchor from = anchor_.value_or(Anchor());  // it is set while playing
-  const double ns = static_cast<double>(log_utc_ns - from.log_utc_ns) / options_.speed;
+  const double ns = static_cast<double>(gaps_.PlayedNs(log_utc_ns) - from.played_ns) / options_.speed;
   return from.clock_ns + static_cast<int64_t>(std::llround(std::clamp(ns, -kLongestNs, kLongestNs)));
 }
 
 void LogPlayer::AnchorAt(int64_t now_ns) {
-  anchor_ = {head_utc_ns_, now_ns};
+  anchor_ = {gaps_.PlayedNs(head_utc_ns_), now_ns};
 }
 
 // Not beyond the next message: who is late goes on with what comes next.
@@ -175,7 +176,7 @@ int64_t LogPlayer::LogTimeAt(int64_t now_ns) {
   const double passed = static_cast<double>(now_ns - anchor_->clock_ns) * options_.speed;
   const auto ahead = static_cast<int64_t>(std::llround(std::clamp(passed, 0.0, kLongestNs)));
   const int64_t limit = Fetch() ? Bounded(next_->log_time_ns) : options_.to_utc_ns;
-  return std::clamp(anchor_->log_utc_ns + ahead, head_utc_ns_, std::max(head_utc_ns_, limit));
+  return std::clamp(gaps_.LogUtcNs(anchor_->played_ns + ahead), head_utc_ns_, std::max(head_utc_ns_, limit));
 }
 
 void LogPlayer::Pause(int64_t now_ns) {

@@ -10,6 +10,7 @@
 
 #include "mcap/cursor.h"
 #include "mcap/reader.h"
+#include "server/replay/log_gaps.h"
 
 namespace taclink::server {
 
@@ -57,6 +58,7 @@ struct PlayerStep {
 
 /// Plays a log's messages in the order of their log times. Holds no thread and no clock: whoever calls Next
 /// with the time gets what is due, or is told when to come again. Who comes late gets all the same, late.
+/// Long times without messages are played as a short pause (LogGaps).
 /// What can't be read is counted and passed over. One thread; reads the log's source.
 class LogPlayer {
  public:
@@ -94,7 +96,7 @@ class LogPlayer {
     mcap::Buffer data;
   };
   struct Anchor {
-    int64_t log_utc_ns = 0;
+    int64_t played_ns = 0;  // as LogGaps counts
     int64_t clock_ns = 0;
   };
 
@@ -113,6 +115,7 @@ class LogPlayer {
 
   // Constant after construction.
   const std::shared_ptr<const mcap::Reader> reader_;
+  const LogGaps gaps_;
 
   PlayerOptions options_;  // speed and loop may change; the range is that of the status
   std::unique_ptr<mcap::MessageCursor> cursor_;

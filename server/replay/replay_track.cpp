@@ -15,9 +15,10 @@ constexpr int64_t kJoinsLateNs = 500'000'000;  // who joins the first round earl
 
 }  // namespace
 
-ReplaySchedule::ReplaySchedule(int64_t from_utc_ns, int64_t to_utc_ns, Clock& clock)
-    : from_utc_ns_(from_utc_ns),
-      length_ns_(std::max(to_utc_ns - from_utc_ns + kPauseNs, kShortestRoundNs)),
+ReplaySchedule::ReplaySchedule(int64_t from_utc_ns, int64_t to_utc_ns, Clock& clock, LogGaps gaps)
+    : gaps_(std::move(gaps)),
+      from_ns_(gaps_.PlayedNs(from_utc_ns)),
+      length_ns_(std::max(gaps_.PlayedNs(to_utc_ns) - from_ns_ + kPauseNs, kShortestRoundNs)),
       clock_(clock) {}
 
 void ReplaySchedule::Begin() {
@@ -26,7 +27,7 @@ void ReplaySchedule::Begin() {
 }
 
 int64_t ReplaySchedule::DueNs(uint64_t round, int64_t log_utc_ns) const {
-  return start_ns_ + static_cast<int64_t>(round) * length_ns_ + (log_utc_ns - from_utc_ns_);
+  return start_ns_ + static_cast<int64_t>(round) * length_ns_ + (gaps_.PlayedNs(log_utc_ns) - from_ns_);
 }
 
 int64_t ReplaySchedule::PassedNs() const {
@@ -36,7 +37,7 @@ int64_t ReplaySchedule::PassedNs() const {
 ReplaySchedule::Place ReplaySchedule::Now() const {
   const int64_t passed = PassedNs();
   return {.round = static_cast<uint64_t>(passed / length_ns_),
-          .log_utc_ns = from_utc_ns_ + passed % length_ns_};
+          .log_utc_ns = gaps_.LogUtcNs(from_ns_ + passed % length_ns_)};
 }
 
 void ReplaySchedule::Reached(uint64_t round) {

@@ -7,6 +7,7 @@
 
 #include "sensing/core/clock.h"
 #include "server/replay/log_channels.h"
+#include "server/replay/log_gaps.h"
 
 namespace taclink::server {
 
@@ -15,7 +16,7 @@ namespace taclink::server {
 class ReplaySchedule {
  public:
   /// Log times, ns since 1970-01-01 UTC.
-  ReplaySchedule(int64_t from_utc_ns, int64_t to_utc_ns, Clock& clock);
+  ReplaySchedule(int64_t from_utc_ns, int64_t to_utc_ns, Clock& clock, LogGaps gaps = {});
 
   /// The first call begins the first round. Before that nothing else may be asked.
   void Begin();
@@ -33,7 +34,8 @@ class ReplaySchedule {
 
  private:
   // Constant after construction.
-  const int64_t from_utc_ns_, length_ns_;
+  const LogGaps gaps_;
+  const int64_t from_ns_, length_ns_;  // as LogGaps counts
   Clock& clock_;
 
   std::atomic<int64_t> start_ns_ = 0;  // monotonic; 0: not begun

@@ -316,6 +316,57 @@ TEST_F(SplitTest, ALogIsClosedAndTheNextBegun) {
     EXPECT_GE(Read<v1::Arm>(PathOf(log.name()), TopicKind::kArm).size(), 1u);
 }
 
+TEST_F(RecordingTest, WhenTheClockIsSetAnotherLogBeginsAndEachKeepsItsTimeLine) {
+  constexpr std::chrono::hours kDay{24};
+  Start();
+  Publish(0, 1, 5);
+  WaitFor([](const auto& status) { return status.frames() == 5; });
+  server_.clock().SetUtc(-kDay);
+  WaitFor([](const auto& status) { return status.logs() == 2; });
+  Publish(0, 6, 8);
+  server_.clock().Advance(std::chrono::seconds(2));
+  const auto stopped = Stop();
+  EXPECT_EQ(stopped.frames(), 8u);
+  EXPECT_EQ(stopped.frames_lost(), 0u);
+  const auto logs = recordings_.List();
+  ASSERT_EQ(logs->logs_size(), 2);
+  constexpr int64_t kMinuteNs = 60'000'000'000;
+  for (const auto& log : logs->logs())
+    EXPECT_LT(log.end_utc_ns() - log.start_utc_ns(), kMinuteNs) << log.name();
+  EXPECT_EQ(logs->logs(0).frames(), 5u) << "in the order of recording, although the clock went back";
+  EXPECT_EQ(logs->logs(1).frames(), 3u);
+  EXPECT_LT(logs->logs(1).end_utc_ns(), logs->logs(0).start_utc_ns());
+}
+
+class QuotaTest : public RecordingTest {
+ protected:
+  QuotaTest() : RecordingTest({.split_mb = 0, .split_s = 10, .quota_mb = 0.001}) {}
+};
+
+TEST_F(QuotaTest, EachDeletionIsAnEventAndTheNewestStay) {
+  Start();
+  Publish(0, 1, 5);
+  WaitFor([](const auto& status) { return status.frames() == 5; });
+  server_.clock().SetUtc(-std::chrono::hours(24));
+  WaitFor([](const auto& status) { return status.logs() == 2; });
+  const std::string newest = recordings_.Status()->log();
+  server_.clock().Advance(std::chrono::seconds(20));
+  const auto deletion = [this] {
+    EventCursor cursor(server_.arm().events().history(), 0, {}, [] {});
+    while (true) {
+      const auto step = cursor.Next();
+      if (step.status) continue;
+      if (!step.event) return std::string();
+      const auto* detail = std::get_if<Operation>(&step.event->detail);
+      if (detail != nullptr && detail->values.contains("logs_deleted")) return detail->outcome;
+    }
+  };
+  WaitFor([&](const auto&) { return !deletion().empty(); });
+  EXPECT_THAT(deletion(), ::testing::HasSubstr("recording.quota_mb"));
+  EXPECT_THAT(deletion(), ::testing::Not(::testing::HasSubstr(newest)));
+  Stop();
+}
+
 /// Files of this process can't grow beyond a limit: as a full disk, but for the error's name.
 class FileLimit {
  public:

@@ -120,6 +120,41 @@ TEST(LogPlayer, SpeedScalesTimeAndMayChange) {
     EXPECT_EQ(player->SetSpeed(bad, player.now_ns).error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST(LogPlayer, ALongTimeWithoutMessagesIsPlayedAsAPause) {
+  constexpr int64_t kYearsNs = 56LL * 365 * 86'400 * 1'000'000'000;
+  for (const size_t chunk_bytes : {size_t{100}, size_t{1} << 20}) {  // between chunks, and within one
+    TestLog log({.chunk_bytes = chunk_bytes});
+    log.Frames(5);
+    for (uint64_t i = 5; i < 10; ++i) log.Frame("a", i, kT0 + kYearsNs + static_cast<int64_t>(i) * 10 * kMs);
+    Played player(log, {.speed = 2});
+    EXPECT_EQ(player.Told(5).back(), "a4");
+    EXPECT_EQ(player.now_ns, kNow + 20 * kMs);
+    EXPECT_EQ(player.Told(), "a5");
+    EXPECT_EQ(player.now_ns, kNow + 20 * kMs + LogGaps::kPauseNs / 2);
+    EXPECT_EQ(player->status().position_utc_ns, kT0 + kYearsNs + 50 * kMs);
+    // Within the pause one is at its end.
+    player->Seek(kT0 + 40 * kMs);
+    EXPECT_EQ(player.Told(), "a3") << "the state before";
+    EXPECT_EQ(player.Told(), "a4");
+    player.now_ns += 100 * kMs;
+    ASSERT_TRUE(player->SetSpeed(1, player.now_ns).ok());
+    EXPECT_EQ(player.Told(), "a5");
+    EXPECT_EQ(player.now_ns % kMs, 0);
+  }
+}
+
+TEST(LogGaps, ShortSilencesAreKept) {
+  TestLog log({.chunk_bytes = 100});
+  log.Frame("a", 0, kT0);
+  log.Frame("a", 1, kT0 + LogGaps::kLeastGapNs - 1);
+  log.Frame("a", 2, kT0 + 2 * LogGaps::kLeastGapNs);
+  const LogGaps gaps(*Open(log.Bytes()));
+  const int64_t one = kT0 + LogGaps::kLeastGapNs - 1, two = kT0 + 2 * LogGaps::kLeastGapNs;
+  EXPECT_EQ(gaps.PlayedNs(one) - gaps.PlayedNs(kT0), LogGaps::kLeastGapNs - 1);
+  EXPECT_EQ(gaps.PlayedNs(two) - gaps.PlayedNs(one), LogGaps::kPauseNs);
+  for (const int64_t time : {kT0, one, two, two + 5}) EXPECT_EQ(gaps.LogUtcNs(gaps.PlayedNs(time)), time);
+}
+
 TEST(LogPlayer, AtSpeed0AllIsThereAtOnce) {
   TestLog log;
   Played player(log.Frames(50), {.speed = 0});
