@@ -23,6 +23,7 @@
 #include "server/config/config.h"
 #include "server/gateway/setup.h"
 #include "server/gateway/static_files.h"
+#include "server/process/descriptors.h"
 #include "server/process/heap.h"
 #include "server/process/log.h"
 #include "server/process/signals.h"
@@ -102,7 +103,7 @@ void AddReloads(Reloader& reloader, RpcServer& server, Arm& arm) {
                  server.SetLimits(ToServiceLimits(next.limits));
                  return Result<void>();
                },
-               {"max_links", "max_calls_per_connection", "max_message_kb", "memory_mb", "keepalive_s",
+               {"max_links", "max_connections", "max_connections_per_peer", "max_calls_per_connection", "max_message_kb", "memory_mb", "keepalive_s",
                 "keepalive_timeout_s", "handshake_timeout_s", "idle_timeout_s"});
   reloader.AddAlways("links", [&arm](const Config&) {
     for (size_t link = 0; link < arm.links().size(); ++link) arm.worker(link).Wake();
@@ -301,6 +302,7 @@ int Main(int argc, char** argv) {
 int main(int argc, char** argv) {
   taclink::KeepFilesFromOthers();
   taclink::server::ReturnLargeBlocks();
+  taclink::server::RaiseDescriptorLimit();
   try {
     return taclink::server::Main(argc, argv);
   } catch (const std::exception& e) {

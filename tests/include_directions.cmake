@@ -78,12 +78,13 @@ folder(server/arm sensing/core sensing/capture server/config server/hub server/p
 folder(server/messages wire server/events server/arm)
 folder(server/recording sensing/core mcap wire wire/log server/config server/process server/hub server/arm server/messages)
 folder(server/replay sensing/core sensing/capture mcap wire wire/log server/process server/link server/arm)
-folder(server/rpc/requests sensing/core server/config server/security)
+folder(server/listener sensing/core server/process server/security)
+folder(server/rpc/requests sensing/core server/config server/listener server/security)
 folder(server/rpc/streams sensing/core sensing/capture mcap wire wire/log server/hub server/link server/events server/security
        server/arm server/messages server/replay server/rpc/requests)
 folder(server/rpc/services sensing/core sensing/simulation wire server/link server/events server/simulation server/security
        server/arm server/messages server/recording server/replay server/rpc/requests server/rpc/streams)
-folder(server/rpc sensing/core server/process server/security server/arm server/rpc/requests server/rpc/services)
+folder(server/rpc sensing/core server/listener server/process server/security server/arm server/rpc/requests server/rpc/services)
 folder(server/publish sensing/core wire server/config server/process server/security server/arm server/messages)
 folder(server/gateway sensing/core server/config server/process server/link server/security server/arm server/rpc server/publish)
 folder(server/assembly sensing/core sensing/yaml sensing/model sensing/camera sensing/capture sensing/pipeline sensing/simulation mcap

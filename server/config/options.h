@@ -24,12 +24,17 @@ namespace taclink::server {
 
 /// What clients may cost. What goes beyond is refused or dropped, and the client learns which limit it was.
 struct LimitsConfig {
-  int max_links = 32, max_streams = 64, max_streams_per_peer = 16, max_calls_per_connection = 100;
+  int max_links = 32, max_connections = 256, max_connections_per_peer = 64;
+  int max_streams = 64, max_streams_per_peer = 16, max_calls_per_connection = 100;
   int max_message_kb = 64, memory_mb = 256, queue_messages = 256, queue_mb = 32, queue_mb_per_peer = 64;
   int keepalive_s = 60, keepalive_timeout_s = 120, handshake_timeout_s = 20, idle_timeout_s = 300;
   void Describe(FieldVisitor& visit) {
     constexpr Range kCount{1, 10000}, kMegabytes{1, 65536}, kDay{1, 86400};
     visit("max_links", max_links, kCount, "Links of the arm; each takes some 100 MB.");
+    visit("max_connections", max_connections, {16, 10000},
+          "Connections of gRPC; a quarter is for this machine.");
+    visit("max_connections_per_peer", max_connections_per_peer, kCount,
+          "Connections of one other address; then the oldest without a good call gives way.");
     visit("max_streams", max_streams, kCount, "Streams of all clients; a quarter is for operators.");
     visit("max_streams_per_peer", max_streams_per_peer, kCount, "Streams of one caller or address.");
     visit("max_calls_per_connection", max_calls_per_connection, kCount, "Concurrent calls.");

@@ -76,6 +76,12 @@ std::string MetricsOf(const Arm& arm, const RpcServer& server, const GatewayCoun
   AddArmMetrics(arm, metrics);
   metrics.Gauge("taclink_streams", "Streams of clients that are open")
       .Value(static_cast<double>(server.streams()));
+  const ListenerCounts& grpc = server.connections();
+  metrics.Gauge("taclink_grpc_connections", "Open connections of gRPC").Value(Number(grpc.connections));
+  metrics.Counter("taclink_grpc_connections_refused_total", "Connections of gRPC that were one too many")
+      .Value(Number(grpc.refused));
+  metrics.Counter("taclink_grpc_violations_total", "Connections that were closed for what they sent")
+      .Value(Number(grpc.violations));
   metrics.Gauge("taclink_http_connections", "Open HTTP connections").Value(Number(counts.connections));
   metrics.Gauge("taclink_http_calls", "gRPC-Web calls under way").Value(Number(counts.calls));
   metrics.Counter("taclink_http_requests_total", "HTTP requests").Value(Number(counts.requests));

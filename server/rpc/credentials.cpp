@@ -90,11 +90,15 @@ class GuardedCredentials final : public grpc::ServerCredentials {
 
 }  // namespace
 
+bool HasTls(const std::string& listen, const Security& security) {
+  return security.tls() != nullptr && !listen.starts_with("unix:");
+}
+
 std::shared_ptr<grpc::ServerCredentials> MakeCredentials(const std::string& listen,
                                                          const std::shared_ptr<const Security>& security) {
   const bool unix_socket = listen.starts_with("unix:");
   const auto tls = security->tls();
-  const bool encrypt = tls != nullptr && !unix_socket;
+  const bool encrypt = HasTls(listen, *security);
   if (!encrypt && !security->needs_token()) return grpc::InsecureServerCredentials();
   auto* const guard =
       new Guard{.security = security, .mutex = {}, .given = {}};  // GuardedCredentials deletes it

@@ -9,6 +9,9 @@
 
 namespace taclink::server {
 
+/// Whether connections at this address are encrypted.
+bool HasTls(const std::string& listen, const Security& security);
+
 /// How gRPC listens at an address: TLS with the certificates of the moment, each call checked against the
 /// table of who may call what; in the clear where `security` asks for nothing. Unix sockets need no TLS.
 std::shared_ptr<grpc::ServerCredentials> MakeCredentials(const std::string& listen,

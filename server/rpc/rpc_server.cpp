@@ -4,12 +4,14 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
+#include <grpcpp/support/server_interceptor.h>
 
-#include <string_view>
+#include <functional>
 #include <utility>
+#include <vector>
 
-#include "server/process/unix_socket.h"
 #include "server/rpc/credentials.h"
+#include "server/security/access.h"
 
 namespace taclink::server {
 namespace {
@@ -26,20 +28,23 @@ void EnablePlugins() {
   static_cast<void>(once);
 }
 
-Result<void> CheckSocketIsFree(const std::string& listen) {
-  constexpr std::string_view kUnixScheme = "unix:";
-  if (!listen.starts_with(kUnixScheme)) return {};
-  const auto listener = ListenerOf(listen.substr(kUnixScheme.size()));
-  if (!listener) return {};
-  const std::string who = *listener == 0 ? "another program" : "process " + std::to_string(*listener);
-  return Error{ErrorCode::kUnavailable,
-               "cannot listen on " + listen + ": " + who + " does; stop it or choose another with --listen"};
-}
+/// Sees each call that has passed the check of its token (credentials.cpp). Intercepts nothing.
+class CallObserver final : public grpc::experimental::ServerInterceptorFactoryInterface {
+ public:
+  CallObserver(bool needs_token, std::function<void(const std::string& peer)> on_call)
+      : needs_token_(needs_token), on_call_(std::move(on_call)) {}
 
-std::string WithPort(const std::string& listen, int port) {
-  if (listen.starts_with("unix:")) return listen;
-  return listen.substr(0, listen.rfind(':') + 1) + std::to_string(port);
-}
+  grpc::experimental::Interceptor* CreateServerInterceptor(grpc::experimental::ServerRpcInfo* call) override {
+    // Whoever may call without a token proves nothing where others need one.
+    if (!needs_token_ || NeededRole(call->method()) != Role::kNobody)
+      on_call_(call->server_context()->peer());
+    return nullptr;
+  }
+
+ private:
+  const bool needs_token_;
+  const std::function<void(const std::string& peer)> on_call_;
+};
 
 }  // namespace
 
@@ -56,25 +61,37 @@ RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const
 Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, Arm& arm, ServiceLimits limits,
                                                     std::shared_ptr<const Security> security,
                                                     Recorder* recorder) {
-  if (const auto free = CheckSocketIsFree(listen); !free) return free.error();
   EnablePlugins();
   if (!security) security = std::make_shared<const Security>();
   std::unique_ptr<RpcServer> out(new RpcServer(arm, limits, security, recorder));
-  int port = 0;
+  auto listener = Listener::Open({.address = listen,
+                                  .has_tls = HasTls(listen, *security),
+                                  .user_timeout = limits.keepalive_timeout,
+                                  .connections = limits.connections});
+  if (!listener) return listener.error();
   grpc::ServerBuilder builder;
   Apply(limits, builder);
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // else two servers share a port without a word
-  builder.AddListeningPort(listen, MakeCredentials(listen, security), &port);
+  std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> observers;
+  observers.push_back(std::make_unique<CallObserver>(
+      security->needs_token(),
+      [listener = listener->get()](const std::string& peer) { listener->Prove(peer); }));
+  builder.experimental().SetInterceptorCreators(std::move(observers));
+  using Connections = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
+  out->acceptor_ = builder.experimental().AddExternalConnectionAcceptor(Connections::FROM_FD,
+                                                                        MakeCredentials(listen, security));
   builder.RegisterService(&out->service_);
   builder.RegisterService(&out->operations_);
   builder.RegisterService(&out->simulations_);
   if (recorder != nullptr) builder.RegisterService(out->recordings_.get());
+  out->listener_ = std::move(*listener);
   out->server_ = builder.BuildAndStart();
-  if (!out->server_ || port == 0) {
-    return Error{ErrorCode::kUnavailable,
-                 "cannot listen on " + listen + "; stop what uses it or choose another with --listen"};
-  }
-  out->address_ = WithPort(listen, port);
+  if (!out->server_) return Error{ErrorCode::kUnavailable, "gRPC cannot be started"};
+  const auto begun = out->listener_->Begin([acceptor = out->acceptor_.get()](int fd) {
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+    connection.fd = fd;
+    acceptor->HandleNewConnection(&connection);
+  });
+  if (!begun) return begun.error();
   out->server_->GetHealthCheckService()->SetServingStatus(v1::TactileService::service_full_name(), true);
   out->server_->GetHealthCheckService()->SetServingStatus(v1::OperationsService::service_full_name(), true);
   out->server_->GetHealthCheckService()->SetServingStatus(v1::SimulationService::service_full_name(), true);
@@ -89,6 +106,7 @@ RpcServer::~RpcServer() {
 
 void RpcServer::Shutdown(const std::string& reason, std::chrono::milliseconds patience) {
   if (!server_) return;
+  listener_->Close();
   server_->GetHealthCheckService()->SetServingStatus(false);
   service_.EndStreams(reason);
   // Calls from within the process lose their last words once gRPC shuts down, so they get their time before.

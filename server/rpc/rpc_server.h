@@ -1,6 +1,7 @@
 #pragma once
 
 #include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
 
 #include <boost/asio/thread_pool.hpp>
 #include <chrono>
@@ -9,6 +10,7 @@
 
 #include "sensing/core/result.h"
 #include "server/arm/arm.h"
+#include "server/listener/listener.h"
 #include "server/rpc/services/operations_service.h"
 #include "server/rpc/services/recording_service.h"
 #include "server/rpc/services/simulation_service.h"
@@ -32,12 +34,13 @@ class RpcServer {
   void Shutdown(const std::string& reason, std::chrono::milliseconds patience);
 
   /// Where it listens, with the real port.
-  const std::string& address() const { return address_; }
+  const std::string& address() const { return listener_->address(); }
   /// For calls from within this process.
   std::shared_ptr<grpc::Channel> InProcessChannel() { return server_->InProcessChannel({}); }
   /// Null: there is none.
   const Recorder* recorder() const { return recordings_ ? &recordings_->recorder() : nullptr; }
   size_t streams() const { return service_.streams(); }
+  const ListenerCounts& connections() const { return listener_->counts(); }
   void SetLimits(ServiceLimits limits) { service_.SetLimits(limits); }
 
  private:
@@ -49,9 +52,10 @@ class RpcServer {
   TactileService service_;
   OperationsService operations_;
   SimulationService simulations_;
-  std::unique_ptr<RecordingService> recordings_;  // null: none
+  std::unique_ptr<RecordingService> recordings_;                              // null: none
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;  // of the listener's connections
+  std::unique_ptr<Listener> listener_;
   std::unique_ptr<grpc::Server> server_;
-  std::string address_;
 };
 
 }  // namespace taclink::server

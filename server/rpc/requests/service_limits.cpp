@@ -14,7 +14,9 @@ constexpr milliseconds kLeastPingInterval{5000};
 
 ServiceLimits ToServiceLimits(const LimitsConfig& config) {
   const auto size = [](int value) { return static_cast<size_t>(value); };
-  return {.max_streams = size(config.max_streams),
+  return {.connections = {.all = size(config.max_connections),
+                          .per_place = size(config.max_connections_per_peer)},
+          .max_streams = size(config.max_streams),
           .max_streams_per_peer = size(config.max_streams_per_peer),
           .queue_messages = size(config.queue_messages),
           .queue_bytes = size(config.queue_mb) << 20,

@@ -6,11 +6,13 @@
 #include <cstddef>
 
 #include "server/config/options.h"
+#include "server/listener/connection_table.h"
 
 namespace taclink::server {
 
 /// LimitsConfig, in the units that the services use.
 struct ServiceLimits {
+  ConnectionLimits connections = {};
   size_t max_streams = 64;
   size_t max_streams_per_peer = 16;
   size_t queue_messages = 256;

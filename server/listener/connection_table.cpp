@@ -1,0 +1,125 @@
+#include "server/listener/connection_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "server/security/shares.h"
+
+namespace taclink::server {
+namespace {
+
+constexpr double kLocalBurst = 512, kLocalPerS = 200;  // programs and scripts on this machine
+constexpr double kRemoteBurst = 128, kRemotePerS = 40;
+constexpr double kPunishedBurst = 1, kPunishedPerS = 20;
+constexpr int64_t kPunishmentNs = 10'000'000'000;
+constexpr size_t kMostPaces = 1024;
+constexpr size_t kMostWaiting = 32;  // of one address
+
+// gRPC writes the brackets of IPv6 in its own way.
+std::string KeyOf(const std::string& peer, const Place& place) {
+  return place.address + peer.substr(std::min(peer.rfind(':'), peer.size()));
+}
+
+// All addresses of this machine are one place.
+std::string NameOf(const Place& place) {
+  return place.local ? "this machine" : place.address;
+}
+
+}  // namespace
+
+template <typename F>
+size_t ConnectionTable::Count(const F& among) const {
+  return static_cast<size_t>(std::count_if(connections_.begin(), connections_.end(), [&](const auto& each) {
+    return !each.second.leaving && among(each.second);
+  }));
+}
+
+template <typename F>
+std::optional<ConnectionTable::Id> ConnectionTable::OldestUnproven(const F& among) {
+  for (auto& [id, connection] : connections_) {
+    if (connection.proven || connection.leaving || !among(connection)) continue;
+    connection.leaving = true;
+    return id;
+  }
+  return std::nullopt;
+}
+
+Result<ConnectionTable::Admission> ConnectionTable::Admit(const std::string& peer) {
+  const Place place = PlaceOf(peer);
+  const size_t kept = Kept(limits_.all);
+  const size_t most_here = place.local ? limits_.all - kept : limits_.per_place;
+  const auto same = [name = NameOf(place)](const Connection& other) { return NameOf(other.place) == name; };
+  const auto remote = [](const Connection& other) { return !other.place.local; };
+  const auto any = [](const Connection&) { return true; };
+  if (Count([&](const Connection& other) { return other.waiting && same(other); }) >= kMostWaiting)
+    return Error{ErrorCode::kResourceExhausted,
+                 fmt::format("connections of {} come faster than they are taken", NameOf(place))};
+  Admission admission;
+  std::string taken;
+  if (Count(same) >= most_here) {
+    taken = fmt::format("all {} connections of {}", most_here, NameOf(place));
+    admission.gives_way = OldestUnproven(same);
+  } else if (!place.local && Count(remote) >= limits_.all - kept) {
+    taken = fmt::format("all {} connections but those kept for this machine", limits_.all - kept);
+    admission.gives_way = OldestUnproven(remote);
+  } else if (Count(any) >= limits_.all) {
+    taken = fmt::format("all {} connections", limits_.all);
+    admission.gives_way = OldestUnproven(any);
+  }
+  if (!taken.empty() && !admission.gives_way)
+    return Error{ErrorCode::kResourceExhausted,
+                 taken +
+                     " are in use; close one or raise limits.max_connections or "
+                     "limits.max_connections_per_peer"};
+  admission.id = ++last_;
+  connections_[admission.id] = {.place = place, .key = KeyOf(peer, place)};
+  return admission;
+}
+
+void ConnectionTable::Remove(Id id) {
+  connections_.erase(id);
+}
+
+std::optional<ConnectionTable::Id> ConnectionTable::GiveWay() {
+  return OldestUnproven([](const Connection&) { return true; });
+}
+
+void ConnectionTable::Prove(const std::string& peer) {
+  const std::string key = KeyOf(peer, PlaceOf(peer));
+  for (auto& [id, connection] : connections_) {
+    if (connection.key == key) connection.proven = true;
+  }
+}
+
+ConnectionTable::Pace& ConnectionTable::PaceOf(const Place& place, int64_t now_ns) {
+  // Addresses that have long been silent are as new ones.
+  if (paces_.size() >= kMostPaces)
+    std::erase_if(paces_, [&](const auto& pace) {
+      return pace.second.punished_until_ns <= now_ns && pace.second.bucket.IsFull(now_ns);
+    });
+  const TokenBucket fresh =
+      place.local ? TokenBucket(kLocalBurst, kLocalPerS) : TokenBucket(kRemoteBurst, kRemotePerS);
+  Pace& pace = paces_.try_emplace(NameOf(place), Pace{.bucket = fresh}).first->second;
+  if (pace.punished_until_ns != 0 && pace.punished_until_ns <= now_ns) pace = {.bucket = fresh};
+  return pace;
+}
+
+int64_t ConnectionTable::WaitNs(Id id, int64_t now_ns) {
+  const auto at = connections_.find(id);
+  if (at == connections_.end()) return 0;
+  Pace& pace = PaceOf(at->second.place, now_ns);
+  at->second.waiting = !pace.bucket.Take(now_ns);
+  return at->second.waiting ? pace.bucket.WaitNs(now_ns) : 0;
+}
+
+void ConnectionTable::Punish(Id id, int64_t now_ns) {
+  const auto at = connections_.find(id);
+  if (at == connections_.end()) return;
+  Pace& pace = PaceOf(at->second.place, now_ns);
+  if (pace.punished_until_ns == 0) pace.bucket = TokenBucket(kPunishedBurst, kPunishedPerS);
+  pace.punished_until_ns = now_ns + kPunishmentNs;
+}
+
+}  // namespace taclink::server

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "sensing/core/result.h"
+#include "server/listener/token_bucket.h"
+#include "server/security/party.h"
+
+namespace taclink::server {
+
+struct ConnectionLimits {
+  size_t all = 256;       ///< a quarter of them is kept for this machine
+  size_t per_place = 64;  ///< of one address; this machine may have three quarters of all
+};
+
+/// The connections of a listener: how many each address may have, which one gives way to a new one, and how
+/// fast new ones are taken. Tokens come later, with the calls: until then a connection is *unproven*, and the
+/// oldest of these gives way, so that who opens connections and says nothing keeps nobody out. Times are
+/// monotonic. Guarded by its owner.
+class ConnectionTable {
+ public:
+  using Id = uint64_t;
+
+  explicit ConnectionTable(const ConnectionLimits& limits) : limits_(limits) {}
+
+  struct Admission {
+    Id id = 0;
+    std::optional<Id> gives_way;  ///< to be ended; does not count any more
+  };
+  /// A new connection from `peer` ("ipv4:192.168.1.5:40000"). Errors: kResourceExhausted (all are proven, or
+  /// too many of the address wait).
+  Result<Admission> Admit(const std::string& peer);
+  void Remove(Id id);
+  /// The oldest unproven connection, which does not count from now on: descriptors have run out. None: there
+  /// is none.
+  std::optional<Id> GiveWay();
+  /// Somebody who may has called over the connection from `peer`.
+  void Prove(const std::string& peer);
+
+  /// How long the next connection of this address must wait before gRPC gets it; 0: not, and it is counted.
+  int64_t WaitNs(Id id, int64_t now_ns);
+  /// The connection did what it must not: its address has to wait for some time.
+  void Punish(Id id, int64_t now_ns);
+
+  size_t size() const { return connections_.size(); }
+
+ private:
+  struct Connection {
+    Place place;
+    std::string key;      // of the peer
+    bool waiting = true;  // not handed over yet
+    bool proven = false;
+    bool leaving = false;  // does not count
+  };
+  /// New connections of one address.
+  struct Pace {
+    TokenBucket bucket;
+    int64_t punished_until_ns = 0;
+  };
+  template <typename F>
+  size_t Count(const F& among) const;
+  template <typename F>
+  std::optional<Id> OldestUnproven(const F& among);
+  Pace& PaceOf(const Place& place, int64_t now_ns);
+
+  const ConnectionLimits limits_;
+  std::map<Id, Connection> connections_;  // the oldest first
+  std::map<std::string, Pace> paces_;     // by address
+  Id last_ = 0;
+};
+
+}  // namespace taclink::server
