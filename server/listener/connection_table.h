@@ -47,6 +47,7 @@ class ConnectionTable {
   void Punish(Id id, int64_t now_ns);
 
   size_t size() const { return connections_.size(); }
+  size_t addresses() const { return paces_.size(); }  ///< whose pace is remembered
 
  private:
   struct Connection {
