@@ -20,6 +20,7 @@
 
 #include "server/config/config.h"
 #include "server/gateway/session.h"
+#include "server/process/socket_options.h"
 #include "server/process/thread_setup.h"
 #include "server/security/party.h"
 #include "server/security/shares.h"
@@ -206,6 +207,7 @@ asio::awaitable<void> Gateway::Running::Accept() {
       continue;  // the socket closes
     }
     socket.set_option(tcp::no_delay(true), ignored);
+    BoundUnsent(socket.native_handle());
     auto current = CurrentTls();
     if (tls_material && !current) continue;
     auto session =

@@ -25,6 +25,7 @@
 #include "sensing/core/clock.h"
 #include "server/listener/listening_socket.h"
 #include "server/listener/read_guard.h"
+#include "server/process/socket_options.h"
 #include "server/process/thread_setup.h"
 
 namespace taclink::server {
@@ -35,9 +36,6 @@ using Id = ConnectionTable::Id;
 constexpr uint64_t kWake = 0, kListening = uint64_t{1} << 63;  // of epoll; else a connection's id
 // Kept for logs, token files, cameras and the HTTP gateway.
 constexpr size_t kReservedDescriptors = 384, kLeastConnections = 16;
-// What waits in the kernel and is not sent yet is out of date when it is sent: a slow link would make all
-// frames and events old. The kernel takes up to twice as much.
-constexpr int kUnsentBytes = 8 << 10;
 constexpr int kAcceptsAtOnce = 64;
 constexpr int64_t kNsPerMs = 1'000'000;
 
@@ -250,7 +248,7 @@ void Listener::Running::Take(int fd, const sockaddr_storage& from) {
   }
   if (!sockets.is_unix()) {
     SetOption(fd, TCP_NODELAY, 1);
-    SetOption(fd, TCP_NOTSENT_LOWAT, kUnsentBytes);
+    BoundUnsent(fd);
     SetOption(fd, TCP_USER_TIMEOUT, static_cast<unsigned>(options.user_timeout.count()));
   }
   connections[id] = {.watch = watch, .fd = fd, .peer = peer, .guarded = {}};

@@ -90,7 +90,8 @@ StreamReactor* TactileService::StreamFrames(grpc::CallbackServerContext* context
                                             const grpc::ByteBuffer* request) {
   auto options = ParseStreamRequest(*request, link_names_, limits());
   if (!options) return RefuseStream(*context, "StreamFrames", options.error());
-  auto stream = std::make_shared<FrameStream>(std::move(*options), link_names_, registry_, senders_);
+  auto stream =
+      std::make_shared<FrameStream>(std::move(*options), link_names_, arm_.clock(), registry_, senders_);
   if (auto* refused = AddOrRefuse(*context, "StreamFrames", stream)) return refused;
   stream->Begin(arm_.hub());
   return stream.get();  // the registry holds it until gRPC is done

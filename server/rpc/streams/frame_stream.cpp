@@ -1,5 +1,6 @@
 #include "server/rpc/streams/frame_stream.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -12,6 +13,7 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kStatusInterval{1};
+constexpr int64_t kLateNs = 200'000'000;
 
 // A slice that keeps the shared bytes alive instead of copying them.
 grpc::Slice SharedSlice(std::shared_ptr<const std::string> bytes) {
@@ -25,26 +27,37 @@ grpc::Slice SharedSlice(std::shared_ptr<const std::string> bytes) {
 
 }  // namespace
 
-FrameStream::FrameStream(FrameStreamOptions options, std::vector<std::string> link_names,
+FrameStream::FrameStream(FrameStreamOptions options, std::vector<std::string> link_names, const Clock& clock,
                          StreamRegistry& registry, std::shared_ptr<boost::asio::thread_pool> senders)
     : PumpedStream(registry, std::move(senders)),
       options_(std::move(options)),
-      link_names_(std::move(link_names)) {}
+      link_names_(std::move(link_names)),
+      clock_(clock) {}
 
 void FrameStream::Begin(Hub& hub) {
   SubscriberOptions options = options_.subscriber;
   options.party_bytes = party_bytes();
+  begun_ns_ = clock_.MonotonicNs();  // the first frames may be older
   subscription_ = hub.Subscribe(std::move(options), Notifier());
   Open();
 }
 
 std::optional<grpc::ByteBuffer> FrameStream::Next() {
-  const bool news = subscription_->dropped() != dropped_told_;
-  if (!status_sent_ || (news && steady_clock::now() - status_time_ >= kStatusInterval)) return Status("");
+  // Asked again once the last message was sent.
+  if (const int64_t published_ns = std::exchange(under_way_ns_, 0); published_ns != 0)
+    lateness_ns_ = std::max(lateness_ns_, clock_.MonotonicNs() - published_ns);
+  if (IsStatusDue()) return Status("");
   bool unchanged = false;
   const auto publication = subscription_->Take(&unchanged);
   if (!publication) return std::nullopt;
+  under_way_ns_ = std::max(publication->state().times.published_ns, begun_ns_);
   return Frame(*publication, unchanged);
+}
+
+bool FrameStream::IsStatusDue() const {
+  if (!status_sent_) return true;
+  const bool news = subscription_->dropped() != dropped_told_ || lateness_ns_ > kLateNs || was_late_;
+  return news && steady_clock::now() - status_time_ >= kStatusInterval;
 }
 
 std::optional<grpc::ByteBuffer> FrameStream::Last(const std::string& reason) {
@@ -68,7 +81,9 @@ grpc::ByteBuffer FrameStream::Status(const std::string& end_reason) {
   }
   status.set_queue_capacity(static_cast<uint32_t>(subscription_->capacity()));
   status.set_queue_capacity_bytes(options_.subscriber.queue_bytes);
+  status.set_lateness_s(static_cast<double>(lateness_ns_) * 1e-9);
   status.set_end_reason(end_reason);
+  was_late_ = std::exchange(lateness_ns_, 0) > kLateNs;
   status_sent_ = true;
   status_time_ = steady_clock::now();
   const grpc::Slice slice(response.SerializeAsString());
