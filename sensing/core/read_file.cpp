@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <limits>
+#include <string_view>
 #include <system_error>
 
 namespace taclink {
@@ -93,6 +94,13 @@ Result<std::string> ReadFile(const std::string& path, size_t most_bytes) {
   if (content && content->size() > most_bytes)
     return TooLarge(path, most_bytes);  // it grows, or hides its size
   return content;
+}
+
+Result<std::string> ReadText(const std::string& path, size_t most_bytes) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  auto text = ReadFile(path, most_bytes);
+  if (text && text->starts_with(kByteOrderMark)) text->erase(0, kByteOrderMark.size());
+  return text;
 }
 
 }  // namespace taclink

@@ -17,6 +17,10 @@ inline constexpr size_t kMostTableBytes = size_t{256} << 20;
 /// larger than `most_bytes`), kUnavailable (the disk).
 Result<std::string> ReadFile(const std::string& path, size_t most_bytes = kMostTextBytes);
 
+/// ReadFile of a text, without the byte order mark with which some editors begin UTF-8: it is no part of the
+/// first word. Errors: likewise.
+Result<std::string> ReadText(const std::string& path, size_t most_bytes = kMostTextBytes);
+
 /// Its first `bytes`, or all of it. Errors: likewise.
 Result<std::string> ReadBeginning(const std::string& path, size_t bytes);
 

@@ -66,7 +66,7 @@ Result<std::string> ReadSecretFile(const std::string& what, const std::string& p
 }
 
 Result<std::string> ReadSecurityFile(const std::string& what, const std::string& path) {
-  auto text = ReadFile(path);
+  auto text = ReadText(path);
   if (!text) return Error{text.error().code, what + " " + text.error().message};
   return text;
 }

@@ -11,10 +11,10 @@ namespace taclink::server {
 /// messages. Errors: kNotFound, kPermissionDenied with what to do.
 Result<void> CheckSecretFile(const std::string& what, const std::string& path);
 
-/// Its content. Errors: likewise, and those of ReadFile.
+/// Its content, as ReadText gives it. Errors: likewise, and those of ReadText.
 Result<std::string> ReadSecretFile(const std::string& what, const std::string& path);
 
-/// The same where anybody may read it. Errors: those of ReadFile, with `what` before.
+/// The same where anybody may read it. Errors: those of ReadText, with `what` before.
 Result<std::string> ReadSecurityFile(const std::string& what, const std::string& path);
 
 }  // namespace taclink::server

@@ -38,15 +38,6 @@ std::string TlsChanges(const TlsMaterial& before, const TlsMaterial& after) {
   return out.empty() ? out : out + " reloaded";
 }
 
-// Whose tokens have expired between two moments.
-std::string ExpiredSince(const Tokens& tokens, int64_t before_s, int64_t now_s) {
-  std::string out;
-  for (const Tokens::Entry& entry : tokens.entries())
-    if (entry.ExpiredAt(now_s) && !entry.ExpiredAt(before_s))
-      out += (out.empty() ? "expired: " : ", ") + entry.caller.name;
-  return out;
-}
-
 void Count(const Tokens& tokens, int64_t now_s, SecurityStatus& out) {
   for (const Tokens::Entry& entry : tokens.entries()) {
     ++(entry.ExpiredAt(now_s) ? out.expired : out.tokens);
@@ -161,14 +152,15 @@ std::shared_ptr<const TlsMaterial> Security::tls() const {
 
 SecurityStatus Security::Status() const {
   SecurityStatus out;
-  const int64_t now_s = clock_.UtcNs() / kNsPerSecond;
+  std::shared_ptr<const Tokens> tokens;
   {
     const std::lock_guard lock(mutex_);
     for (const Part* part : {&tls_part_, &token_part_, &expiry_part_})
       if (!part->complaint.empty())
         out.trouble += (out.trouble.empty() ? "" : "; ") + part->complaint + "; " + part->consequence;
-    if (tokens_) Count(*tokens_, now_s, out);
+    tokens = tokens_;
   }
+  if (tokens) Count(*tokens, clock_.UtcNs() / kNsPerSecond, out);  // calls do not wait for it
   out.refuses_all = needs_token() && out.tokens == 0;
   out.tries_without = without_;
   out.tries_unknown = unknown_;
@@ -204,7 +196,7 @@ Result<std::string> Security::ReadTokens() {
     if (before) changes = TokenChanges(*before, *good_tokens_);
   }
   const int64_t now_s = clock_.UtcNs() / kNsPerSecond;
-  const std::string expired = ExpiredSince(*good_tokens_, std::exchange(tokens_read_s_, now_s), now_s);
+  const std::string expired = ExpiredBetween(*good_tokens_, std::exchange(tokens_read_s_, now_s), now_s);
   if (!expired.empty()) changes += (changes.empty() ? "" : "; ") + expired;
   const std::lock_guard lock(mutex_);
   tokens_ = good_tokens_;

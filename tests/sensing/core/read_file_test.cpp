@@ -43,6 +43,18 @@ TEST_F(ReadFileTest, GivesAllOfIt) {
   EXPECT_EQ(ReadFile(folder_ / "link").value(), content) << "as secrets are mounted into containers";
 }
 
+TEST_F(ReadFileTest, AByteOrderMarkIsNoPartOfAText) {
+  EXPECT_EQ(ReadText(Write("marked",
+                           "\xEF\xBB\xBF"
+                           "eve"))
+                .value(),
+            "eve");
+  EXPECT_EQ(ReadText(Write("plain", "eve \xEF\xBB\xBF")).value(), "eve \xEF\xBB\xBF")
+      << "only where a text begins";
+  EXPECT_EQ(ReadText(Write("mark", "\xEF\xBB\xBF")).value(), "");
+  EXPECT_EQ(ReadFile(folder_ / "mark").value().size(), 3u);
+}
+
 // Each would keep a program waiting, or fill its memory.
 TEST_F(ReadFileTest, OnlyRegularFiles) {
   ExpectRefused(folder_, ErrorCode::kInvalidArgument, "is a folder");
