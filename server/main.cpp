@@ -26,6 +26,7 @@
 #include "server/process/heap.h"
 #include "server/process/log.h"
 #include "server/process/signals.h"
+#include "server/process/system_limits.h"
 #include "server/process/systemd_notify.h"
 #include "server/publish/nats_connection.h"
 #include "server/publish/publisher.h"
@@ -304,7 +305,8 @@ int main(int argc, char** argv) {
   try {
     return taclink::server::Main(argc, argv);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "taclinkd: failed unexpectedly: %s\n", taclink::Printable(e.what()).c_str());
+    std::fprintf(stderr, "taclinkd: failed unexpectedly: %s\n",
+                 taclink::Printable(taclink::server::DescribeLimit(e)).c_str());
     return 1;
   }
 }

@@ -20,6 +20,7 @@
 
 #include "server/config/config.h"
 #include "server/gateway/session.h"
+#include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 #include "server/security/party.h"
 #include "server/security/shares.h"
@@ -220,7 +221,7 @@ asio::awaitable<void> Gateway::Running::Serve(std::shared_ptr<Session> session) 
   try {
     co_await session->Run();
   } catch (const std::exception& e) {
-    SPDLOG_ERROR("http: a connection failed: {}", e.what());
+    SPDLOG_ERROR("http: a connection failed: {}", DescribeLimit(e));
     session->Close();
   }
   --shared->services.counts->connections;
