@@ -18,7 +18,7 @@
 #include <thread>
 #include <utility>
 
-#include "server/config/config.h"
+#include "sensing/core/address.h"
 #include "server/gateway/session.h"
 #include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
@@ -35,17 +35,6 @@ using std::chrono::steady_clock;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 constexpr milliseconds kAcceptPause{100};  // after a failure, such as too many open files
-
-struct HostPort {
-  std::string host, port;
-};
-
-HostPort SplitAddress(const std::string& address) {
-  const auto colon = address.rfind(':');
-  HostPort out{address.substr(0, colon), address.substr(colon + 1)};
-  if (out.host.starts_with('[')) out.host = out.host.substr(1, out.host.size() - 2);
-  return out;
-}
 
 // As gRPC tells a peer.
 std::string PeerText(const tcp::endpoint& remote) {
@@ -113,10 +102,12 @@ struct Gateway::Running {
 
 Result<void> Gateway::Running::Listen() {
   const std::string& listen = shared->options.listen;
-  const auto [host, port] = SplitAddress(listen);
+  const auto parsed = ParseHostPort(listen);
+  if (!parsed) return Error{parsed.error().code, "http.listen " + listen + ": " + parsed.error().message};
   boost::system::error_code error;
   tcp::resolver resolver(shared->loop);
-  const auto found = resolver.resolve(host, port, tcp::resolver::passive, error);
+  const auto found =
+      resolver.resolve(parsed->host, std::to_string(parsed->port), tcp::resolver::passive, error);
   if (!error) {
     const tcp::endpoint endpoint = found.begin()->endpoint();
     const auto then = [&error](auto&& step) {
