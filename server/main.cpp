@@ -96,8 +96,9 @@ Result<Config> Configure(const Options& options) {
 
 // Everything that a change of the configuration can do without a restart.
 void AddReloads(Reloader& reloader, RpcServer& server, Arm& arm) {
-  reloader.AddAlways("log", [](const Config& next) { return SetUpLog(next.log); });  // also reopens its file
-  reloader.Add("log", [](const Config&) { return Result<void>(); });
+  reloader.Add(
+      "log", [](const Config& next) { return SetUpLog(next.log); }, {},
+      Reloader::When::kAlways);  // also reopens its file
   reloader.Add("limits",
                [&server](const Config& next) {
                  server.SetLimits(ToServiceLimits(next.limits));
