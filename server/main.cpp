@@ -34,6 +34,7 @@
 #include "server/rpc/rpc_server.h"
 #include "server/security/exposure.h"
 #include "server/security/security.h"
+#include "server/security/tls_policy.h"
 
 namespace taclink::server {
 namespace {
@@ -302,6 +303,7 @@ int Main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   taclink::KeepFilesFromOthers();
+  taclink::server::LimitGrpcCiphers();
   taclink::server::ReturnLargeBlocks();
   try {
     return taclink::server::Main(argc, argv);
