@@ -27,6 +27,7 @@
 #include "server/process/heap.h"
 #include "server/process/log.h"
 #include "server/process/signals.h"
+#include "server/process/system_limits.h"
 #include "server/process/systemd_notify.h"
 #include "server/publish/nats_connection.h"
 #include "server/publish/publisher.h"
@@ -34,6 +35,7 @@
 #include "server/rpc/rpc_server.h"
 #include "server/security/exposure.h"
 #include "server/security/security.h"
+#include "server/security/tls_policy.h"
 
 namespace taclink::server {
 namespace {
@@ -96,8 +98,9 @@ Result<Config> Configure(const Options& options) {
 
 // Everything that a change of the configuration can do without a restart.
 void AddReloads(Reloader& reloader, RpcServer& server, Arm& arm) {
-  reloader.AddAlways("log", [](const Config& next) { return SetUpLog(next.log); });  // also reopens its file
-  reloader.Add("log", [](const Config&) { return Result<void>(); });
+  reloader.Add(
+      "log", [](const Config& next) { return SetUpLog(next.log); }, {},
+      Reloader::When::kAlways);  // also reopens its file
   reloader.Add("limits",
                [&server](const Config& next) {
                  server.SetLimits(ToServiceLimits(next.limits));
@@ -301,12 +304,14 @@ int Main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   taclink::KeepFilesFromOthers();
+  taclink::server::LimitGrpcCiphers();
   taclink::server::ReturnLargeBlocks();
   taclink::server::RaiseDescriptorLimit();
   try {
     return taclink::server::Main(argc, argv);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "taclinkd: failed unexpectedly: %s\n", taclink::Printable(e.what()).c_str());
+    std::fprintf(stderr, "taclinkd: failed unexpectedly: %s\n",
+                 taclink::Printable(taclink::server::DescribeLimit(e)).c_str());
     return 1;
   }
 }

@@ -58,7 +58,7 @@ bool StaysHere(const std::string& address) {
 }
 
 Result<std::string> ReadFileIfAny(const std::string& path) {
-  return path.empty() ? Result<std::string>(std::string()) : ReadFile(path);
+  return path.empty() ? Result<std::string>(std::string()) : ReadText(path);
 }
 
 Result<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const Credentials& credentials) {

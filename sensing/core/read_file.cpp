@@ -8,9 +8,33 @@
 #include <cerrno>
 #include <cstdint>
 #include <limits>
+#include <string_view>
 #include <system_error>
 
 namespace taclink {
+
+Error FileError(const std::string& path, int number) {
+  const std::string what = path + " cannot be read (" + std::generic_category().message(number) + ")";
+  switch (number) {
+    case EMFILE:
+    case ENFILE:
+      return {ErrorCode::kUnavailable, what + "; raise LimitNOFILE, or close what has many files open"};
+    case EAGAIN:
+    case EINTR:
+    case EIO:
+    case ENOBUFS:
+    case ENOMEM:
+    case ESTALE:
+    case ETIMEDOUT:
+      return {ErrorCode::kUnavailable, what + "; see the machine's memory and disk"};
+    case EACCES:
+    case EPERM:
+      return {ErrorCode::kPermissionDenied, what + "; see who may read it"};
+    default:
+      return {ErrorCode::kNotFound, what + "; check the path"};
+  }
+}
+
 namespace {
 
 class OpenFile {
@@ -28,22 +52,6 @@ class OpenFile {
  private:
   const int number_;
 };
-
-Error SystemError(const std::string& path, int number) {
-  const std::string what = path + " cannot be read (" + std::generic_category().message(number) + ")";
-  switch (number) {
-    case EIO:
-    case EMFILE:
-    case ENFILE:
-    case ENOMEM:
-      return {ErrorCode::kUnavailable, what};
-    case EACCES:
-    case EPERM:
-      return {ErrorCode::kPermissionDenied, what + "; see who may read it"};
-    default:
-      return {ErrorCode::kNotFound, what + "; check the path"};
-  }
-}
 
 Error TooLarge(const std::string& path, uint64_t most_bytes) {
   return {ErrorCode::kInvalidArgument, path + ": is larger than " + std::to_string(most_bytes >> 20) +
@@ -64,7 +72,7 @@ namespace {
 Result<std::string> Read(const std::string& path, size_t bytes, uint64_t most_size) {
   const OpenFile file(path);
   struct stat status{};
-  if (file.number() < 0 || ::fstat(file.number(), &status) != 0) return SystemError(path, errno);
+  if (file.number() < 0 || ::fstat(file.number(), &status) != 0) return FileError(path, errno);
   if (!S_ISREG(status.st_mode))
     return Error{ErrorCode::kInvalidArgument,
                  path + ": is " + KindOf(status.st_mode) + ", and must be a regular file"};
@@ -76,7 +84,7 @@ Result<std::string> Read(const std::string& path, size_t bytes, uint64_t most_si
     out.resize(before + std::min(kBlock, bytes - before));
     const ssize_t got = ::read(file.number(), out.data() + before, out.size() - before);
     out.resize(before + static_cast<size_t>(std::max<ssize_t>(got, 0)));
-    if (got < 0 && errno != EINTR) return SystemError(path, errno);
+    if (got < 0 && errno != EINTR) return FileError(path, errno);
     if (got == 0) break;
   }
   return out;
@@ -93,6 +101,13 @@ Result<std::string> ReadFile(const std::string& path, size_t most_bytes) {
   if (content && content->size() > most_bytes)
     return TooLarge(path, most_bytes);  // it grows, or hides its size
   return content;
+}
+
+Result<std::string> ReadText(const std::string& path, size_t most_bytes) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  auto text = ReadFile(path, most_bytes);
+  if (text && text->starts_with(kByteOrderMark)) text->erase(0, kByteOrderMark.size());
+  return text;
 }
 
 }  // namespace taclink

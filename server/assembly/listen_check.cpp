@@ -11,6 +11,7 @@
 #include <set>
 #include <sstream>
 
+#include "sensing/core/address.h"
 #include "server/process/unix_socket.h"
 
 namespace taclink::server {
@@ -89,12 +90,11 @@ class Listeners {
 
   void Try(const std::string& key, const std::string& address, Binds binds) {
     if (address.starts_with(kUnixScheme)) return TryUnix(key, address.substr(kUnixScheme.size()));
-    const auto colon = address.rfind(':');
-    std::string host = address.substr(0, colon);
-    const std::string port = address.substr(colon + 1);
-    if (host.starts_with('[')) host = host.substr(1, host.size() - 2);
+    const auto parsed = ParseHostPort(address);
+    if (!parsed) return Fail(key, address, parsed.error().message);
     error_code error;
-    const auto endpoints = tcp::resolver(io_).resolve(host, port, tcp::resolver::passive, error);
+    const auto endpoints =
+        tcp::resolver(io_).resolve(parsed->host, std::to_string(parsed->port), tcp::resolver::passive, error);
     if (error) return Fail(key, address, "no such host (" + error.message() + ")");
     std::set<tcp::endpoint> tried;  // a name may stand for several, and twice for one
     bool listens = false, in_use = false;

@@ -1,6 +1,7 @@
 #include "server/assembly/reload.h"
 
 #include <algorithm>
+#include <cassert>
 #include <sstream>
 #include <utility>
 
@@ -20,9 +21,10 @@ std::vector<std::pair<std::string, std::string>> Sections(const std::string& con
 
 Reloader::Reloader(const Config& running) : running_(ConfigText(running)), last_(running_) {}
 
-void Reloader::Add(const std::string& section, Apply apply, std::vector<std::string> fixed) {
+void Reloader::Add(const std::string& section, Apply apply, std::vector<std::string> fixed, When when) {
   const std::lock_guard lock(mutex_);
-  sections_.push_back({section, std::move(apply), std::move(fixed)});
+  assert(std::ranges::find(sections_, section, &Hook::name) == sections_.end());
+  sections_.push_back({section, std::move(apply), std::move(fixed), when});
 }
 
 void Reloader::AddAlways(const std::string& what, Apply apply) {
@@ -30,14 +32,33 @@ void Reloader::AddAlways(const std::string& what, Apply apply) {
   always_.push_back({what, std::move(apply)});
 }
 
+const std::string& Reloader::TakeOver(const Change& change, const Config& next, Outcome& outcome) const {
+  const bool changed = change.before != change.after;
+  const auto hook = std::ranges::find(sections_, change.section, &Hook::name);
+  if (hook == sections_.end()) {
+    if (changed) outcome.needs_restart.push_back(change.section);
+    return change.before;
+  }
+  if (!changed && hook->when == When::kChanged) return change.before;
+  if (const auto applied = hook->apply(next); !applied) {
+    outcome.errors.push_back(change.section + ": " + applied.error().message);
+    return change.before;
+  }
+  if (!changed) return change.before;
+  outcome.applied.push_back(change.section);
+  for (const std::string& key : ChangedKeys(change.before, change.after)) {
+    const auto is_key = [&](const std::string& fixed) { return key == change.section + "." + fixed; };
+    if (std::ranges::any_of(hook->fixed, is_key)) outcome.needs_restart.push_back(key);
+  }
+  return change.after;
+}
+
 Reloader::Outcome Reloader::Reload(const Config& next) {
   const std::lock_guard lock(mutex_);
   Outcome outcome;
-  const auto before = Sections(running_);
-  std::string running;
   const std::string next_text = ConfigText(next);
   outcome.keys = ChangedKeys(std::exchange(last_, next_text), next_text);
-  const auto after = Sections(next_text);
+  const auto before = Sections(running_), after = Sections(next_text);
   // A section that is not there is an empty one.
   const auto text_in = [](const auto& sections, const std::string& name) {
     const auto at =
@@ -50,30 +71,10 @@ Reloader::Outcome Reloader::Reload(const Config& next) {
       if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
     }
   }
+  std::string running;
   for (const std::string& name : names) {
-    const std::string old_text = text_in(before, name), text = text_in(after, name);
-    if (text == old_text) {
-      running += text;
-      continue;
-    }
-    const auto hook =
-        std::find_if(sections_.begin(), sections_.end(), [&](const Hook& h) { return h.name == name; });
-    if (hook == sections_.end()) {
-      outcome.needs_restart.push_back(name);
-      running += old_text;
-      continue;
-    }
-    const auto applied = hook->apply(next);
-    if (applied) {
-      outcome.applied.push_back(name);
-      for (const std::string& key : ChangedKeys(old_text, text)) {
-        const auto is_key = [&](const std::string& fixed) { return key == name + "." + fixed; };
-        if (std::ranges::any_of(hook->fixed, is_key)) outcome.needs_restart.push_back(key);
-      }
-    } else {
-      outcome.errors.push_back(name + ": " + applied.error().message);
-    }
-    running += applied ? text : old_text;
+    const Change change{.section = name, .before = text_in(before, name), .after = text_in(after, name)};
+    running += TakeOver(change, next, outcome);
   }
   running_ = running;
   for (const Hook& hook : always_) {

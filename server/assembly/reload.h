@@ -17,16 +17,21 @@ class Reloader {
   struct Outcome {
     std::vector<std::string> applied;        ///< sections that changed and are in use now
     std::vector<std::string> needs_restart;  ///< sections that changed and are not
-    std::vector<std::string> errors;         ///< what could not be taken over; the old stays in use
+    std::vector<std::string> errors;         ///< what could not be taken over, and why; the old stays in use
     std::vector<std::string> keys;           ///< that changed since the last reload, see ChangedKeys
   };
 
+  /// kAlways: also where the section did not change, for files that may be others under the same name.
+  enum class When { kChanged, kAlways };
+
   explicit Reloader(const Config& running);
 
-  /// How a top-level section of the configuration is taken over when it changed, but for its keys `fixed`,
-  /// which hold until the server is started again.
-  void Add(const std::string& section, Apply apply, std::vector<std::string> fixed = {});
-  /// Called by every reload, for files that may have changed under the same name.
+  /// How a top-level section of the configuration is taken over, but for its keys `fixed`, which hold until
+  /// the server is started again. Each section has one such hook, so that what it returns is what is reported
+  /// of the section; where it fails, the section counts as changed at the next reload, too.
+  void Add(const std::string& section, Apply apply, std::vector<std::string> fixed = {},
+           When when = When::kChanged);
+  /// Called by every reload, for what is no section.
   void AddAlways(const std::string& what, Apply apply);
   /// Any thread; the hooks run within.
   Outcome Reload(const Config& next);
@@ -36,7 +41,13 @@ class Reloader {
     std::string name;
     Apply apply;
     std::vector<std::string> fixed = {};
+    When when = When::kAlways;
   };
+  struct Change {
+    std::string section, before, after;  // texts; empty: it is not there
+  };
+  /// Of a changed section, or one whose hook is called always. Returns the text that is in use then.
+  const std::string& TakeOver(const Change& change, const Config& next, Outcome& outcome) const;
 
   std::mutex mutex_;
   // Guarded by mutex_.

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "sensing/core/printable.h"
+#include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 
 namespace taclink::server {
@@ -107,7 +108,7 @@ void EventEngine::Drain() {
     TakeFrames();
     TellLostFrames();
   } catch (const std::exception& e) {
-    SPDLOG_ERROR("events: {}", e.what());
+    SPDLOG_ERROR("events: {}", DescribeLimit(e));
   }
   if (clock_.MonotonicNs() - beat_ns_ < kBeatNs) return;
   beat_ns_ = clock_.MonotonicNs();

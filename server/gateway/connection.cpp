@@ -2,7 +2,9 @@
 
 #include <openssl/ssl.h>
 #include <openssl/x509.h>
+#include <openssl/x509v3.h>
 
+#include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ssl/stream.hpp>
@@ -42,15 +44,36 @@ void EndSocket(tcp::socket& socket) {
   socket.shutdown(tcp::socket::shutdown_send, ignored);
 }
 
-std::string CommonNameOfPeer(const SSL* ssl) {
+std::string Utf8(const ASN1_STRING* text) {
+  unsigned char* bytes = nullptr;
+  const int size = ASN1_STRING_to_UTF8(&bytes, text);
+  std::string out(reinterpret_cast<const char*>(bytes), static_cast<size_t>(std::max(size, 0)));
+  OPENSSL_free(bytes);
+  return out;
+}
+
+// The first alternative name that is a text; empty: none.
+std::string AlternativeName(const X509& certificate) {
+  auto* const names =
+      static_cast<GENERAL_NAMES*>(X509_get_ext_d2i(&certificate, NID_subject_alt_name, nullptr, nullptr));
+  std::string out;
+  for (int i = 0; out.empty() && i < sk_GENERAL_NAME_num(names); ++i) {
+    const GENERAL_NAME* const name = sk_GENERAL_NAME_value(names, i);
+    if (name->type == GEN_DNS || name->type == GEN_EMAIL || name->type == GEN_URI) out = Utf8(name->d.ia5);
+  }
+  GENERAL_NAMES_free(names);
+  return out;
+}
+
+// As server/rpc/requests/who.cpp takes it of a call over gRPC.
+std::string NameOfPeer(const SSL* ssl) {
   const std::unique_ptr<X509, decltype(&X509_free)> certificate(SSL_get1_peer_certificate(ssl), X509_free);
   if (!certificate) return {};
   const X509_NAME* const subject = X509_get_subject_name(certificate.get());
   const int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
-  if (at < 0) return {};
-  const ASN1_STRING* const text = X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at));
-  return {reinterpret_cast<const char*>(ASN1_STRING_get0_data(text)),
-          static_cast<size_t>(ASN1_STRING_length(text))};
+  const std::string common_name =
+      at < 0 ? std::string() : Utf8(X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at)));
+  return common_name.empty() ? AlternativeName(*certificate) : common_name;
 }
 
 class PlainConnection final : public Connection {
@@ -75,7 +98,7 @@ class TlsConnection final : public Connection {
     const auto [error] = co_await stream_.async_handshake(asio::ssl::stream_base::server, kAwaitTransfer);
     co_return !error;
   }
-  std::string ClientName() override { return CommonNameOfPeer(stream_.native_handle()); }
+  std::string ClientName() override { return NameOfPeer(stream_.native_handle()); }
   asio::awaitable<size_t> Read(std::span<char> place) override { return ReadSome(stream_, place); }
   asio::awaitable<bool> Write(std::string_view bytes) override { return WriteAll(stream_, bytes); }
   void EndWriting() override { EndSocket(stream_.next_layer()); }

@@ -16,7 +16,8 @@ class Connection {
   virtual ~Connection() = default;
   /// False: it failed; close it.
   virtual boost::asio::awaitable<bool> Handshake() = 0;
-  /// Of the client's certificate, its common name; empty: it showed none.
+  /// Of the client's certificate, its first common name, else its first alternative name; empty: it showed
+  /// none.
   virtual std::string ClientName() = 0;
   /// 0: the client sends no more, or has gone.
   virtual boost::asio::awaitable<size_t> Read(std::span<char> place) = 0;

@@ -1,6 +1,8 @@
 #include "server/gateway/gateway.h"
 
 #include <fmt/format.h>
+#include <openssl/err.h>
+#include <openssl/ssl.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -10,6 +12,7 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/ssl/context.hpp>
+#include <boost/asio/ssl/error.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <functional>
 #include <map>
@@ -18,12 +21,14 @@
 #include <thread>
 #include <utility>
 
-#include "server/config/config.h"
+#include "sensing/core/address.h"
 #include "server/gateway/session.h"
 #include "server/process/socket_options.h"
+#include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 #include "server/security/party.h"
 #include "server/security/shares.h"
+#include "server/security/tls_policy.h"
 
 namespace taclink::server {
 namespace {
@@ -36,17 +41,6 @@ using std::chrono::steady_clock;
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 constexpr milliseconds kAcceptPause{100};  // after a failure, such as too many open files
 
-struct HostPort {
-  std::string host, port;
-};
-
-HostPort SplitAddress(const std::string& address) {
-  const auto colon = address.rfind(':');
-  HostPort out{address.substr(0, colon), address.substr(colon + 1)};
-  if (out.host.starts_with('[')) out.host = out.host.substr(1, out.host.size() - 2);
-  return out;
-}
-
 // As gRPC tells a peer.
 std::string PeerText(const tcp::endpoint& remote) {
   boost::system::error_code ignored;
@@ -54,14 +48,23 @@ std::string PeerText(const tcp::endpoint& remote) {
   return remote.address().is_v6() ? "ipv6:[" + address + "]:" + port : "ipv4:" + address + ":" + port;
 }
 
+// TLS 1.2 or 1.3, and of the former only what tls_policy.h has. False: OpenSSL knows no such ciphers.
+bool LimitProtocol(SSL_CTX* context) {
+  constexpr int kBits112 = 2;  // OpenSSL's security level: refuses short keys and SHA-1, of clients too
+  SSL_CTX_set_security_level(context, kBits112);
+  SSL_CTX_set_options(context,
+                      SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION | SSL_OP_CIPHER_SERVER_PREFERENCE);
+  return SSL_CTX_set_min_proto_version(context, TLS1_2_VERSION) == 1 &&
+         SSL_CTX_set_cipher_list(context, kTlsCiphers) == 1;
+}
+
 // Null: the material is of no use, which its reader would have found before.
 std::shared_ptr<asio::ssl::context> MakeTls(const TlsMaterial& material) {
   auto tls = std::make_shared<asio::ssl::context>(asio::ssl::context::tls_server);
   boost::system::error_code error;
   const auto good = [&error] { return !error; };
-  tls->set_options(
-      asio::ssl::context::default_workarounds | asio::ssl::context::no_tlsv1 | asio::ssl::context::no_tlsv1_1,
-      error);
+  if (!LimitProtocol(tls->native_handle()))
+    error.assign(static_cast<int>(ERR_get_error()), asio::error::get_ssl_category());
   if (good()) tls->use_certificate_chain(asio::buffer(material.certificate), error);
   if (good()) tls->use_private_key(asio::buffer(material.key), asio::ssl::context::pem, error);
   if (good() && !material.client_ca.empty()) {
@@ -113,10 +116,12 @@ struct Gateway::Running {
 
 Result<void> Gateway::Running::Listen() {
   const std::string& listen = shared->options.listen;
-  const auto [host, port] = SplitAddress(listen);
+  const auto parsed = ParseHostPort(listen);
+  if (!parsed) return Error{parsed.error().code, "http.listen " + listen + ": " + parsed.error().message};
   boost::system::error_code error;
   tcp::resolver resolver(shared->loop);
-  const auto found = resolver.resolve(host, port, tcp::resolver::passive, error);
+  const auto found =
+      resolver.resolve(parsed->host, std::to_string(parsed->port), tcp::resolver::passive, error);
   if (!error) {
     const tcp::endpoint endpoint = found.begin()->endpoint();
     const auto then = [&error](auto&& step) {
@@ -222,7 +227,7 @@ asio::awaitable<void> Gateway::Running::Serve(std::shared_ptr<Session> session) 
   try {
     co_await session->Run();
   } catch (const std::exception& e) {
-    SPDLOG_ERROR("http: a connection failed: {}", e.what());
+    SPDLOG_ERROR("http: a connection failed: {}", DescribeLimit(e));
     session->Close();
   }
   --shared->services.counts->connections;

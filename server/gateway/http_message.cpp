@@ -87,9 +87,12 @@ size_t HttpRequestParser::FeedOnce(std::string_view bytes) {
 
 void HttpRequestParser::KeepHead() {
   const auto& head = parser_->beast.get();
-  for (const http::field once : {http::field::host, http::field::authorization, http::field::content_type}) {
-    if (head.count(once) > 1)
-      failure_ = {400, "the request has two '" + Lower(http::to_string(once)) + "' headers"};
+  // Headers that something is decided by and that hold one value. A proxy before this server could read
+  // another one of two than this server does.
+  for (const char* const once :
+       {"host", "authorization", "content-type", "content-length", "origin", "expect", "grpc-timeout"}) {
+    if (const size_t count = head.count(once); count > 1)
+      failure_ = {400, "the request has " + std::to_string(count) + " '" + once + "' headers; send one"};
   }
   if (head.version() == 11 && head.count(http::field::host) == 0)
     failure_ = {400, "the request has no 'host' header"};

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "sensing/core/result.h"
+#include "server/process/system_limits.h"
 
 namespace taclink::server {
 
@@ -80,7 +81,7 @@ class CommandQueue {
     try {
       return run(target);
     } catch (const std::exception& e) {
-      return Error{ErrorCode::kInternal, std::string("the command failed: ") + e.what()};
+      return Error{ErrorCode::kInternal, std::string("the command failed: ") + DescribeLimit(e)};
     }
   }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "server/process/log.h"
+#include "server/process/system_limits.h"
 
 namespace taclink::server {
 namespace {
@@ -41,7 +42,7 @@ struct LinkSupervisor::Build {
     try {
       result = Make(factories);
     } catch (const std::exception& e) {
-      result = Error{ErrorCode::kInternal, e.what()};
+      result = Error{ErrorCode::kInternal, DescribeLimit(e)};
     } catch (...) {
       result = Error{ErrorCode::kInternal, "an exception of unknown type"};
     }
@@ -385,7 +386,7 @@ Result<void> LinkSupervisor::SetForceModel(std::optional<ForceModel> model, Comm
       return Error{estimator.error().code, "link '" + name_ + "': " + estimator.error().message};
     return worker->UseEstimator(std::move(*estimator), adopted);
   } catch (const std::exception& e) {
-    return Error{ErrorCode::kInternal, std::string("the force model can't be made: ") + e.what()};
+    return Error{ErrorCode::kInternal, std::string("the force model can't be made: ") + DescribeLimit(e)};
   }
 }
 

@@ -9,6 +9,8 @@
 #include <system_error>
 #include <utility>
 
+#include "server/process/system_limits.h"
+
 namespace taclink::server {
 
 LinkWorker::LinkWorker(std::string name, std::unique_ptr<FrameSource> source,
@@ -57,7 +59,7 @@ void LinkWorker::RunThread(const char* kind, void (LinkWorker::*loop)(const std:
   try {
     (this->*loop)(stop);
   } catch (const std::exception& e) {
-    Died(e.what());
+    Died(DescribeLimit(e));
   } catch (...) {
     Died("an exception of unknown type");
   }
@@ -246,11 +248,12 @@ void LinkWorker::SolveOne(StereoFrame& frame) {
     failing_ = 0;
     settled_ = state->status == LinkStatus::kOk || state->status == LinkStatus::kDegraded;
   } catch (const std::exception& e) {
+    const std::string why = DescribeLimit(e);
     if (failing_ == 0)
-      SPDLOG_ERROR("link {}: frame {} could not be processed: {}", name_, frame.sequence, e.what());
+      SPDLOG_ERROR("link {}: frame {} could not be processed: {}", name_, frame.sequence, why);
     if (++failing_ >= options_.failures)
-      throw std::runtime_error(std::to_string(failing_) + " frames in a row failed: " + e.what());
-    ResetTo(*state, LinkStatus::kLost, std::string("processing failed: ") + e.what(), ReasonId::kWorker);
+      throw std::runtime_error(std::to_string(failing_) + " frames in a row failed: " + why);
+    ResetTo(*state, LinkStatus::kLost, "processing failed: " + why, ReasonId::kWorker);
     state->times = frame.times;
   }
   state->sequence = frame.sequence;

@@ -6,6 +6,8 @@
 #include <exception>
 #include <utility>
 
+#include "server/process/system_limits.h"
+
 namespace taclink::server {
 namespace {
 
@@ -18,7 +20,7 @@ Result<void> Guarded(F call) {
   try {
     return call();
   } catch (const std::exception& e) {
-    return Error{ErrorCode::kInternal, e.what()};
+    return Error{ErrorCode::kInternal, DescribeLimit(e)};
   }
 }
 

@@ -5,6 +5,7 @@
 #include <exception>
 #include <utility>
 
+#include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 
 namespace taclink::server {
@@ -36,7 +37,7 @@ void Watchdog::Round() {
     const std::lock_guard lock(mutex_);
     if (hook_) hook_();
   } catch (const std::exception& e) {  // no memory, no thread: the next round may do better
-    SPDLOG_ERROR("the watchdog could not look after the links: {}", e.what());
+    SPDLOG_ERROR("the watchdog could not look after the links: {}", DescribeLimit(e));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "sensing/core/units.h"
+#include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 
 namespace taclink::server {
@@ -43,7 +44,7 @@ void PressureSensor::Start() {
       try {
         Step(kPoll);
       } catch (const std::exception& e) {  // no memory: the next try may do better
-        Failed({ErrorCode::kInternal, e.what()});
+        Failed({ErrorCode::kInternal, DescribeLimit(e)});
       }
     }
   });

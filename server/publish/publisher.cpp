@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/messages/event_message.h"
+#include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 #include "wire/frame_codec.h"
 
@@ -144,7 +145,7 @@ void Publisher::Run(const std::stop_token& stop) {
     try {
       Round();
     } catch (const std::exception& e) {
-      SetTrouble(e.what());
+      SetTrouble(DescribeLimit(e));
     }
   }
 }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <utility>
 
+#include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 #include "taclink/v1/frame.pb.h"
 #include "wire/log/picture.h"
@@ -143,7 +144,7 @@ void Recording::Guarded(const std::function<void()>& step) {
   try {
     step();
   } catch (const std::exception& e) {
-    SetTrouble(trouble_, e.what());
+    SetTrouble(trouble_, DescribeLimit(e));
   }
 }
 

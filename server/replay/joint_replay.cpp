@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 #include "taclink/v1/log.pb.h"
 
@@ -35,7 +36,7 @@ void JointReplay::Run(const std::stop_token& stop) {
       Take(*item);
     }
   } catch (const std::exception& e) {
-    SPDLOG_ERROR("the log's joint states are given up: {}", e.what());
+    SPDLOG_ERROR("the log's joint states are given up: {}", DescribeLimit(e));
   }
 }
 

@@ -6,10 +6,12 @@
 
 #include <cstdint>
 #include <mutex>
+#include <span>
 #include <string_view>
 #include <utility>
 
 #include "server/rpc/requests/status.h"
+#include "server/security/single_header.h"
 
 namespace taclink::server {
 namespace {
@@ -51,17 +53,23 @@ std::string ConnectionPlace(const grpc_auth_context* connection) {
   return fmt::format("gRPC connection {:04x}", reinterpret_cast<uintptr_t>(connection) * kMixer >> 48);
 }
 
+Result<Caller> CheckMetadata(const Security& security, std::span<const grpc_metadata> metadata,
+                             const std::string& place) {
+  SingleHeader path(":path"), authorization("authorization");
+  for (const grpc_metadata& entry : metadata) {
+    path.Read(View(entry.key), View(entry.value));
+    authorization.Read(View(entry.key), View(entry.value));
+  }
+  for (const SingleHeader* header : {&path, &authorization})
+    if (const auto value = header->Value(); !value) return value.error();
+  return security.Check(*path.Value(), *authorization.Value(), place);
+}
+
 // Called before each call.
 void CheckCall(void* state, grpc_auth_context* connection, const grpc_metadata* metadata, size_t count,
                grpc_process_auth_metadata_done_cb done, void* user_data) {
-  std::string_view path, authorization;
-  for (size_t i = 0; i < count; ++i) {
-    const std::string_view key = View(metadata[i].key);
-    if (key == ":path") path = View(metadata[i].value);
-    if (key == "authorization") authorization = View(metadata[i].value);
-  }
   const auto caller =
-      static_cast<Guard*>(state)->security->Check(path, authorization, ConnectionPlace(connection));
+      CheckMetadata(*static_cast<Guard*>(state)->security, {metadata, count}, ConnectionPlace(connection));
   const grpc::Status status = caller ? grpc::Status::OK : ToGrpc(caller.error());
   done(user_data, nullptr, 0, nullptr, 0, static_cast<grpc_status_code>(status.error_code()),
        status.error_message().c_str());

@@ -6,8 +6,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdio>
-#include <system_error>
 #include <vector>
 
 #include "sensing/core/read_file.h"
@@ -44,9 +44,10 @@ Error Refusal(const std::string& what, const std::string& path, mode_t mode, con
 
 Result<void> CheckSecretFile(const std::string& what, const std::string& path) {
   struct stat info{};
-  if (stat(path.c_str(), &info) != 0)
-    return Error{ErrorCode::kNotFound, what + " " + path + " cannot be read (" +
-                                           std::generic_category().message(errno) + "); check the path"};
+  if (stat(path.c_str(), &info) != 0) {
+    const Error error = FileError(path, errno);
+    return Error{error.code, what + " " + error.message};
+  }
   if ((info.st_mode & S_IRWXO) != 0)
     return Refusal(
         what, path, info.st_mode,
@@ -66,7 +67,7 @@ Result<std::string> ReadSecretFile(const std::string& what, const std::string& p
 }
 
 Result<std::string> ReadSecurityFile(const std::string& what, const std::string& path) {
-  auto text = ReadFile(path);
+  auto text = ReadText(path);
   if (!text) return Error{text.error().code, what + " " + text.error().message};
   return text;
 }

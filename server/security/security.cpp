@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <utility>
 
 #include "sensing/core/utc_time.h"
+#include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 #include "server/security/secret_file.h"
 
@@ -38,21 +40,22 @@ std::string TlsChanges(const TlsMaterial& before, const TlsMaterial& after) {
   return out.empty() ? out : out + " reloaded";
 }
 
-// Whose tokens have expired between two moments.
-std::string ExpiredSince(const Tokens& tokens, int64_t before_s, int64_t now_s) {
-  std::string out;
-  for (const Tokens::Entry& entry : tokens.entries())
-    if (entry.ExpiredAt(now_s) && !entry.ExpiredAt(before_s))
-      out += (out.empty() ? "expired: " : ", ") + entry.caller.name;
-  return out;
-}
-
 void Count(const Tokens& tokens, int64_t now_s, SecurityStatus& out) {
   for (const Tokens::Entry& entry : tokens.entries()) {
     ++(entry.ExpiredAt(now_s) ? out.expired : out.tokens);
     if (entry.expires_utc_s && !entry.ExpiredAt(now_s))
       out.next_expiry_utc_s =
           std::min(out.next_expiry_utc_s.value_or(*entry.expires_utc_s), *entry.expires_utc_s);
+  }
+}
+
+// Memory that cannot be had says no more of a file than an error of the disk.
+template <typename Read>
+Result<std::string> Guarded(const Read& read) {
+  try {
+    return read();
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kUnavailable, "cannot be read again now: " + DescribeLimit(e)};
   }
 }
 
@@ -69,14 +72,7 @@ std::string_view BearerToken(std::string_view authorization) {
 }
 
 Security::Security(SecurityConfig config, Clock& clock)
-    : config_(std::move(config)),
-      clock_(clock),
-      tls_part_{.name = "certificates", .consequence = "what was read before stays in use"},
-      token_part_{.name = "tokens",
-                  .consequence = config_.tokens_keep ? "the tokens that were read before stay in use"
-                                                     : "nobody's token is taken until it is mended"},
-      expiry_part_{.name = "expiry of tokens", .consequence = "nobody is let in; add a new one"},
-      tries_(config_.max_failed_tries) {}
+    : config_(std::move(config)), clock_(clock), tries_(config_.max_failed_tries) {}
 
 Result<std::shared_ptr<Security>> Security::Load(const SecurityConfig& config, Clock& clock) {
   std::shared_ptr<Security> out(new Security(config, clock));
@@ -161,14 +157,14 @@ std::shared_ptr<const TlsMaterial> Security::tls() const {
 
 SecurityStatus Security::Status() const {
   SecurityStatus out;
-  const int64_t now_s = clock_.UtcNs() / kNsPerSecond;
+  std::shared_ptr<const Tokens> tokens;
   {
     const std::lock_guard lock(mutex_);
     for (const Part* part : {&tls_part_, &token_part_, &expiry_part_})
-      if (!part->complaint.empty())
-        out.trouble += (out.trouble.empty() ? "" : "; ") + part->complaint + "; " + part->consequence;
-    if (tokens_) Count(*tokens_, now_s, out);
+      if (!part->complaint.empty()) out.trouble += (out.trouble.empty() ? "" : "; ") + part->complaint;
+    tokens = tokens_;
   }
+  if (tokens) Count(*tokens, clock_.UtcNs() / kNsPerSecond, out);  // calls do not wait for it
   out.refuses_all = needs_token() && out.tokens == 0;
   out.tries_without = without_;
   out.tries_unknown = unknown_;
@@ -204,15 +200,15 @@ Result<std::string> Security::ReadTokens() {
     if (before) changes = TokenChanges(*before, *good_tokens_);
   }
   const int64_t now_s = clock_.UtcNs() / kNsPerSecond;
-  const std::string expired = ExpiredSince(*good_tokens_, std::exchange(tokens_read_s_, now_s), now_s);
+  const std::string expired = ExpiredBetween(*good_tokens_, std::exchange(tokens_read_s_, now_s), now_s);
   if (!expired.empty()) changes += (changes.empty() ? "" : "; ") + expired;
   const std::lock_guard lock(mutex_);
   tokens_ = good_tokens_;
   return changes;
 }
 
-void Security::Tell(Part& part, const Result<std::string>& read) {
-  const std::string complaint = read ? "" : read.error().message;
+void Security::Tell(Part& part, const Result<std::string>& read, const char* consequence) {
+  const std::string complaint = read ? "" : read.error().message + "; " + consequence;
   const std::string before = [&] {
     const std::lock_guard lock(mutex_);
     return std::exchange(part.complaint, complaint);
@@ -221,7 +217,7 @@ void Security::Tell(Part& part, const Result<std::string>& read) {
     good ? SPDLOG_INFO("security: {}", text) : SPDLOG_ERROR("security: {}", text);
     if (listener_) listener_(good, text);
   };
-  if (!complaint.empty() && complaint != before) tell(false, complaint + "; " + part.consequence);
+  if (!complaint.empty() && complaint != before) tell(false, complaint);
   if (complaint.empty() && !before.empty()) tell(true, std::string(part.name) + ": good again");
   if (!read || read->empty()) return;
   changes_.push_back(std::string(part.name) + ": " + *read);
@@ -230,19 +226,23 @@ void Security::Tell(Part& part, const Result<std::string>& read) {
 }
 
 void Security::Reload() {
+  constexpr const char* kNobody = "nobody's token is taken until it is mended";
   const std::lock_guard lock(reload_mutex_);
-  Tell(tls_part_, ReadTls());
-  const auto tokens = ReadTokens();
-  if (!tokens && !config_.tokens_keep) {
+  Tell(tls_part_, Guarded([this] { return ReadTls(); }), "what was read before stays in use");
+  const auto tokens = Guarded([this] { return ReadTokens(); });
+  const bool is_in_use = [&] {
     const std::lock_guard tokens_lock(mutex_);
-    tokens_ = nullptr;
-  }
-  Tell(token_part_, tokens);
+    if (!tokens && tokens.error().code != ErrorCode::kUnavailable && !config_.tokens_keep) tokens_ = nullptr;
+    return tokens_ != nullptr;
+  }();
+  Tell(token_part_, tokens, is_in_use ? "the tokens that were read before stay in use" : kNobody);
   const SecurityStatus status = Status();
-  Tell(expiry_part_, status.tokens == 0 && status.expired > 0
-                         ? Result<std::string>(Error{ErrorCode::kFailedPrecondition,
-                                                     "every token of " + config_.tokens + " has expired"})
-                         : Result<std::string>(std::string()));
+  Tell(expiry_part_,
+       status.tokens == 0 && status.expired > 0
+           ? Result<std::string>(
+                 Error{ErrorCode::kFailedPrecondition, "every token of " + config_.tokens + " has expired"})
+           : Result<std::string>(std::string()),
+       "nobody is let in; add a new one");
 }
 
 std::vector<std::string> Security::TakeChanges() {
@@ -263,7 +263,11 @@ void Security::Run(const std::stop_token& stop) {
       if (stopped_.wait_for(lock, stop, kWatchInterval, [] { return false; }) || stop.stop_requested())
         return;
     }
-    Reload();
+    try {
+      Reload();
+    } catch (const std::exception& e) {  // the next round may do better
+      SPDLOG_ERROR("security: {}", DescribeLimit(e));
+    }
   }
 }
 

@@ -60,8 +60,9 @@ class Security {
 
   /// Hears what is logged, too. Before other threads have the object; by any of them.
   void Listen(Listener listener) { listener_ = std::move(listener); }
-  /// Reads the files again. What is wrong is told once. Of TLS what was there before stays in use, of tokens
-  /// nothing, unless it is configured to.
+  /// Reads the files again. What is wrong is told once. Of TLS what was there before stays in use; of tokens
+  /// nothing, unless it is configured to, or the error is kUnavailable: this machine could not read the file
+  /// now, which says nothing of what is in it.
   void Reload();
   /// What Reload took over since this was last asked, the newest 16.
   std::vector<std::string> TakeChanges();
@@ -72,8 +73,7 @@ class Security {
   // One of the things that are read, and how it stands.
   struct Part {
     const char* name;
-    const char* consequence;     // of not being good
-    std::string complaint = {};  // empty: it is good
+    std::string complaint = {};  // with its consequence; empty: it is good
   };
   struct Found {
     Caller caller;  // nobody: not good
@@ -84,7 +84,7 @@ class Security {
   Security(SecurityConfig config, Clock& clock);
   Result<std::string> ReadTls();
   Result<std::string> ReadTokens();
-  void Tell(Part& part, const Result<std::string>& read);
+  void Tell(Part& part, const Result<std::string>& read, const char* consequence);
   Found Find(std::string_view token) const;
   Error Refuse(const Found& found, std::string_view token, const std::string& place) const;
   void Run(const std::stop_token& stop);
@@ -107,7 +107,7 @@ class Security {
   // Guarded by mutex_.
   std::shared_ptr<const Tokens> tokens_;  // null: none is let in
   std::shared_ptr<const TlsMaterial> tls_;
-  Part tls_part_, token_part_, expiry_part_;
+  Part tls_part_{"certificates"}, token_part_{"tokens"}, expiry_part_{"expiry of tokens"};
 
   mutable FailedTries tries_;
   mutable std::atomic<uint64_t> without_ = 0, unknown_ = 0, expired_ = 0;

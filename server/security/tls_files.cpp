@@ -1,12 +1,17 @@
 #include "server/security/tls_files.h"
 
 #include <openssl/err.h>
+#include <openssl/evp.h>
+#include <openssl/objects.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
 
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "server/security/secret_file.h"
+#include "server/security/tls_policy.h"
 
 namespace taclink::server {
 namespace {
@@ -24,6 +29,16 @@ using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
 
 Bio MakeBio(const std::string& text) {
   return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
+}
+
+// All certificates of a PEM text, in their order.
+std::vector<Certificate> Certificates(const std::string& pem) {
+  const Bio bio = MakeBio(pem);
+  std::vector<Certificate> out;
+  while (Certificate next{PEM_read_bio_X509(bio.get(), nullptr, nullptr, nullptr)})
+    out.push_back(std::move(next));
+  ERR_clear_error();
+  return out;
 }
 
 Certificate FirstCertificate(const std::string& pem) {
@@ -49,6 +64,52 @@ Error Invalid(std::string message) {
   return {ErrorCode::kInvalidArgument, std::move(message)};
 }
 
+// Empty: the key is strong enough.
+std::string WeaknessOf(const EVP_PKEY* key) {
+  const int kind = EVP_PKEY_get_base_id(key), bits = EVP_PKEY_get_bits(key);
+  const auto too_short = [bits](const char* name, int least) {
+    return bits >= least ? std::string()
+                         : "has " + std::string(name) + " key of " + std::to_string(bits) +
+                               " bits, and must have at least " + std::to_string(least);
+  };
+  if (kind == EVP_PKEY_RSA || kind == EVP_PKEY_RSA_PSS) return too_short("an RSA", kLeastRsaBits);
+  if (kind == EVP_PKEY_EC) return too_short("an EC", kLeastEcBits);
+  if (kind == EVP_PKEY_ED25519 || kind == EVP_PKEY_ED448) return {};
+  const char* const name = EVP_PKEY_get0_type_name(key);
+  return "has a key of type " + std::string(name != nullptr ? name : "unknown") +
+         ", and must have one of RSA, EC or Ed25519";
+}
+
+// Empty: it is strong enough. Nobody checks the signature that a root has of itself.
+std::string WeaknessOf(X509* certificate, bool is_root) {
+  const EVP_PKEY* const key = X509_get0_pubkey(certificate);
+  if (key == nullptr) return "has a key that cannot be read";
+  if (std::string weakness = WeaknessOf(key); !weakness.empty()) return weakness;
+  int digest = NID_undef;
+  const bool known = X509_get_signature_info(certificate, &digest, nullptr, nullptr, nullptr) == 1;
+  const bool weak = digest == NID_sha1 || digest == NID_md5 || digest == NID_md5_sha1 || digest == NID_md4 ||
+                    digest == NID_mdc2 || digest == NID_ripemd160;
+  if (is_root || !known || !weak) return {};
+  return "is signed with " + std::string(OBJ_nid2sn(digest)) + ", and must be with SHA-256 or stronger";
+}
+
+// Those of the server's own file, where the first is never taken for a root, or those that clients' must be
+// signed by.
+Result<void> CheckStrength(const std::string& what, const std::string& pem, bool is_authorities) {
+  const std::vector<Certificate> certificates = Certificates(pem);
+  for (size_t i = 0; i < certificates.size(); ++i) {
+    X509* const one = certificates[i].get();
+    const bool is_own = X509_NAME_cmp(X509_get_subject_name(one), X509_get_issuer_name(one)) == 0;
+    const std::string weakness = WeaknessOf(one, is_own && (is_authorities || i > 0));
+    if (weakness.empty()) continue;
+    const std::string number = certificates.size() == 1 ? "" : " (certificate " + std::to_string(i + 1) + ")";
+    return Error{ErrorCode::kInvalidArgument,
+                 what + number + " " + weakness +
+                     "; make a new one, for example with openssl req -newkey rsa:3072 -sha256"};
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<TlsMaterial> ReadTlsFiles(const SecurityConfig& config) {
@@ -67,11 +128,16 @@ Result<TlsMaterial> ReadTlsFiles(const SecurityConfig& config) {
   ERR_clear_error();
   if (!match)
     return Invalid("security.key " + config.key + " is not the key of the certificate " + config.certificate);
+  if (const auto strong = CheckStrength("security.certificate " + config.certificate, out.certificate, false);
+      !strong)
+    return strong.error();
   if (config.client_ca.empty()) return out;
   auto client_ca = ReadSecurityFile("security.client_ca", config.client_ca);
   if (!client_ca) return client_ca.error();
   if (!FirstCertificate(*client_ca))
     return Invalid("security.client_ca " + config.client_ca + " holds no certificate in PEM form");
+  if (const auto strong = CheckStrength("security.client_ca " + config.client_ca, *client_ca, true); !strong)
+    return strong.error();
   out.client_ca = std::move(*client_ca);
   return out;
 }

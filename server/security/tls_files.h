@@ -7,7 +7,9 @@
 
 namespace taclink::server {
 
-/// What TLS needs, as PEM texts that were checked: they parse, and the key is the certificate's.
+/// What TLS needs, as PEM texts that were checked: they parse, the key is the certificate's, and keys and
+/// signatures are as strong as server/security/tls_policy.h wants them, so that no client refuses them for
+/// it.
 struct TlsMaterial {
   std::string certificate;  ///< chain, the server's own first
   std::string key;

@@ -118,7 +118,10 @@ TEST_F(TokenTest, FilesAreForOwnerAndGroupWhateverTheUmask) {
 
 TEST_F(TokenTest, NamesAndRolesAreChecked) {
   EXPECT_EQ(Taclink({"token"}).exit_code, 2);
-  EXPECT_EQ(Taclink({"token", "a b"}).exit_code, 2);
+  for (const char* bad : {"a b", "a#b", "a/b", ".a",
+                          "\xEF\xBB\xBF"
+                          "a"})
+    EXPECT_EQ(Taclink({"token", bad}).exit_code, 2) << bad;
   EXPECT_EQ(Taclink({"token", "otto", "--role", "root"}).exit_code, 2);
   EXPECT_EQ(Taclink({"token", "new"}).exit_code, 2);
   EXPECT_EQ(Taclink({"token", "old", "otto"}).exit_code, 2);

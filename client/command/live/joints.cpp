@@ -91,7 +91,7 @@ Result<void> RunJoints(const JointsOptions& options) {
   do {
     std::istringstream file;
     if (options.file != "-") {
-      auto text = ReadFile(options.file, kMostTableBytes);
+      auto text = ReadText(options.file, kMostTableBytes);
       if (!text) return text.error();
       file.str(*std::move(text));
     }

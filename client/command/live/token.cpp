@@ -14,6 +14,7 @@
 
 #include "client/command/cli/commands.h"
 #include "sensing/core/clock.h"
+#include "sensing/core/name.h"
 #include "sensing/core/utc_time.h"
 
 namespace taclink::command {
@@ -55,8 +56,8 @@ std::string ExpiryProblem(const std::string& text) {
 }
 
 std::string NameProblem(const std::string& name) {
-  const bool good = !name.empty() && name.find_first_of(" \t\r\n#") == std::string::npos;
-  return good ? std::string() : std::string("a name without spaces and '#'");
+  const auto good = CheckName(name);  // as the server reads it
+  return good ? std::string() : good.error().message;
 }
 
 Result<void> RunToken(const TokenOptions& options) {

@@ -65,7 +65,7 @@ void SetNoise(const MarkerNoise& noise, SkinShape& shape) {
 
 Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
                                 std::optional<double> sigma_mm) {
-  const auto text = ReadFile(path, kMostTableBytes);
+  const auto text = ReadText(path, kMostTableBytes);
   if (!text) return text.error();
   std::istringstream in(*text);
   const auto count = static_cast<size_t>(model.markers.count());
@@ -87,8 +87,6 @@ Result<SkinShape> ReadMarkerCsv(const std::string& path, const LinkModel& model,
     if (IsEmptyCsvLine(line)) continue;
     if (!header_read) {
       header_read = true;
-      // What spreadsheets begin a UTF-8 file with.
-      if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
       std::string header;
       for (const auto& field : CsvFields(line)) header += (header.empty() ? "" : ",") + field;
       if (header != kHeader) return fail("the header must be '" + std::string(kHeader) + "'");

@@ -68,7 +68,7 @@ Result<ProbeRecord> ParseRow(const std::string& line, const Header& header, cons
 
 Result<std::vector<ProbeRecord>> ReadProbeCsv(const std::string& path, const LinkModel& model,
                                               double diameter_mm) {
-  const auto text = ReadFile(path, kMostTableBytes);
+  const auto text = ReadText(path, kMostTableBytes);
   if (!text) return text.error();
   std::istringstream in(*text);
   std::vector<ProbeRecord> records;

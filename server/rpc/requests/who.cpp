@@ -1,14 +1,33 @@
 #include "server/rpc/requests/who.h"
 
+#include <grpc/grpc_security_constants.h>
+
 #include "server/security/forwarded.h"
+#include "server/security/single_header.h"
 
 namespace taclink::server {
 namespace {
 
+std::string_view TextOf(const grpc::string_ref& text) {
+  return {text.data(), text.size()};
+}
+
+// Empty also where the call has several: these are nobody's.
 std::string Metadata(const grpc::ServerContextBase& context, const char* key) {
-  const auto at = context.client_metadata().find(key);
-  return at == context.client_metadata().end() ? std::string()
-                                               : std::string(at->second.data(), at->second.size());
+  SingleHeader header(key);
+  for (const auto& [name, value] : context.client_metadata()) header.Read(TextOf(name), TextOf(value));
+  const auto value = header.Value();
+  return value ? std::string(*value) : std::string();
+}
+
+// A certificate can have several names. The first common name counts, as for the HTTP gateway; the first
+// alternative name where it has no common name.
+std::string CertificateName(const grpc::AuthContext& auth) {
+  const auto common_names = auth.FindPropertyValues(GRPC_X509_CN_PROPERTY_NAME);
+  if (!common_names.empty() && !common_names.front().empty())
+    return std::string(TextOf(common_names.front()));
+  const auto names = auth.GetPeerIdentity();
+  return names.empty() ? std::string() : std::string(TextOf(names.front()));
 }
 
 bool IsForwarded(const grpc::ServerContextBase& context) {
@@ -31,7 +50,7 @@ Caller CallerOf(const grpc::ServerContextBase& context, const Security& security
   if (!caller.name.empty()) return caller;
   const auto auth = context.auth_context();
   if (!auth || !auth->IsPeerAuthenticated()) return caller;
-  for (const auto& identity : auth->GetPeerIdentity()) caller.name.assign(identity.data(), identity.size());
+  caller.name = CertificateName(*auth);
   return caller;
 }
 

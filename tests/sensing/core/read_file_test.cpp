@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 
@@ -41,6 +42,27 @@ TEST_F(ReadFileTest, GivesAllOfIt) {
   EXPECT_EQ(ReadBeginning(folder_ / "a", 3).value(), content.substr(0, 3));
   fs::create_symlink("a", folder_ / "link");
   EXPECT_EQ(ReadFile(folder_ / "link").value(), content) << "as secrets are mounted into containers";
+}
+
+TEST_F(ReadFileTest, AByteOrderMarkIsNoPartOfAText) {
+  EXPECT_EQ(ReadText(Write("marked",
+                           "\xEF\xBB\xBF"
+                           "eve"))
+                .value(),
+            "eve");
+  EXPECT_EQ(ReadText(Write("plain", "eve \xEF\xBB\xBF")).value(), "eve \xEF\xBB\xBF")
+      << "only where a text begins";
+  EXPECT_EQ(ReadText(Write("mark", "\xEF\xBB\xBF")).value(), "");
+  EXPECT_EQ(ReadFile(folder_ / "mark").value().size(), 3u);
+}
+
+TEST_F(ReadFileTest, WhatTheMachineCannotReadNowSaysNothingOfTheFile) {
+  for (const int number : {EMFILE, ENFILE, ENOMEM, EIO, EINTR, EAGAIN, ESTALE})
+    EXPECT_EQ(FileError("/a", number).code, ErrorCode::kUnavailable) << number;
+  for (const int number : {ENOENT, ENOTDIR, ELOOP, ENAMETOOLONG})
+    EXPECT_EQ(FileError("/a", number).code, ErrorCode::kNotFound) << number;
+  EXPECT_EQ(FileError("/a", EACCES).code, ErrorCode::kPermissionDenied);
+  EXPECT_THAT(FileError("/a", EMFILE).message, AllOf(HasSubstr("/a"), HasSubstr("LimitNOFILE")));
 }
 
 // Each would keep a program waiting, or fill its memory.

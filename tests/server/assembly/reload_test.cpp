@@ -66,6 +66,39 @@ TEST(Reload, WhatFailsIsToldAndTriedAgain) {
   EXPECT_THAT(reloader.Reload(next).applied, ElementsAre("log"));
 }
 
+// As the log's: its file is opened again by each reload.
+TEST(Reload, ASectionThatIsAlwaysAppliedIsReportedByWhatBecameOfIt) {
+  Reloader reloader(Parse(""));
+  int calls = 0;
+  bool refuse = false;
+  reloader.Add(
+      "log",
+      [&](const Config&) -> Result<void> {
+        ++calls;
+        return refuse ? Result<void>(Error{ErrorCode::kUnavailable, "/no/such: no such folder"})
+                      : Result<void>();
+      },
+      {}, Reloader::When::kAlways);
+  const Config same = Parse(""), next = Parse("log: {file: /no/such/log}\n");
+  const auto unchanged = reloader.Reload(same);
+  EXPECT_EQ(calls, 1);
+  EXPECT_THAT(unchanged.applied, IsEmpty());
+  EXPECT_THAT(unchanged.errors, IsEmpty());
+
+  refuse = true;
+  const auto refused = reloader.Reload(next);
+  EXPECT_THAT(refused.applied, IsEmpty());
+  EXPECT_THAT(refused.errors, ElementsAre("log: /no/such: no such folder"));
+  EXPECT_THAT(refused.keys, ElementsAre("log.file"));
+  EXPECT_THAT(reloader.Reload(same).errors, ElementsAre(HasSubstr("no such folder")))
+      << "unchanged, but refused";
+  EXPECT_EQ(calls, 3);
+
+  refuse = false;
+  EXPECT_THAT(reloader.Reload(next).applied, ElementsAre("log"));
+  EXPECT_THAT(reloader.Reload(next).applied, IsEmpty());
+}
+
 TEST(Reload, SectionsOfAPrintedConfigurationAreAllThere) {
   const std::string text = ConfigText(Parse(""));
   std::string joined;

@@ -50,9 +50,10 @@ TEST(ConfigPublish, AUrlAloneIsEnough) {
 TEST(ConfigPublish, MistakesAreNamed) {
   for (const char* wrong :
        {"publish: on\n", "publish:\n", "publish: [a]\n", "publish: nats://me:secret@a\n", "publish: {}\n",
-        "publish: {url: 'http://a'}\n", "publish: {url: 'nats://a,b'}\n",
-        "publish: {url: 'nats://me:secret@a'}\n", "publish: {url: 'nats://a', site: a.b}\n",
-        "publish: {url: 'nats://a', stream: 'x y'}\n", "publish: {url: 'nats://a', certificate: c.pem}\n",
+        "publish: {url: 'http://a'}\n", "publish: {url: 'nats://a,b'}\n", "publish: {url: 'nats://[::1'}\n",
+        "publish: {url: 'nats://a:70000'}\n", "publish: {url: 'nats://me:secret@a'}\n",
+        "publish: {url: 'nats://a', site: a.b}\n", "publish: {url: 'nats://a', stream: 'x y'}\n",
+        "publish: {url: 'nats://a', certificate: c.pem}\n",
         "publish: {url: 'nats://a', frames_detail: most}\n", "publish: {url: 'nats://a', que_mb: 1}\n"}) {
     const auto config = ParsePublish(wrong);
     ASSERT_FALSE(config.ok()) << wrong;

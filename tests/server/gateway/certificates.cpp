@@ -2,6 +2,7 @@
 
 #include <openssl/evp.h>
 #include <openssl/pem.h>
+#include <openssl/rsa.h>
 #include <openssl/x509v3.h>
 
 #include <atomic>
@@ -45,6 +46,20 @@ void Extend(X509* certificate, int kind, const char* value) {
   X509_EXTENSION_free(extension);
 }
 
+EVP_PKEY* MakeKey(TestKey kind) {
+  switch (kind) {
+    case TestKey::kP192:
+      return EVP_EC_gen("P-192");
+    case TestKey::kRsa1024:
+      return EVP_RSA_gen(1024);
+    case TestKey::kRsa2048:
+      return EVP_RSA_gen(2048);
+    case TestKey::kP256:
+      break;
+  }
+  return EVP_EC_gen("P-256");
+}
+
 }  // namespace
 
 struct TestAuthority::Keys {
@@ -65,12 +80,12 @@ TestAuthority::~TestAuthority() {
   EVP_PKEY_free(keys_->key);
 }
 
-PemPair TestAuthority::Issue(const std::string& name, int days) const {
-  EVP_PKEY* const key = EVP_EC_gen("P-256");
+PemPair TestAuthority::Issue(const std::string& name, int days, TestKey kind, TestDigest digest) const {
+  EVP_PKEY* const key = MakeKey(kind);
   X509* const certificate = NewCertificate(name, key, days);
   X509_set_issuer_name(certificate, X509_get_subject_name(keys_->certificate));
   Extend(certificate, NID_subject_alt_name, "DNS:localhost,IP:127.0.0.1");
-  X509_sign(certificate, keys_->key, EVP_sha256());
+  X509_sign(certificate, keys_->key, digest == TestDigest::kSha1 ? EVP_sha1() : EVP_sha256());
   PemPair out{CertificatePem(certificate), Pem([&](BIO* bio) {
                 PEM_write_bio_PrivateKey(bio, key, nullptr, nullptr, 0, nullptr, nullptr);
               })};

@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <future>
+#include <utility>
+#include <vector>
 
 #include "server/gateway/grpc_call.h"
 #include "server/gateway/grpc_web.h"
 #include "taclink/v1/events.pb.h"
+#include "taclink/v1/tactile.grpc.pb.h"
 #include "tests/integration/support.h"
 #include "tests/server/gateway/security_support.h"
 #include "tests/server/gateway/support.h"
@@ -198,6 +201,40 @@ TEST_F(GrpcSecurity, NobodyCallsInAnothersName) {
                    .name = "otto"});
   });
   EXPECT_THAT(who, ::testing::StartsWith("ipv4:127.0.0.1:"));
+}
+
+TEST_F(GrpcSecurity, TwoTokensInOneCallAreRefused) {
+  Serve(WithTokens());
+  const auto channel = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
+  const auto stub = v1::TactileService::NewStub(channel);
+  const auto set_thresholds = [&](const std::vector<std::string>& tokens) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kForever);
+    for (const std::string& token : tokens) context.AddMetadata("authorization", "Bearer " + token);
+    v1::SetThresholdsRequest request;
+    EXPECT_TRUE(request.ParseFromString(ThresholdsMessage()));
+    v1::SetThresholdsResponse response;
+    return stub->SetThresholds(&context, request, &response);
+  };
+  EXPECT_TRUE(set_thresholds({kOperator}).ok());
+  for (const auto& [first, second] : {std::pair(kViewer, kOperator), std::pair(kOperator, kViewer)}) {
+    const grpc::Status refused = set_thresholds({first, second});
+    EXPECT_EQ(refused.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+    EXPECT_THAT(refused.error_message(), HasSubstr("2 'authorization' headers"));
+  }
+}
+
+TEST_F(GrpcSecurity, ACertificateHasOneNameForGrpcAndForHttp) {
+  Serve(MutualTls());
+  WritePair("client", authority_.Issue("client"));  // which also has alternative names
+  const std::string who = WhoSetThresholds(arm_, [this] {
+    auto client = Connect({.ca_file = Path("ca.pem"),
+                           .certificate_file = Path("client.pem"),
+                           .key_file = Path("client.key"),
+                           .token = {}});
+    EXPECT_TRUE(client.ok() && client->SetThresholds("lower", "", MakeThresholds(1, 2), kForever).ok());
+  });
+  EXPECT_THAT(who, ::testing::StartsWith("client ipv4:127.0.0.1:"));
 }
 
 TEST_F(GrpcSecurity, HealthNeedsNoTokenAndReflectionDoes) {

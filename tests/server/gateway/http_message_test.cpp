@@ -81,6 +81,22 @@ TEST(HttpMessage, BadRequestsAreRefused) {
   EXPECT_EQ(FailureOf("POST / HTTP/1.1\r\nHost: a\r\nExpect: magic\r\nContent-Length: 1\r\n\r\n"), 417);
 }
 
+TEST(HttpMessage, HeadersThatDecideSomethingComeOnce) {
+  for (const char* once :
+       {"Authorization: Bearer ", "Content-Type: text/", "Origin: http://", "Grpc-Timeout: 1", "HOST: "}) {
+    const std::string head =
+        std::string("POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 0\r\n") + once + "a\r\n";
+    const bool second = std::string_view(once).starts_with("HOST");
+    EXPECT_EQ(FailureOf(head + "\r\n"), second ? 400 : 0) << once;
+    const Fed twice(head + once + "b\r\n\r\n");
+    ASSERT_TRUE(twice.parser.failure().has_value()) << once;
+    EXPECT_EQ(twice.parser.failure()->status, 400);
+    EXPECT_THAT(twice.parser.failure()->message, HasSubstr("headers; send one"));
+  }
+  EXPECT_EQ(FailureOf("POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 0\r\nContent-Length: 0\r\n\r\n"), 400);
+  EXPECT_EQ(FailureOf("GET / HTTP/1.1\r\nHost: a\r\nAccept: a\r\nAccept: b\r\n\r\n"), 0) << "a list";
+}
+
 TEST(HttpMessage, LengthsAreBounded) {
   const HttpLimits limits{.header_bytes = 200, .body_bytes = 10};
   EXPECT_EQ(FailureOf("GET / HTTP/1.1\r\nHost: a\r\nX: " + std::string(300, 'x'), limits), 431)

@@ -109,6 +109,24 @@ TEST_F(SecurityTest, BadCertificatesAreNamed) {
   EXPECT_THAT(Complaint(MutualTls()), HasSubstr("cannot be read"));
 }
 
+TEST_F(SecurityTest, WeakKeysAndSignaturesAreRefused) {
+  const auto complaint = [this](TestKey kind, TestDigest digest = TestDigest::kSha256) {
+    WritePair("server", authority_.Issue("server", 2, kind, digest));
+    return Complaint(Tls());
+  };
+  EXPECT_THAT(complaint(TestKey::kRsa1024),
+              AllOf(HasSubstr("server.pem"), HasSubstr("RSA key of 1024 bits"), HasSubstr("at least 2048")));
+  EXPECT_THAT(complaint(TestKey::kP192), AllOf(HasSubstr("EC key of 192 bits"), HasSubstr("at least 256")));
+  EXPECT_THAT(complaint(TestKey::kP256, TestDigest::kSha1),
+              AllOf(HasSubstr("signed with SHA1"), HasSubstr("SHA-256")));
+  EXPECT_EQ(complaint(TestKey::kRsa2048), "accepted");
+  EXPECT_EQ(complaint(TestKey::kP256), "accepted");
+  const std::string strong = authority_.Issue("other").certificate,
+                    weak = authority_.Issue("weak", 2, TestKey::kRsa1024).certificate;
+  Write("ca.pem", authority_.pem() + strong + weak);
+  EXPECT_THAT(Complaint(MutualTls()), AllOf(HasSubstr("ca.pem (certificate 3)"), HasSubstr("1024 bits")));
+}
+
 TEST_F(SecurityTest, ExpiredCertificatesAreWarnedOf) {
   const auto warnings = [this] {
     const auto material = ReadTlsFiles(Tls());

@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 
 #include "server/gateway/grpc_web.h"
+#include "server/security/tls_policy.h"
 #include "tests/server/gateway/security_support.h"
 #include "tests/server/gateway/support.h"
 
@@ -38,7 +39,49 @@ std::string AskTls(const std::string& address, const std::string& ca, const std:
   return out;
 }
 
+/// Whether a client that speaks only this version of TLS, and of TLS 1.2 only this cipher, is served.
+bool Shakes(const std::string& address, int version, const std::string& cipher) {
+  SSL_CTX* const context = SSL_CTX_new(TLS_client_method());
+  EXPECT_EQ(SSL_CTX_set_min_proto_version(context, version), 1);
+  EXPECT_EQ(SSL_CTX_set_max_proto_version(context, version), 1);
+  EXPECT_EQ(SSL_CTX_set_cipher_list(context, (cipher + ":@SECLEVEL=0").c_str()), 1) << cipher;
+  BIO* const bio = BIO_new_ssl_connect(context);
+  BIO_set_conn_hostname(bio, address.c_str());
+  const bool shaken = BIO_do_connect(bio) == 1 && BIO_do_handshake(bio) == 1;
+  BIO_free_all(bio);
+  SSL_CTX_free(context);
+  return shaken;
+}
+
 class TlsGateway : public SecurityTest {};
+
+TEST_F(TlsGateway, OnlyAuthenticatedEncryptionWithEphemeralKeys) {
+  constexpr const char* kAny = "ALL";
+  const TestGateway gateway({}, Load(Tls()));
+  const auto shakes = [&](int version, const char* cipher) {
+    return Shakes(gateway.address(), version, cipher);
+  };
+  EXPECT_TRUE(shakes(TLS1_3_VERSION, kAny));
+  for (const char* good : {"ECDHE-ECDSA-AES128-GCM-SHA256", "ECDHE-ECDSA-CHACHA20-POLY1305"})
+    EXPECT_TRUE(shakes(TLS1_2_VERSION, good)) << good;
+  for (const char* bad : {"ECDHE-ECDSA-AES128-SHA", "ECDHE-ECDSA-AES256-SHA384", "ECDHE-ECDSA-AES128-CCM"})
+    EXPECT_FALSE(shakes(TLS1_2_VERSION, bad)) << bad;
+  EXPECT_FALSE(shakes(TLS1_1_VERSION, kAny));
+}
+
+TEST(TlsPolicy, ItsCiphersAreKnownAndModern) {
+  SSL_CTX* const context = SSL_CTX_new(TLS_server_method());
+  ASSERT_EQ(SSL_CTX_set_cipher_list(context, kTlsCiphers), 1);
+  const STACK_OF(SSL_CIPHER)* const ciphers = SSL_CTX_get_ciphers(context);
+  EXPECT_GE(sk_SSL_CIPHER_num(ciphers), 6);
+  for (int i = 0; i < sk_SSL_CIPHER_num(ciphers); ++i) {
+    const SSL_CIPHER* const cipher = sk_SSL_CIPHER_value(ciphers, i);
+    EXPECT_EQ(SSL_CIPHER_is_aead(cipher), 1) << SSL_CIPHER_get_name(cipher);
+    EXPECT_THAT(SSL_CIPHER_get_kx_nid(cipher), ::testing::AnyOf(NID_kx_ecdhe, NID_kx_any))
+        << SSL_CIPHER_get_name(cipher);
+  }
+  SSL_CTX_free(context);
+}
 
 TEST_F(TlsGateway, ServesThoseWhoTrustIt) {
   TestGateway gateway({}, Load(Tls()));
