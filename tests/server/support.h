@@ -31,7 +31,10 @@ class ManualClock final : public Clock {
     const std::lock_guard lock(mutex_);
     return now_ns_;
   }
-  int64_t UtcNs() const override { return MonotonicNs() + 1'700'000'000'000'000'000; }
+  int64_t UtcNs() const override {
+    const std::lock_guard lock(mutex_);
+    return now_ns_ + utc_offset_ns_;
+  }
   void SleepUntilMonotonicNs(int64_t time_ns) override {
     std::unique_lock lock(mutex_);
     if (sleeping_passes_time_) {
@@ -48,6 +51,11 @@ class ManualClock final : public Clock {
     }
     changed_.notify_all();
   }
+  /// As if somebody set the clock.
+  void StepUtc(std::chrono::nanoseconds by) {
+    const std::lock_guard lock(mutex_);
+    utc_offset_ns_ += by.count();
+  }
   /// A sleep returns at once with the time it slept to.
   void LetSleepingPassTime() { sleeping_passes_time_ = true; }
 
@@ -55,6 +63,7 @@ class ManualClock final : public Clock {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   int64_t now_ns_ = 1'000'000'000;
+  int64_t utc_offset_ns_ = 1'700'000'000'000'000'000;
   bool sleeping_passes_time_ = false;
 };
 
