@@ -2,9 +2,10 @@
 
 #include <google/protobuf/stubs/logging.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
-#include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
 
+#include <set>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -17,7 +18,6 @@ namespace {
 // gRPC's plug-ins are global and must be set before the first builder.
 void EnablePlugins() {
   static const bool once = [] {
-    grpc::EnableDefaultHealthCheckService(true);
     // Every malformed request would write a line; the client is told.
     google::protobuf::SetLogHandler(nullptr);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -36,6 +36,14 @@ Result<void> CheckSocketIsFree(const std::string& listen) {
                "cannot listen on " + listen + ": " + who + " does; stop it or choose another with --listen"};
 }
 
+std::set<std::string> ServiceNames(bool records) {
+  std::set<std::string> names = {v1::TactileService::service_full_name(),
+                                 v1::OperationsService::service_full_name(),
+                                 v1::SimulationService::service_full_name()};
+  if (records) names.insert(v1::RecordingService::service_full_name());
+  return names;
+}
+
 std::string WithPort(const std::string& listen, int port) {
   if (listen.starts_with("unix:")) return listen;
   return listen.substr(0, listen.rfind(':') + 1) + std::to_string(port);
@@ -48,7 +56,8 @@ RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const
     : senders_(std::make_shared<boost::asio::thread_pool>(1)),
       service_(arm, limits, senders_, security),
       operations_(arm, security),
-      simulations_(arm) {
+      simulations_(arm),
+      health_(ServiceNames(recorder != nullptr), service_.registry(), senders_, security) {
   if (recorder != nullptr)
     recordings_ = std::make_unique<RecordingService>(*recorder, service_.registry(), senders_, security);
 }
@@ -68,6 +77,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
   builder.RegisterService(&out->service_);
   builder.RegisterService(&out->operations_);
   builder.RegisterService(&out->simulations_);
+  builder.RegisterService(&out->health_);
   if (recorder != nullptr) builder.RegisterService(out->recordings_.get());
   out->server_ = builder.BuildAndStart();
   if (!out->server_ || port == 0) {
@@ -75,11 +85,6 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
                  "cannot listen on " + listen + "; stop what uses it or choose another with --listen"};
   }
   out->address_ = WithPort(listen, port);
-  out->server_->GetHealthCheckService()->SetServingStatus(v1::TactileService::service_full_name(), true);
-  out->server_->GetHealthCheckService()->SetServingStatus(v1::OperationsService::service_full_name(), true);
-  out->server_->GetHealthCheckService()->SetServingStatus(v1::SimulationService::service_full_name(), true);
-  if (recorder != nullptr)
-    out->server_->GetHealthCheckService()->SetServingStatus(v1::RecordingService::service_full_name(), true);
   return out;
 }
 
@@ -89,7 +94,7 @@ RpcServer::~RpcServer() {
 
 void RpcServer::Shutdown(const std::string& reason, std::chrono::milliseconds patience) {
   if (!server_) return;
-  server_->GetHealthCheckService()->SetServingStatus(false);
+  health_.Stop();
   service_.EndStreams(reason);
   // Calls from within the process lose their last words once gRPC shuts down, so they get their time before.
   const auto deadline = std::chrono::system_clock::now() + patience;

@@ -9,6 +9,7 @@
 
 #include "sensing/core/result.h"
 #include "server/arm/arm.h"
+#include "server/rpc/services/health_service.h"
 #include "server/rpc/services/operations_service.h"
 #include "server/rpc/services/recording_service.h"
 #include "server/rpc/services/simulation_service.h"
@@ -50,6 +51,7 @@ class RpcServer {
   OperationsService operations_;
   SimulationService simulations_;
   std::unique_ptr<RecordingService> recordings_;  // null: none
+  HealthService health_;
   std::unique_ptr<grpc::Server> server_;
   std::string address_;
 };
