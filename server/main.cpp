@@ -106,8 +106,9 @@ void AddReloads(Reloader& reloader, RpcServer& server, Arm& arm) {
                  server.SetLimits(ToServiceLimits(next.limits));
                  return Result<void>();
                },
-               {"max_links", "max_connections", "max_connections_per_peer", "max_calls_per_connection", "max_message_kb", "memory_mb", "keepalive_s",
-                "keepalive_timeout_s", "handshake_timeout_s", "idle_timeout_s"});
+               {"max_links", "max_connections", "max_connections_per_peer", "max_calls_per_connection",
+                "max_message_kb", "memory_mb", "keepalive_s", "keepalive_timeout_s", "handshake_timeout_s",
+                "idle_timeout_s", "max_frame_age_s"});
   reloader.AddAlways("links", [&arm](const Config&) {
     for (size_t link = 0; link < arm.links().size(); ++link) arm.worker(link).Wake();
     return Result<void>();

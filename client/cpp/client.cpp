@@ -95,7 +95,13 @@ struct FrameReader::Call : StreamCall<v1::StreamFramesResponse> {
     end_reason = status.end_reason();
   }
 
+  bool IsTooOld(const v1::LinkFrame& frame) const {
+    return max_age_s > 0 && LatencyS(frame).value_or(0) > max_age_s;
+  }
+
   v1::StreamStatus status;
+  double max_age_s = 0;  // 0: any
+  uint64_t frames_too_old = 0;
 };
 
 FrameReader::FrameReader(std::unique_ptr<Call> call) : call_(std::move(call)) {}
@@ -107,8 +113,18 @@ Result<v1::LinkFrame> FrameReader::Next(milliseconds timeout) {
     const auto read = call_->Read(deadline);
     if (!read) return read.error();
     if (call_->response.has_status()) call_->TakeStatus();
-    if (call_->response.has_frame()) return std::move(*call_->response.mutable_frame());
+    if (!call_->response.has_frame()) continue;
+    if (!call_->IsTooOld(call_->response.frame())) return std::move(*call_->response.mutable_frame());
+    ++call_->frames_too_old;
   }
+}
+
+void FrameReader::SetMaxAge(std::chrono::nanoseconds max_age) {
+  call_->max_age_s = std::chrono::duration<double>(max_age).count();
+}
+
+uint64_t FrameReader::frames_too_old() const {
+  return call_->frames_too_old;
 }
 
 void FrameReader::Cancel() {

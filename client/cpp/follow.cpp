@@ -133,10 +133,12 @@ bool Subscription::ended() const {
 
 std::unique_ptr<Subscription> FollowFrames(FollowOptions options, v1::StreamFramesRequest request,
                                            std::function<void(const v1::LinkFrame&)> on_frame) {
-  auto read = [request = std::move(request), on_frame = std::move(on_frame)](Subscription::Worker& worker,
-                                                                             Client& client) {
+  auto read = [request = std::move(request), on_frame = std::move(on_frame), max_age = options.max_age](
+                  Subscription::Worker& worker, Client& client) {
     const auto reader = client.StreamFrames(request);
-    return reader ? worker.ReadAll(**reader, on_frame) : reader.error();
+    if (!reader) return reader.error();
+    (*reader)->SetMaxAge(max_age);
+    return worker.ReadAll(**reader, on_frame);
   };
   return std::make_unique<Subscription>(
       std::make_unique<Subscription::Worker>(std::move(options), std::move(read)));

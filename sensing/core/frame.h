@@ -96,6 +96,7 @@ struct LinkState;
 /// What a link's cameras saw at one moment.
 struct StereoFrame {
   uint64_t sequence = 0;  ///< counts exposures of this source; a gap is a frame that was not seen
+  int64_t period_ns = 0;  ///< of its source's frame rate; 0: not known
   FrameTimes times;
   RawPictures images;
   std::optional<double> pressure_mpa;  ///< gauge pressure inside the skin at that time; none: not measured

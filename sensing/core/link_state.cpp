@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
+#include <utility>
 
 #include "sensing/core/link_state_fields.h"
 
@@ -43,6 +44,7 @@ constexpr ReasonTraits kReasonTraits[] = {
     {.name = "cameras_swapped"},
     {.name = "frame_rate", .unit = ReasonUnit::kHertz},
     {.name = "image_contrast", .doubts_contacts = false},
+    {.name = "late_frame", .unit = ReasonUnit::kSeconds},
 };
 static_assert(std::size(kReasonTraits) == kReasonCount);
 
@@ -65,6 +67,13 @@ bool AreContactsCertain(const LinkState& state) {
   return state.measured() && state.has_forces() &&
          std::ranges::none_of(state.reasons,
                               [](const Reason& reason) { return TraitsOf(reason.id).doubts_contacts; });
+}
+
+void Degrade(LinkState& state, Reason reason) {
+  if (state.status != LinkStatus::kOk && state.status != LinkStatus::kDegraded) return;
+  state.status = LinkStatus::kDegraded;
+  if (state.status_reason.empty()) state.status_reason = reason.text;
+  state.reasons.push_back(std::move(reason));
 }
 
 double LinkState::total_magnitude_n() const {

@@ -52,8 +52,9 @@ enum class ReasonId : uint8_t {
   kCamerasSwapped,    ///< the top camera's images are those of the bottom camera, and the other way round
   kFrameRate,         ///< a camera gives fewer new images than the link gives frames
   kImageContrast,     ///< markers stand out less in a camera's images than when the rest shape was taken
+  kLateFrame,         ///< too much time passed from the exposure to the publication
 };
-inline constexpr int kReasonCount = static_cast<int>(ReasonId::kImageContrast) + 1;
+inline constexpr int kReasonCount = static_cast<int>(ReasonId::kLateFrame) + 1;
 
 /// What a reason's number is in. kNone: a number of markers, or a ratio.
 enum class ReasonUnit : uint8_t { kNone, kMillimeters, kMegapascals, kSeconds, kHertz };
@@ -154,5 +155,9 @@ struct LinkState {
 
 /// Whether it is certain which contacts a frame has: forces are known, and no reason doubts it.
 bool AreContactsCertain(const LinkState& state);
+
+/// Adds a reason that is found only after the frame was judged, which makes the state worse, never better: an
+/// OK one is degraded, a degraded one keeps its first reason, and any other stays as it is.
+void Degrade(LinkState& state, Reason reason);
 
 }  // namespace taclink

@@ -82,10 +82,15 @@ int64_t SimulatedSource::ExposureNs(uint64_t frame) const {
   return start_ns_ + std::llround(static_cast<double>(frame) * 1e9 / scene_.frame_rate_hz);
 }
 
-// A late caller skips to the newest frame, or by frames moves the scene's start by its delay.
+// By frames, a frame that should be over is exposed now: the scene's start moves by the delay.
+void SimulatedSource::DelayScene(uint64_t frame, int64_t now_ns) {
+  if (pace_ == ScenePace::kFrames && ExposureNs(frame + 1) <= now_ns) start_ns_ += now_ns - ExposureNs(frame);
+}
+
+// A late caller skips to the newest frame, or delays the scene.
 uint64_t SimulatedSource::NextDue(int64_t now_ns) {
   if (pace_ == ScenePace::kFrames) {
-    if (ExposureNs(next_frame_ + 1) <= now_ns) start_ns_ += now_ns - ExposureNs(next_frame_);
+    DelayScene(next_frame_, now_ns);
     return next_frame_;
   }
   uint64_t due = next_frame_;
@@ -140,8 +145,9 @@ void SimulatedSource::Take(uint64_t frame_number, StereoFrame& frame) {
                    .velocity_radps = truth_.joint.radps};
   }
   frame.times = {};
-  frame.times.exposure_monotonic_ns = ExposureNs(frame_number);
   const int64_t now = clock_.MonotonicNs();
+  DelayScene(frame_number, now);  // the time that the images took to make is not the frame's age
+  frame.times.exposure_monotonic_ns = ExposureNs(frame_number);
   frame.times.exposure_utc_ns = clock_.UtcNs() - now + frame.times.exposure_monotonic_ns;
   frame.times.received_ns = now;
 }

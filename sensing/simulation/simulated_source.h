@@ -48,6 +48,7 @@ class SimulatedSource final : public FrameSource {
                   double took_s, ScenePace pace, HandlingNow handling);
   int64_t ExposureNs(uint64_t frame) const;
   uint64_t NextDue(int64_t now_ns);
+  void DelayScene(uint64_t frame, int64_t now_ns);
   void Report(StereoFrame& frame) const;
   void Take(uint64_t frame_number, StereoFrame& frame);
 

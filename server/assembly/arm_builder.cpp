@@ -192,7 +192,9 @@ Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock) {
     links.push_back(std::move(*parts));
   }
   return std::make_unique<Arm>(config.arm_name, std::move(links), MakeEncoder(names), clock,
-                               ArmOptions{.watchdog = config.watchdog, .events = config.events},
+                               ArmOptions{.worker = {.age_limit = AgeLimit{config.limits.max_frame_age}},
+                                          .watchdog = config.watchdog,
+                                          .events = config.events},
                                std::move(*poses));
 }
 

@@ -28,6 +28,7 @@ struct LimitsConfig {
   int max_streams = 64, max_streams_per_peer = 16, max_calls_per_connection = 100;
   int max_message_kb = 64, memory_mb = 256, queue_messages = 256, queue_mb = 32, queue_mb_per_peer = 64;
   int keepalive_s = 60, keepalive_timeout_s = 120, handshake_timeout_s = 20, idle_timeout_s = 300;
+  std::chrono::milliseconds max_frame_age{0};  ///< 0: by the frame rate
   void Describe(FieldVisitor& visit) {
     constexpr Range kCount{1, 10000}, kMegabytes{1, 65536}, kDay{1, 86400};
     visit("max_links", max_links, kCount, "Links of the arm; each takes some 100 MB.");
@@ -47,6 +48,8 @@ struct LimitsConfig {
     visit("keepalive_timeout_s", keepalive_timeout_s, kDay, "Longest wait for the answer to a ping.");
     visit("handshake_timeout_s", handshake_timeout_s, {1, 3600}, "Longest wait for gRPC to begin.");
     visit("idle_timeout_s", idle_timeout_s, kDay, "A connection is closed so long after its last call.");
+    visit("max_frame_age_s", max_frame_age, {0, 86400},
+          "Older when published, frames are degraded; 0: three frame periods, at least 0.2 s.");
   }
 };
 

@@ -25,12 +25,13 @@ enum class EventKind : uint8_t {
   kBaseline,  ///< taken by the link itself, from its first pictures
   kDrift,
   kThresholds,
-  kFramesLost,  ///< the engine was too slow: what happened in them is not told
-  kRecording,   ///< begun, ended, in trouble
-  kForceModel,  ///< set
-  kCamera,      ///< exposure or gain set
+  kFramesLost,    ///< the engine was too slow: what happened in them is not told
+  kRecording,     ///< begun, ended, in trouble
+  kForceModel,    ///< set
+  kCamera,        ///< exposure or gain set
+  kClockStepped,  ///< UTC was set, or the machine was suspended
 };
-inline constexpr size_t kEventKinds = 14;
+inline constexpr size_t kEventKinds = 15;
 
 struct ContactDetail {
   uint64_t id = 0;  ///< the contact's in the frame that began it; lasts

@@ -1,5 +1,6 @@
 #include "server/events/event_engine.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -37,7 +38,7 @@ const char* Name(EventKind kind) {
   static constexpr std::array<const char*, kEventKinds> kNames = {
       "contact_begin", "contact_update", "contact_end", "force_level", "link_status",
       "tare",          "calibration",    "baseline",    "drift",       "thresholds",
-      "frames_lost",   "recording",      "force_model", "camera"};
+      "frames_lost",   "recording",      "force_model", "camera",      "clock_stepped"};
   return kNames[static_cast<size_t>(kind)];
 }
 
@@ -71,6 +72,7 @@ EventEngine::EventEngine(Hub& hub, std::vector<WatchedLink> links, const EventOp
       lost_told_(links_.size(), 0) {
   for (size_t i = 0; i < links_.size(); ++i)
     watches_.emplace_back(i, links_[i].rules, links_[i].grid, options);
+  clock_watch_.Poll(clock_);  // steps count from here
 }
 
 EventEngine::~EventEngine() {
@@ -112,7 +114,24 @@ void EventEngine::Drain() {
   }
   if (clock_.MonotonicNs() - beat_ns_ < kBeatNs) return;
   beat_ns_ = clock_.MonotonicNs();
+  TellClockStep();
   history_.Beat();
+}
+
+void EventEngine::TellClockStep() {
+  const auto step_ns = clock_watch_.Poll(clock_);
+  if (!step_ns) return;
+  const double step_s = static_cast<double>(*step_ns) / 1e9;
+  std::string outcome = fmt::format(
+      "UTC stepped by {:+.3f} s against the monotonic clock: the clock was set, or the machine was "
+      "suspended; "
+      "UTC times from before and after do not fit together",
+      step_s);
+  SPDLOG_WARN("clock: {}", outcome);
+  Event event;
+  event.kind = EventKind::kClockStepped;
+  event.detail = Operation{.who = "server", .outcome = std::move(outcome), .values = {{"step_s", step_s}}};
+  Raise(std::move(event));
 }
 
 void EventEngine::TakePosts() {

@@ -15,6 +15,7 @@
 #include "server/events/event_history.h"
 #include "server/events/link_watch.h"
 #include "server/hub/hub.h"
+#include "server/process/clock_watch.h"
 
 namespace taclink::server {
 
@@ -75,6 +76,7 @@ class EventEngine {
   void TakePosts();
   void TakeFrames();
   void TellLostFrames();
+  void TellClockStep();
   void Raise(Event event);
 
   // Constant after construction.
@@ -98,6 +100,7 @@ class EventEngine {
   std::vector<uint64_t> lost_told_;  // by link
   uint64_t all_lost_told_ = 0;
   int64_t beat_ns_ = 0;
+  ClockWatch clock_watch_;
 
   std::jthread thread_;
 };

@@ -39,6 +39,7 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
+constexpr size_t kProbePlaces = 8;         // of connections to /healthz and /readyz
 constexpr milliseconds kAcceptPause{100};  // after a failure, such as too many open files
 
 // As gRPC tells a peer.
@@ -85,6 +86,15 @@ milliseconds SweepInterval(const GatewayOptions& options) {
 }  // namespace
 
 struct Gateway::Running {
+  struct Held {
+    Place place;
+    bool only_probes = false;  // it has one of the places that are reserved for probes
+  };
+  /// For a new connection.
+  struct Room {
+    std::string busy = {};  // not empty: for probes only, and why
+  };
+
   Running(GatewayOptions options, GatewayServices services, StaticFiles files)
       : shared(std::make_shared<GatewayShared>(std::move(options), std::move(services), std::move(files))),
         acceptor(shared->loop),
@@ -94,8 +104,9 @@ struct Gateway::Running {
   asio::awaitable<void> Accept();
   asio::awaitable<void> Sweep();
   asio::awaitable<void> Serve(std::shared_ptr<Session> session);
-  Result<void> MakeRoom(const Place& from);
-  bool EndLongestWaiting(const std::function<bool(const Place&)>& among);
+  Result<Room> MakeRoom(const Place& from);
+  bool MakeProbeRoom();
+  bool EndLongestWaiting(const std::function<bool(const Held&)>& among);
   std::shared_ptr<asio::ssl::context> CurrentTls();
   void StopListening();
   void Stop();
@@ -107,7 +118,7 @@ struct Gateway::Running {
   tcp::acceptor acceptor;
   asio::steady_timer sweep_timer;
   bool stopping = false;
-  std::map<std::shared_ptr<Session>, Place> sessions;
+  std::map<std::shared_ptr<Session>, Held> sessions;
   std::shared_ptr<const TlsMaterial> tls_material;
   std::shared_ptr<asio::ssl::context> tls;
 
@@ -152,11 +163,11 @@ std::shared_ptr<asio::ssl::context> Gateway::Running::CurrentTls() {
 }
 
 // False: none of them waits for a request.
-bool Gateway::Running::EndLongestWaiting(const std::function<bool(const Place&)>& among) {
+bool Gateway::Running::EndLongestWaiting(const std::function<bool(const Held&)>& among) {
   std::shared_ptr<Session> oldest;
-  for (const auto& [session, place] : sessions) {
+  for (const auto& [session, held] : sessions) {
     const auto since = session->waiting_since();
-    if (since && among(place) && (!oldest || *since < *oldest->waiting_since())) oldest = session;
+    if (since && among(held) && (!oldest || *since < *oldest->waiting_since())) oldest = session;
   }
   if (!oldest) return false;
   oldest->Close();
@@ -164,13 +175,23 @@ bool Gateway::Running::EndLongestWaiting(const std::function<bool(const Place&)>
   return true;
 }
 
+// Places beyond all limits, for those who watch this server from its own machine: programs that take all
+// connections must not make it look dead. A probe asks as soon as it is connected, so the one that has waited
+// longest can go.
+bool Gateway::Running::MakeProbeRoom() {
+  const auto probes = [](const Held& held) { return held.only_probes; };
+  const auto count = std::ranges::count_if(sessions, [&](const auto& each) { return probes(each.second); });
+  return static_cast<size_t>(count) < kProbePlaces || EndLongestWaiting(probes);
+}
+
 // Where all places that the new connection may take are taken, the one among them that has waited longest for
 // a request ends: those who open connections and say nothing keep nobody out. Errors: kResourceExhausted.
-Result<void> Gateway::Running::MakeRoom(const Place& from) {
+Result<Gateway::Running::Room> Gateway::Running::MakeRoom(const Place& from) {
   const size_t most = shared->options.max_connections,
                most_per_peer = shared->options.max_connections_per_peer;
-  const auto of_peer = [&](const Place& place) { return place.address == from.address; };
-  const auto remote = [](const Place& place) { return !place.local; };
+  const auto any = [](const Held& held) { return !held.only_probes; };
+  const auto of_peer = [&](const Held& held) { return any(held) && held.place.address == from.address; };
+  const auto remote = [&](const Held& held) { return any(held) && !held.place.local; };
   const auto count = [this](const auto& which) {
     return static_cast<size_t>(std::count_if(sessions.begin(), sessions.end(),
                                              [&](const auto& each) { return which(each.second); }));
@@ -184,13 +205,15 @@ Result<void> Gateway::Running::MakeRoom(const Place& from) {
   } else if (!from.local && count(remote) >= most - Kept(most)) {
     taken = fmt::format("all {} connections but those kept for this machine", most - Kept(most));
     made = EndLongestWaiting(remote);
-  } else if (sessions.size() >= most) {
+  } else if (count(any) >= most) {
     taken = fmt::format("all {} connections", most);
-    made = EndLongestWaiting([](const Place&) { return true; });
+    made = EndLongestWaiting(any);
   }
   if (!taken.empty()) ++shared->services.counts->refused;
-  if (made) return {};
-  return Error{ErrorCode::kResourceExhausted, taken + " are in use; close one or raise " + setting};
+  if (made) return Room{};
+  std::string busy = taken + " are in use; close one or raise " + setting;
+  if (from.local && MakeProbeRoom()) return Room{std::move(busy)};
+  return Error{ErrorCode::kResourceExhausted, std::move(busy)};
 }
 
 asio::awaitable<void> Gateway::Running::Accept() {
@@ -207,7 +230,8 @@ asio::awaitable<void> Gateway::Running::Accept() {
     boost::system::error_code ignored;
     const std::string peer = PeerText(socket.remote_endpoint(ignored));
     const Place place = PlaceOf(peer);
-    if (const auto room = MakeRoom(place); !room) {
+    const auto room = MakeRoom(place);
+    if (!room) {
       SPDLOG_INFO("http {}: connection refused: {}", peer, room.error().message);
       continue;  // the socket closes
     }
@@ -215,9 +239,9 @@ asio::awaitable<void> Gateway::Running::Accept() {
     BoundUnsent(socket.native_handle());
     auto current = CurrentTls();
     if (tls_material && !current) continue;
-    auto session =
-        std::make_shared<Session>(shared, MakeConnection(std::move(socket), std::move(current)), peer);
-    sessions.emplace(session, place);
+    auto session = std::make_shared<Session>(shared, MakeConnection(std::move(socket), std::move(current)),
+                                             peer, room->busy);
+    sessions.emplace(session, Held{place, !room->busy.empty()});
     asio::co_spawn(shared->loop, Serve(std::move(session)), asio::detached);
   }
 }
@@ -239,7 +263,7 @@ asio::awaitable<void> Gateway::Running::Sweep() {
     sweep_timer.expires_after(SweepInterval(shared->options));
     co_await sweep_timer.async_wait(kAwait);
     const auto now = steady_clock::now();
-    for (const auto& [session, place] : sessions) session->CloseIfLate(now);
+    for (const auto& [session, held] : sessions) session->CloseIfLate(now);
   }
 }
 
@@ -253,7 +277,7 @@ void Gateway::Running::Stop() {
   stopping = true;
   StopListening();
   sweep_timer.cancel();
-  for (const auto& [session, place] : sessions) session->Close();
+  for (const auto& [session, held] : sessions) session->Close();
 }
 
 Gateway::Gateway(std::unique_ptr<Running> running) : running_(std::move(running)) {}

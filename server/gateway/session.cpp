@@ -72,6 +72,12 @@ int GrpcStatusOf(ErrorCode code) {
   }
 }
 
+bool IsProbe(const HttpRequest& request) {
+  const auto path = PathOfTarget(request.target);
+  return (request.method == "GET" || request.method == "HEAD") && path &&
+         (*path == "/healthz" || *path == "/readyz");
+}
+
 }  // namespace
 
 asio::awaitable<void> Signal::Wait() {
@@ -80,10 +86,11 @@ asio::awaitable<void> Signal::Wait() {
 }
 
 Session::Session(std::shared_ptr<GatewayShared> shared, std::unique_ptr<Connection> connection,
-                 std::string peer)
+                 std::string peer, std::string busy)
     : shared_(std::move(shared)),
       connection_(std::move(connection)),
       peer_(std::move(peer)),
+      busy_(std::move(busy)),
       parser_(shared_->options.http),
       news_(shared_->loop),
       room_(shared_->loop) {}
@@ -183,6 +190,10 @@ asio::awaitable<bool> Session::Write(std::string_view bytes) {
 
 std::optional<HttpFailure> Session::Objection(const HttpRequest& request) const {
   if (shared_->draining) return HttpFailure{503, "the server is shutting down"};
+  if (!busy_.empty() && !IsProbe(request)) {
+    SPDLOG_INFO("http {}: {} refused: {}", peer_, request.target, busy_);
+    return HttpFailure{429, busy_};
+  }
   const std::string_view origin = request.Header("origin"), host = request.Header("host");
   if (!origin.empty() && !SameOrigin(origin, host))
     return HttpFailure{403, "pages of other origins may not call this server"};
@@ -224,7 +235,7 @@ Session::Outcome Session::AnswerPage(const HttpRequest& request, const std::stri
 
 Session::Outcome Session::AnswerText(const HttpRequest& request, int status, std::string_view type,
                                      std::string text) {
-  const bool keep = request.keep_alive && status != 503 && status != 429;
+  const bool keep = request.keep_alive && status != 503 && status != 429 && busy_.empty();
   HttpHeaders headers = CommonHeaders(type, "no-store");
   if (status == 401) headers.emplace_back("WWW-Authenticate", "Bearer");
   if (status == 429) headers.emplace_back("Retry-After", "60");

@@ -59,7 +59,10 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  Session(std::shared_ptr<GatewayShared> shared, std::unique_ptr<Connection> connection, std::string peer);
+  /// `busy`: not empty: why there is only room for a probe, which is one request to /healthz or /readyz;
+  /// others are refused so.
+  Session(std::shared_ptr<GatewayShared> shared, std::unique_ptr<Connection> connection, std::string peer,
+          std::string busy = {});
 
   /// Until the connection has ended.
   boost::asio::awaitable<void> Run();
@@ -91,6 +94,7 @@ class Session : public std::enable_shared_from_this<Session> {
   const std::shared_ptr<GatewayShared> shared_;
   const std::unique_ptr<Connection> connection_;
   const std::string peer_;
+  const std::string busy_;
 
   HttpRequestParser parser_;
   std::string input_;   // read, not parsed

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "sensing/core/clock.h"
@@ -19,12 +21,20 @@ namespace taclink::server {
 /// Clears all of `state` and sets its status and the reason; its buffers stay.
 void ResetTo(LinkState& state, LinkStatus status, std::string reason, std::optional<ReasonId> id = {});
 
+/// How old a frame may be when it is published, so that it still tells how the link is now.
+struct AgeLimit {
+  std::chrono::nanoseconds configured{0};  ///< 0: three frame periods of the source, and at least 0.2 s
+  /// For frames of a source with this period; 0: not known.
+  int64_t Ns(int64_t period_ns) const;
+};
+
 /// Where a link's states leave. It outlasts the workers that the link has one after the other: only the
 /// newest may publish, so that one that was given up can do no harm when it comes back. Also the hub may go
 /// before it.
 class LinkOutlet {
  public:
-  LinkOutlet(size_t link, Hub& hub, Clock& clock) : link_(link), clock_(clock), hub_(&hub) {}
+  LinkOutlet(size_t link, Hub& hub, Clock& clock, std::optional<AgeLimit> age_limit = {})
+      : link_(link), clock_(clock), age_limit_(age_limit), hub_(&hub) {}
 
   /// A new worker: from now on its states are taken and no other's.
   uint64_t NewLife() { return ++life_; }
@@ -32,7 +42,8 @@ class LinkOutlet {
   /// Nothing leaves any more; the hub is not touched afterwards.
   void Close();
 
-  /// Stamps and publishes what worker `life` made of a frame, and counts it. Where somebody wants the
+  /// Stamps and publishes what worker `life` made of a frame, and counts it. A frame older than the limit is
+  /// degraded. Where somebody wants the
   /// pictures too, those of `frame` are taken and old buffers left in their place, with a copy of `labels`
   /// (null: none). False: refused, for there is a newer worker.
   bool PublishFrame(uint64_t life, std::unique_ptr<LinkState> state, StereoFrame& frame,
@@ -53,11 +64,16 @@ class LinkOutlet {
   const ForceHistory& forces() const { return forces_; }
 
  private:
-  void Send(std::unique_ptr<LinkState> state, const PicturesPtr& pictures = nullptr);  // with the lock held
+  // With the lock held.
+  PicturesPtr TakePictures(StereoFrame& frame, const LabelledMarkers* labels);
+  void JudgeAge(LinkState& state, int64_t period_ns) const;
+  void Send(std::unique_ptr<LinkState> state);
+  void Send(std::unique_ptr<LinkState> state, const PicturesPtr& pictures);
 
   // Constant after construction.
   const size_t link_;
   Clock& clock_;
+  const std::optional<AgeLimit> age_limit_;  // none: frames of any age are published as they are
 
   StatePool pool_;
   SharedPool<FramePictures> picture_pool_;

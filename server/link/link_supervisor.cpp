@@ -64,7 +64,7 @@ LinkSupervisor::LinkSupervisor(size_t link, std::string name, std::unique_ptr<Fr
       clock_(clock),
       options_(std::move(options)),
       limits_(watchdog),
-      outlet_(std::make_shared<LinkOutlet>(link, hub, clock)),
+      outlet_(std::make_shared<LinkOutlet>(link, hub, clock, options_.age_limit)),
       worker_(std::make_shared<LinkWorker>(name_, std::move(source), std::move(processor), outlet_, clock,
                                            options_)) {}
 

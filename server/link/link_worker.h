@@ -45,6 +45,7 @@ struct LinkWorkerOptions {
   std::chrono::milliseconds calibration_patience{10'000};
   /// So many frames in a row that the processor threw at end the worker: a fresh one may do better.
   int failures = 30;
+  std::optional<AgeLimit> age_limit = {};  ///< of frames; none: they may have any age
   RealtimeOptions realtime = {};
   std::shared_ptr<PressureSource> pressure = nullptr;  ///< null: as the frames have it
   std::shared_ptr<AttitudeSource> attitude = nullptr;  ///< likewise

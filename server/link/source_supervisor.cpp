@@ -89,6 +89,7 @@ bool SourceSupervisor::TryNext(StereoFrame& frame, milliseconds timeout) {
   if (result) {
     alive_at_ns_ = clock_.MonotonicNs();
     backoff_ = options_.first_backoff;  // only a frame proves that the source works
+    frame.period_ns = FramesOr(milliseconds(0), 1);
     SetCondition(SourceCondition::State::kRunning, "");
     return true;
   }

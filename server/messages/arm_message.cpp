@@ -32,6 +32,12 @@ void FillSource(SourceKind kind, const SourceInfo& info, v1::Source& out) {
   out.set_frame_rate_hz(info.frame_rate_hz);
 }
 
+void FillFrameAge(const LinkState& state, int64_t now_ns, v1::LinkStatistics& out) {
+  const int64_t exposure_ns = state.times.exposure_monotonic_ns;
+  if (exposure_ns == 0 || state.replayed) return;
+  out.set_frame_age_s(1e-9 * static_cast<double>(now_ns - exposure_ns));
+}
+
 void FillStatistics(const LinkStatistics& statistics, uint64_t restarts, v1::LinkStatistics& out) {
   out.set_rate_hz(statistics.rate_hz);
   out.set_latency_p50_s(statistics.latency_p50_ms * wire::kSecondsPerMs);
@@ -184,6 +190,7 @@ void Fill(const Arm& arm, v1::Arm& out) {
       wire::Fill(latest->state().baseline, *message.mutable_baseline());
       message.set_status_reason(latest->state().status_reason);
       message.mutable_statistics()->set_contacts(static_cast<uint32_t>(latest->state().contacts.size()));
+      FillFrameAge(latest->state(), arm.clock().MonotonicNs(), *message.mutable_statistics());
     }
   }
 }

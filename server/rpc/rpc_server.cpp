@@ -2,11 +2,13 @@
 
 #include <google/protobuf/stubs/logging.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
-#include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
 #include <grpcpp/support/server_interceptor.h>
 
 #include <functional>
+#include <set>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,7 +21,6 @@ namespace {
 // gRPC's plug-ins are global and must be set before the first builder.
 void EnablePlugins() {
   static const bool once = [] {
-    grpc::EnableDefaultHealthCheckService(true);
     // Every malformed request would write a line; the client is told.
     google::protobuf::SetLogHandler(nullptr);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -46,6 +47,14 @@ class CallObserver final : public grpc::experimental::ServerInterceptorFactoryIn
   const std::function<void(const std::string& peer)> on_call_;
 };
 
+std::set<std::string> ServiceNames(bool records) {
+  std::set<std::string> names = {v1::TactileService::service_full_name(),
+                                 v1::OperationsService::service_full_name(),
+                                 v1::SimulationService::service_full_name()};
+  if (records) names.insert(v1::RecordingService::service_full_name());
+  return names;
+}
+
 }  // namespace
 
 RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const Security>& security,
@@ -53,7 +62,8 @@ RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const
     : senders_(std::make_shared<boost::asio::thread_pool>(1)),
       service_(arm, limits, senders_, security),
       operations_(arm, security),
-      simulations_(arm) {
+      simulations_(arm),
+      health_(ServiceNames(recorder != nullptr), service_.registry(), senders_, security) {
   if (recorder != nullptr)
     recordings_ = std::make_unique<RecordingService>(*recorder, service_.registry(), senders_, security);
 }
@@ -82,6 +92,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
   builder.RegisterService(&out->service_);
   builder.RegisterService(&out->operations_);
   builder.RegisterService(&out->simulations_);
+  builder.RegisterService(&out->health_);
   if (recorder != nullptr) builder.RegisterService(out->recordings_.get());
   out->listener_ = std::move(*listener);
   out->server_ = builder.BuildAndStart();
@@ -92,11 +103,6 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
     acceptor->HandleNewConnection(&connection);
   });
   if (!begun) return begun.error();
-  out->server_->GetHealthCheckService()->SetServingStatus(v1::TactileService::service_full_name(), true);
-  out->server_->GetHealthCheckService()->SetServingStatus(v1::OperationsService::service_full_name(), true);
-  out->server_->GetHealthCheckService()->SetServingStatus(v1::SimulationService::service_full_name(), true);
-  if (recorder != nullptr)
-    out->server_->GetHealthCheckService()->SetServingStatus(v1::RecordingService::service_full_name(), true);
   return out;
 }
 
@@ -107,7 +113,7 @@ RpcServer::~RpcServer() {
 void RpcServer::Shutdown(const std::string& reason, std::chrono::milliseconds patience) {
   if (!server_) return;
   listener_->Close();
-  server_->GetHealthCheckService()->SetServingStatus(false);
+  health_.Stop();
   service_.EndStreams(reason);
   // Calls from within the process lose their last words once gRPC shuts down, so they get their time before.
   const auto deadline = std::chrono::system_clock::now() + patience;

@@ -11,6 +11,7 @@
 #include "sensing/core/result.h"
 #include "server/arm/arm.h"
 #include "server/listener/listener.h"
+#include "server/rpc/services/health_service.h"
 #include "server/rpc/services/operations_service.h"
 #include "server/rpc/services/recording_service.h"
 #include "server/rpc/services/simulation_service.h"
@@ -55,6 +56,7 @@ class RpcServer {
   std::unique_ptr<RecordingService> recordings_;                              // null: none
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;  // of the listener's connections
   std::unique_ptr<Listener> listener_;
+  HealthService health_;
   std::unique_ptr<grpc::Server> server_;
 };
 

@@ -4,7 +4,7 @@ namespace taclink::server {
 
 Error Shares::Refusal(const std::string& what, const char* setting) const {
   const std::string raise = setting[0] == '\0' ? "" : std::string(" or raise ") + setting;
-  return {ErrorCode::kResourceExhausted, what + "; close one" + raise};
+  return {ErrorCode::kResourceExhausted, what + "; " + words_.remedy + raise};
 }
 
 Result<void> Shares::Take(const Party& party) {

@@ -24,6 +24,7 @@ struct ShareWords {
   const char* things;
   const char* all_setting;
   const char* party_setting;
+  const char* remedy = "close one";
 };
 
 /// Gives out a limited number of places, so that no party takes all and preferred ones find some free.

@@ -321,7 +321,7 @@ TEST_F(RecordingTest, WhenTheClockIsSetAnotherLogBeginsAndEachKeepsItsTimeLine) 
   Start();
   Publish(0, 1, 5);
   WaitFor([](const auto& status) { return status.frames() == 5; });
-  server_.clock().SetUtc(-kDay);
+  server_.clock().StepUtc(-kDay);
   WaitFor([](const auto& status) { return status.logs() == 2; });
   Publish(0, 6, 8);
   server_.clock().Advance(std::chrono::seconds(2));
@@ -347,7 +347,7 @@ TEST_F(QuotaTest, EachDeletionIsAnEventAndTheNewestStay) {
   Start();
   Publish(0, 1, 5);
   WaitFor([](const auto& status) { return status.frames() == 5; });
-  server_.clock().SetUtc(-std::chrono::hours(24));
+  server_.clock().StepUtc(-std::chrono::hours(24));
   WaitFor([](const auto& status) { return status.logs() == 2; });
   const std::string newest = recordings_.Status()->log();
   server_.clock().Advance(std::chrono::seconds(20));

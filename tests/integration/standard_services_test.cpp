@@ -4,6 +4,11 @@
 #include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
 #include "tests/integration/support.h"
 
 namespace taclink::server {
@@ -54,6 +59,7 @@ Reply Ask(const std::string& address, const std::string& method, const std::stri
 }
 
 constexpr const char* kHealthCheck = "/grpc.health.v1.Health/Check";
+constexpr const char* kHealthWatch = "/grpc.health.v1.Health/Watch";
 constexpr const char* kReflection = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo";
 
 std::string HealthRequest(const std::string& service) {
@@ -70,6 +76,84 @@ TEST(StandardServices, HealthIsServingForEachService) {
   }
   EXPECT_EQ(Ask(server.server().address(), kHealthCheck, HealthRequest("no.Such")).status.error_code(),
             grpc::StatusCode::NOT_FOUND);
+}
+
+// A Watch call that is under way.
+class HealthWatch {
+ public:
+  HealthWatch(const std::shared_ptr<grpc::Channel>& channel, const std::string& service) : stub_(channel) {
+    context_.set_deadline(std::chrono::system_clock::now() + kForever);
+    call_ = stub_.PrepareCall(&context_, kHealthWatch, &queue_);
+    call_->StartCall(nullptr);
+    Await();
+    call_->WriteLast(ToBuffer(HealthRequest(service)), {}, nullptr);
+    Await();
+  }
+  // Empty: the call has ended.
+  std::string Next() {
+    grpc::ByteBuffer response;
+    call_->Read(&response, nullptr);
+    return Await() ? ToText(response) : "";
+  }
+  grpc::Status End() {
+    grpc::Status status;
+    call_->Finish(&status, nullptr);
+    Await();
+    return status;
+  }
+  void Cancel() { context_.TryCancel(); }
+
+ private:
+  bool Await() {
+    void* tag = nullptr;
+    bool ok = false;
+    return queue_.Next(&tag, &ok) && ok;
+  }
+
+  grpc::GenericStub stub_;
+  grpc::ClientContext context_;
+  grpc::CompletionQueue queue_;
+  std::unique_ptr<grpc::GenericClientAsyncReaderWriter> call_;
+};
+
+TEST(StandardServices, HealthIsWatchedUntilTheServerEnds) {
+  TestServer server;
+  const auto channel = grpc::CreateChannel(server.server().address(), grpc::InsecureChannelCredentials());
+  HealthWatch known(channel, "taclink.v1.TactileService"), unknown(channel, "no.Such");
+  EXPECT_EQ(known.Next(), std::string("\x08\x01", 2)) << "SERVING";
+  EXPECT_EQ(unknown.Next(), std::string("\x08\x03", 2)) << "SERVICE_UNKNOWN";
+  std::thread stop([&] { server.Stop(); });
+  EXPECT_EQ(known.Next(), std::string("\x08\x02", 2)) << "NOT_SERVING";
+  EXPECT_EQ(known.Next(), "");
+  EXPECT_EQ(known.End().error_code(), grpc::StatusCode::UNAVAILABLE);
+  unknown.Next();
+  unknown.End();
+  stop.join();
+}
+
+// Health asks for no token, so whoever can connect can open such streams.
+TEST(StandardServices, HealthWatchesCountAsStreams) {
+  ServiceLimits limits = TestLimits();
+  limits.max_streams_per_peer = 2;
+  TestServer server(limits);
+  const auto channel = grpc::CreateChannel(server.server().address(), grpc::InsecureChannelCredentials());
+  HealthWatch first(channel, "");
+  EXPECT_NE(first.Next(), "");
+  HealthWatch second(channel, "");
+  EXPECT_NE(second.Next(), "");
+  EXPECT_EQ(server.server().streams(), 2U);
+  HealthWatch third(channel, "");
+  EXPECT_EQ(third.Next(), "");
+  const grpc::Status refused = third.End();
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(refused.error_message(), HasSubstr("limits.max_streams_per_peer"));
+  auto client = server.Connect();
+  EXPECT_TRUE(client.StreamFrames({}).ok()) << "another connection's";
+  for (HealthWatch* each : {&first, &second}) {
+    each->Cancel();
+    EXPECT_EQ(each->Next(), "");
+    each->End();
+  }
 }
 
 TEST(StandardServices, ReflectionListsTheServices) {

@@ -51,6 +51,30 @@ TEST(Stream, FramesOfTwoLinksReachTwoClientsInOrder) {
   }
 }
 
+TEST(Stream, AClientLeavesOldFramesOut) {
+  TestServer server;
+  auto client = server.Connect();
+  const auto reader = Stream(client, Every());
+  const auto publish = [&](uint64_t sequence, std::chrono::hours age) {
+    auto state = std::make_shared<LinkState>();
+    state->sequence = sequence;
+    state->times.exposure_utc_ns = SystemClock().UtcNs() - std::chrono::nanoseconds(age).count();
+    server.arm().hub().Publish(0, std::move(state));
+  };
+  publish(1, std::chrono::hours(2));
+  EXPECT_EQ(NextOf(*reader).sequence(), 1U) << "of any age";
+  reader->SetMaxAge(std::chrono::hours(1));
+  publish(2, std::chrono::hours(2));
+  publish(3, std::chrono::hours(3));
+  publish(4, std::chrono::hours(0));
+  publish(5, std::chrono::hours(-2));  // the clock of this machine is behind
+  EXPECT_EQ(NextOf(*reader).sequence(), 4U);
+  EXPECT_EQ(NextOf(*reader).sequence(), 5U);
+  EXPECT_EQ(reader->frames_too_old(), 2U);
+  server.arm().hub().Publish(0, MakeState(6));  // without an exposure, as a lost link
+  EXPECT_EQ(NextOf(*reader).sequence(), 6U);
+}
+
 TEST(Stream, GetArmTellsAllThereIsToDrawIt) {
   TestServer server;
   auto client = server.Connect();

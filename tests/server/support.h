@@ -51,10 +51,10 @@ class ManualClock final : public Clock {
     }
     changed_.notify_all();
   }
-  /// UTC is set; monotonic time goes on.
-  void SetUtc(std::chrono::nanoseconds forward) {
+  /// As if somebody set the clock.
+  void StepUtc(std::chrono::nanoseconds by) {
     const std::lock_guard lock(mutex_);
-    utc_offset_ns_ += forward.count();
+    utc_offset_ns_ += by.count();
   }
   /// A sleep returns at once with the time it slept to.
   void LetSleepingPassTime() { sleeping_passes_time_ = true; }

@@ -128,5 +128,5 @@ export function configuration(arm: string, scenes: Record<string, string>, more 
     ([name, scene], i) =>
       `    - {name: ${name}, model: cylinder, source: simulated, scene: ${scene}, pose: {position_mm: [0, 0, ${240 * i}]}}`,
   );
-  return `taclink_config: 1\n${more}arm:\n  name: ${arm}\n  links:\n${links.join("\n")}\n`;
+  return `taclink_config: 1\nlimits: {max_frame_age_s: 3600}\n${more}arm:\n  name: ${arm}\n  links:\n${links.join("\n")}\n`;
 }

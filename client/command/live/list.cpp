@@ -27,14 +27,14 @@ std::string Milliseconds(double seconds) {
 void PrintTable(const v1::Arm& arm) {
   size_t width = 4;
   for (const auto& link : arm.links()) width = std::max(width, link.name().size());
-  fmt::print("{:<{}}  {:<11}  {:>7}  {:>6}  {:>6}  {:>8}  {}\n", "LINK", width, "STATE", "RATE/s", "P50 ms",
-             "P99 ms", "CONTACTS", "REASON");
+  fmt::print("{:<{}}  {:<11}  {:>7}  {:>6}  {:>6}  {:>6}  {:>8}  {}\n", "LINK", width, "STATE", "RATE/s",
+             "P50 ms", "P99 ms", "AGE ms", "CONTACTS", "REASON");
   for (const auto& link : arm.links()) {
     const v1::LinkStatistics& statistics = link.statistics();
-    fmt::print("{:<{}}  {:<11}  {:>7.1f}  {:>6}  {:>6}  {:>8}  {}\n", Printable(link.name()), width,
+    fmt::print("{:<{}}  {:<11}  {:>7.1f}  {:>6}  {:>6}  {:>6}  {:>8}  {}\n", Printable(link.name()), width,
                client::Name(link.status()), statistics.rate_hz(), Milliseconds(statistics.latency_p50_s()),
-               Milliseconds(statistics.latency_p99_s()), statistics.contacts(),
-               link.status_reason().empty() ? "-" : Printable(link.status_reason()));
+               Milliseconds(statistics.latency_p99_s()), Milliseconds(statistics.frame_age_s()),
+               statistics.contacts(), link.status_reason().empty() ? "-" : Printable(link.status_reason()));
   }
 }
 
@@ -96,6 +96,7 @@ Json ListedLinkJson(const v1::Link& link) {
           {"rate_hz", statistics.rate_hz()},
           {"latency_p50_ms", statistics.latency_p50_s() * 1e3},
           {"latency_p99_ms", statistics.latency_p99_s() * 1e3},
+          {"frame_age_ms", statistics.frame_age_s() * 1e3},
           {"contacts", statistics.contacts()},
           {"frames", statistics.frames()},
           {"frames_skipped", statistics.frames_skipped()},

@@ -265,7 +265,7 @@ void LogLinkSolver::SolveForces(const LoadsPair& loads) {
   const SkinEstimate& estimate = estimator_->estimate();
   estimator_->WriteKnownLoads(state_);
   // What the pictures were like, the log knows.
-  std::optional<Reason> trouble;
+  std::optional<Reason> trouble, late;
   if (state_.status != LinkStatus::kOk && state_.reasons.empty())
     trouble = Reason{ReasonId::kCamera, state_.status_reason};
   for (const Reason& reason : state_.reasons) {
@@ -273,6 +273,7 @@ void LogLinkSolver::SolveForces(const LoadsPair& loads) {
                                 reason.id == ReasonId::kCamerasDisagree || reason.id == ReasonId::kLate ||
                                 reason.id == ReasonId::kCamerasMoved;
     if (is_of_pictures && !trouble) trouble = reason;
+    if (reason.id == ReasonId::kLateFrame) late = reason;
   }
   Judge({.model = settings_.model,
          .camera_trouble = trouble,
@@ -287,6 +288,7 @@ void LogLinkSolver::SolveForces(const LoadsPair& loads) {
          .baseline = loads.baseline,
          .estimate = estimate},
         state_);
+  if (late) Degrade(state_, *std::move(late));
 }
 
 std::string LogLinkSolver::Scene(int64_t utc_ns) const {

@@ -29,6 +29,13 @@ class FrameReader {
   FrameReader(const FrameReader&) = delete;
   FrameReader& operator=(const FrameReader&) = delete;
 
+  /// From now on Next leaves frames out whose LatencyS is larger when they arrive, and counts them; 0: any
+  /// age, as at first. It is as right as the clocks of both machines agree: synchronize them much closer than
+  /// `max_age`. Frames of a log have no age.
+  void SetMaxAge(std::chrono::nanoseconds max_age);
+  /// Frames that were left out because of their age.
+  uint64_t frames_too_old() const;
+
   /// Waits for the next frame. Errors: kTimeout (call again), kEndOfData (cancelled), kUnavailable (the
   /// server ended the stream or is gone, with the reason), or the reason for which the server refused the
   /// request.

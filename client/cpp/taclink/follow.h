@@ -31,6 +31,8 @@ struct FollowOptions {
   /// The server refuses for good (kInvalidArgument, kNotFound, kUnauthenticated, kPermissionDenied,
   /// kUnsupported, or files that cannot be read): the subscription has ended.
   std::function<void(const Error&)> on_refused = {};
+  /// Of FollowFrames, as FrameReader::SetMaxAge; 0: any age.
+  std::chrono::nanoseconds max_age{0};
 };
 
 /// Ends with it. Not to be destroyed or moved from by its own callbacks; they may call Stop.

@@ -70,7 +70,7 @@ export class Server {
 
   async start({ arm = STANDING_ARM, security = "", publish = "" } = {}) {
     writeFileSync(this.path("held.yaml"), SCENE);
-    writeFileSync(this.path("arm.yaml"), `taclink_config: 1\n${security}${publish}${arm}`);
+    writeFileSync(this.path("arm.yaml"), `taclink_config: 1\nlimits: {max_frame_age_s: 3600}\n${security}${publish}${arm}`);
     const options = ["--config", "arm.yaml", "--listen", "127.0.0.1:0", "--http-listen", "127.0.0.1:0"];
     const env = { ...process.env, XDG_STATE_HOME: this.path("state") };
     this.process = spawn(TACLINKD, options, { cwd: this.folder, env });

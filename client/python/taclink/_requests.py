@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -28,6 +29,13 @@ def frames(
         deadband_force_n=deadband_force_n,
         deadband_move_m=deadband_move_m,
     )
+
+
+def max_age(max_age_s: float | None) -> float | None:
+    """Of frames(). Errors: InvalidArgument."""
+    if max_age_s is not None and not 0 < max_age_s < math.inf:
+        raise InvalidArgument(f"max_age_s must be a positive number of seconds, or None for any age, not {max_age_s}")
+    return max_age_s
 
 
 def events(

@@ -7,10 +7,10 @@ from typing import Any, Generic, TypeVar
 
 from taclink.messages.contacts import ArmContacts, arm_contacts_from
 from taclink.messages.events import Event, EventPlace, event_from
-from taclink.messages.frame import Frame, StreamCounts, counts_from, frame_from
+from taclink.messages.frame import Frame, StreamCounts, counts_from, frame_from, latency_of
 from taclink.messages.others import Preview, preview_from
 from taclink.messages.recording import ReplayMessage, ReplayStatus, replay_message_from
-from taclink.v1 import tactile_pb2
+from taclink.v1 import frame_pb2, tactile_pb2
 
 T = TypeVar("T")
 
@@ -38,8 +38,10 @@ class StreamState(Generic[T]):
 
 class FrameState(StreamState[Frame]):
     _method = "StreamFrames"
+    _max_age_s: float | None = None
 
     def _begin(self) -> None:
+        self._too_old: dict[str, int] = {}
         self._counts: tuple[StreamCounts, ...] = ()
         self._queue_capacity = 0
         self._last: dict[str, int] = {}
@@ -54,6 +56,11 @@ class FrameState(StreamState[Frame]):
         """Frames that can wait on the server for this client."""
         return self._queue_capacity
 
+    @property
+    def too_old(self) -> dict[str, int]:
+        """By link: frames that were older than max_age_s when they came here, and so were left out."""
+        return dict(self._too_old)
+
     def _take(self, message: tactile_pb2.StreamFramesResponse) -> Frame | None:
         kind = message.WhichOneof("message")
         if kind == "status":
@@ -62,11 +69,19 @@ class FrameState(StreamState[Frame]):
             self._end_reason = message.status.end_reason
         if kind != "frame":
             return None
+        now_utc_ns = time.time_ns()
         frame = message.frame
+        if self._is_too_old(frame, now_utc_ns):
+            self._too_old[frame.link] = self._too_old.get(frame.link, 0) + 1
+            return None
         last = self._last.get(frame.link)
         self._last[frame.link] = frame.sequence
         gap = None if last is None or frame.sequence < last else max(frame.sequence - last - 1, 0)
-        return frame_from(frame, time.time_ns(), gap)
+        return frame_from(frame, now_utc_ns, gap)
+
+    def _is_too_old(self, frame: frame_pb2.LinkFrame, now_utc_ns: int) -> bool:
+        latency_s = latency_of(frame.times.exposure_utc_ns, now_utc_ns, frame.replayed)
+        return self._max_age_s is not None and latency_s is not None and latency_s > self._max_age_s
 
 
 class ContactState(StreamState[ArmContacts]):

@@ -96,6 +96,7 @@ class Client:
         every: bool = False,
         deadband_force_n: float = 0,
         deadband_move_m: float = 0,
+        max_age_s: float | None = None,
         reconnect: bool = False,
         on_reconnect: OnReconnect = None,
     ) -> FrameStream:
@@ -105,6 +106,9 @@ class Client:
         covariances, nodal forces). max_rate_hz: of each link; 0: all. every: all wait in order in a bounded
         queue; else only the newest of each link waits. A link that changes by less than the deadbands (N of a
         contact's force, m of a marker) is sent once a second only (Frame.unchanged); both 0: always.
+        max_age_s: frames whose latency_s is larger when they come here are left out and counted
+        (FrameStream.too_old); None: any age. That is as right as both machines' clocks agree: keep them synchronized
+        much closer than max_age_s (NTP, PTP). Frames of a log have no age.
         reconnect: a broken stream is reopened, with growing pauses, until it is closed; before each try
         on_reconnect(error, attempt, delay_s) is called. The first opening is not retried.
 
@@ -112,7 +116,11 @@ class Client:
         """
         request = _requests.frames(links, detail, max_rate_hz, every, deadband_force_n, deadband_move_m)
         return FrameStream(
-            self._connection, request, self._connection.timeout_s, attempts(reconnect, on_reconnect)
+            self._connection,
+            request,
+            self._connection.timeout_s,
+            attempts(reconnect, on_reconnect),
+            _requests.max_age(max_age_s),
         )
 
     def contacts(

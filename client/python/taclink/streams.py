@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from taclink import _calls, _requests
 from taclink._blocking import Connection, Stream, Writer
+from taclink._reconnect import Attempts
 from taclink._streams import ContactState, EventState, FrameState, PreviewState, ReplayState
 from taclink.messages.contacts import ArmContacts
 from taclink.messages.events import Event
@@ -21,10 +22,22 @@ from taclink.messages.others import (
     pressure_summary_from,
 )
 from taclink.messages.recording import ReplayMessage
+from taclink.v1 import tactile_pb2
 
 
 class FrameStream(FrameState, Stream[Frame]):
     """Of Client.frames()."""
+
+    def __init__(
+        self,
+        connection: Connection,
+        request: tactile_pb2.StreamFramesRequest,
+        timeout_s: float,
+        attempts: Attempts | None = None,
+        max_age_s: float | None = None,
+    ) -> None:
+        self._max_age_s = max_age_s
+        super().__init__(connection, request, timeout_s, attempts)
 
 
 class ContactStream(ContactState, Stream[ArmContacts]):

@@ -16,7 +16,7 @@ from google.protobuf import descriptor_pool
 
 import taclink
 import taclink.aio
-from taclink import _channel, _reconnect, errors, names
+from taclink import _channel, _reconnect, _requests, errors, names
 from taclink._streams import FrameState
 from taclink.messages import arrays, contacts, frame
 from taclink.v1 import contacts_pb2, frame_pb2, geometry_pb2, tactile_pb2
@@ -107,6 +107,39 @@ def test_gaps_count_what_lies_between() -> None:
 
     pairs = [("a", 5), ("b", 7), ("a", 6), ("a", 6), ("a", 10), ("b", 8), ("a", 2), ("a", 3)]
     assert [gap(*pair) for pair in pairs] == [None, None, 0, 0, 3, 0, None, 0]
+
+
+@pytest.mark.parametrize("stream", [taclink.streams.FrameStream, taclink.aio.streams.FrameStream])
+def test_old_frames_are_left_out_and_counted(stream: type[FrameState], monkeypatch: pytest.MonkeyPatch) -> None:
+    now_ns = 1_700_000_000 * 10**9
+    monkeypatch.setattr("time.time_ns", lambda: now_ns)
+    state = stream.__new__(stream)
+    state._begin()
+
+    def sequence(link: str, sequence: int, age_s: float, replayed: bool = False) -> tuple[int, int | None] | None:
+        message = frame_pb2.LinkFrame(link=link, sequence=sequence, replayed=replayed)
+        message.times.exposure_utc_ns = now_ns - round(age_s * 1e9)
+        taken = state._take(tactile_pb2.StreamFramesResponse(frame=message))
+        return None if taken is None else (taken.sequence, taken.gap)
+
+    assert sequence("a", 1, 3600) == (1, None) and state.too_old == {}  # any age
+    state._max_age_s = 0.2
+    assert sequence("a", 2, 0.125) == (2, 0)
+    assert [sequence("a", 3, 0.25), sequence("a", 4, 17), sequence("b", 4, 22)] == [None] * 3
+    assert state.too_old == {"a": 2, "b": 1}
+    assert sequence("a", 5, 0) == (5, 2)
+    assert sequence("a", 6, -5) == (6, 0)  # this machine's clock is behind
+    assert sequence("a", 7, 1e6, replayed=True) == (7, 0)
+    without_times = tactile_pb2.StreamFramesResponse(frame=frame_pb2.LinkFrame(link="a", sequence=8))
+    assert state._take(without_times) is not None
+    assert state.too_old == {"a": 2, "b": 1}
+
+
+@pytest.mark.parametrize("max_age_s", [0, -1, math.nan, math.inf])
+def test_an_age_limit_that_is_none_is_refused(max_age_s: float) -> None:
+    with pytest.raises(taclink.InvalidArgument, match="max_age_s must be a positive number"):
+        _requests.max_age(max_age_s)
+    assert _requests.max_age(None) is None and _requests.max_age(0.1) == 0.1
 
 
 def test_pauses_double_and_differ() -> None:

@@ -80,7 +80,7 @@ class Server
 
   def start(arm: STANDING_ARM, security: '')
     File.write(path('held.yaml'), SCENE)
-    File.write(path('arm.yaml'), "taclink_config: 1\n#{security}#{arm}")
+    File.write(path('arm.yaml'), "taclink_config: 1\nlimits: {max_frame_age_s: 3600}\n#{security}#{arm}")
     @pid = Process.spawn({ 'XDG_STATE_HOME' => path('state') }, TACLINKD, '--config', 'arm.yaml',
                          '--listen', '127.0.0.1:0', '--http-listen', '127.0.0.1:0',
                          chdir: @folder, %i[out err] => path('output'))

@@ -2,7 +2,6 @@
 
 #include <spdlog/spdlog.h>
 
-#include <boost/asio/post.hpp>
 #include <string>
 #include <utility>
 
@@ -41,20 +40,20 @@ RecordingService::RecordingService(Recorder& recorder, StreamRegistry& registry,
     : recorder_(recorder),
       registry_(registry),
       senders_(std::move(senders)),
-      files_(std::make_shared<boost::asio::thread_pool>(1)),
       players_(std::make_shared<boost::asio::thread_pool>(kPlayerThreads)),
       desk_(std::make_shared<ReplayDesk>()),
       security_(std::move(security)) {}
 
-grpc::ServerUnaryReactor* RecordingService::Later(grpc::CallbackServerContext* context, const char* method,
-                                                  std::function<Result<void>()> work) {
+grpc::ServerUnaryReactor* RecordingService::Later(CallQueue& queue, grpc::CallbackServerContext* context,
+                                                  const char* method, std::function<grpc::Status()> work) {
   auto* reactor = context->DefaultReactor();
-  boost::asio::post(*files_, [reactor, method, peer = PeerOf(*context), work = std::move(work)] {
-    const Result<void> done = work();
-    if (!done) SPDLOG_INFO("{}: {} refused: {}", peer, method, done.error().message);
-    reactor->Finish(done ? grpc::Status::OK : ToGrpc(done.error()));
-  });
-  return reactor;
+  const auto answer = [reactor, method, peer = PeerOf(*context), work = std::move(work)] {
+    const grpc::Status done = work();
+    if (!done.ok()) SPDLOG_INFO("{}: {} refused: {}", peer, method, done.error_message());
+    reactor->Finish(done);
+  };
+  const auto posted = queue.Post(PartyOf(*context, *security_), answer);
+  return posted ? reactor : RefuseCall(*context, method, posted.error());
 }
 
 grpc::ServerUnaryReactor* RecordingService::StartRecording(grpc::CallbackServerContext* context,
@@ -62,42 +61,42 @@ grpc::ServerUnaryReactor* RecordingService::StartRecording(grpc::CallbackServerC
                                                            v1::StartRecordingResponse* response) {
   if (const auto good = CheckRequest(*request); !good)
     return RefuseCall(*context, "StartRecording", good.error());
-  const auto work = [this, request, response, who = Who(*context, *security_)]() -> Result<void> {
+  const auto work = [this, request, response, who = Who(*context, *security_)]() -> grpc::Status {
     auto status = recorder_.Start(*request, who);
-    if (!status) return status.error();
+    if (!status) return ToGrpc(status.error());
     *response->mutable_status() = std::move(*status);
-    return {};
+    return grpc::Status::OK;
   };
-  return Later(context, "StartRecording", work);
+  return Later(orders_, context, "StartRecording", work);
 }
 
 grpc::ServerUnaryReactor* RecordingService::StopRecording(grpc::CallbackServerContext* context,
                                                           const v1::StopRecordingRequest*,
                                                           v1::StopRecordingResponse* response) {
-  const auto work = [this, response, who = Who(*context, *security_)]() -> Result<void> {
+  const auto work = [this, response, who = Who(*context, *security_)]() -> grpc::Status {
     auto status = recorder_.Stop(who);
-    if (!status) return status.error();
+    if (!status) return ToGrpc(status.error());
     *response->mutable_status() = std::move(*status);
-    return {};
+    return grpc::Status::OK;
   };
-  return Later(context, "StopRecording", work);
+  return Later(orders_, context, "StopRecording", work);
 }
 
 grpc::ServerUnaryReactor* RecordingService::GetRecorder(grpc::CallbackServerContext* context,
                                                         const v1::GetRecorderRequest*,
                                                         v1::GetRecorderResponse* response) {
-  return Later(context, "GetRecorder", [this, response]() -> Result<void> {
+  return Later(orders_, context, "GetRecorder", [this, response] {
     *response->mutable_status() = recorder_.Status();
-    return {};
+    return grpc::Status::OK;
   });
 }
 
 grpc::ServerUnaryReactor* RecordingService::ListLogs(grpc::CallbackServerContext* context,
                                                      const v1::ListLogsRequest*,
                                                      v1::ListLogsResponse* response) {
-  return Later(context, "ListLogs", [this, response]() -> Result<void> {
+  return Later(reading_, context, "ListLogs", [this, response] {
     for (v1::Log& log : recorder_.catalog().List()) *response->add_logs() = std::move(log);
-    return {};
+    return grpc::Status::OK;
   });
 }
 
@@ -106,11 +105,11 @@ grpc::ServerUnaryReactor* RecordingService::DescribeLog(grpc::CallbackServerCont
                                                         v1::DescribeLogResponse* response) {
   if (const auto good = CheckRequest(*request); !good)
     return RefuseCall(*context, "DescribeLog", good.error());
-  return Later(context, "DescribeLog", [this, request, response]() -> Result<void> {
+  return Later(reading_, context, "DescribeLog", [this, request, response] {
     auto described = recorder_.catalog().Describe(request->log());
-    if (!described) return described.error();
+    if (!described) return ToGrpc(described.error());
     *response = std::move(*described);
-    return {};
+    return grpc::Status::OK;
   });
 }
 
@@ -118,12 +117,13 @@ grpc::ServerUnaryReactor* RecordingService::DeleteLog(grpc::CallbackServerContex
                                                       const v1::DeleteLogRequest* request,
                                                       v1::DeleteLogResponse*) {
   if (const auto good = CheckRequest(*request); !good) return RefuseCall(*context, "DeleteLog", good.error());
-  const auto work = [this, request, who = Who(*context, *security_)]() -> Result<void> {
+  const auto work = [this, request, who = Who(*context, *security_)]() -> grpc::Status {
     const auto deleted = recorder_.folder().Delete(request->log());
-    if (deleted) SPDLOG_INFO("{}: {} deleted", who, request->log());
-    return deleted;
+    if (!deleted) return ToGrpc(deleted.error());
+    SPDLOG_INFO("{}: {} deleted", who, request->log());
+    return grpc::Status::OK;
   };
-  return Later(context, "DeleteLog", work);
+  return Later(orders_, context, "DeleteLog", work);
 }
 
 RecordingService::Stream* RecordingService::DownloadLog(grpc::CallbackServerContext* context,
@@ -140,8 +140,8 @@ RecordingService::Stream* RecordingService::DownloadLog(grpc::CallbackServerCont
         *context, kCall,
         {ErrorCode::kEndOfData, "offset " + std::to_string(request->offset()) + " is past the end of " +
                                     request->log() + ", " + std::to_string((*source)->size())});
-  auto stream =
-      std::make_shared<DownloadStream>(std::move(*source), request->offset(), registry_, senders_, files_);
+  auto stream = std::make_shared<DownloadStream>(std::move(*source), request->offset(), registry_, senders_,
+                                                 reading_.thread());
   if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_)); !admitted)
     return RefuseStream(*context, kCall, admitted.error());
   stream->Begin();
@@ -157,7 +157,7 @@ RecordingService::Stream* RecordingService::Replay(grpc::CallbackServerContext* 
   auto stream = std::make_shared<ReplayStream>(std::move(*order), peer, desk_, registry_, senders_, players_);
   if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_)); !admitted)
     return RefuseStream(*context, kCall, admitted.error());
-  stream->Begin(*files_, [this, log] { return OpenLog(recorder_, log); });
+  stream->Begin(*reading_.thread(), [this, log] { return OpenLog(recorder_, log); });
   return stream.get();  // the registry holds it until gRPC is done
 }
 
@@ -180,24 +180,23 @@ grpc::ServerUnaryReactor* RecordingService::GetReplayPictures(grpc::CallbackServ
                                                               v1::GetReplayPicturesResponse* response) {
   if (const auto good = CheckRequest(*request); !good)
     return RefuseCall(*context, "GetReplayPictures", good.error());
-  auto* reactor = context->DefaultReactor();
-  boost::asio::post(*files_, [this, reactor, request, response] {
+  return Later(reading_, context, "GetReplayPictures", [this, request, response] {
     const auto stream = desk_->Find(request->player());
-    if (!stream) return reactor->Finish(ToGrpc(stream.error()));
+    if (!stream) return ToGrpc(stream.error());
     const auto pictures = FindPictures((*stream)->reader(), request->link(), request->utc_ns());
-    if (!pictures) return reactor->Finish(OfLog(pictures.error()));
+    if (!pictures) return OfLog(pictures.error());
     response->set_sequence(pictures->sequence);
     response->set_exposure_utc_ns(pictures->exposure_utc_ns);
     for (const CameraId id : kBothCameras)
       preview_.Fill(pictures->images[Index(id)], id, *response->add_pictures());
-    reactor->Finish(grpc::Status::OK);
+    return grpc::Status::OK;
   });
-  return reactor;
 }
 
 // A player's timer may be pending, and nobody waits for it any more.
 void RecordingService::Join() {
-  files_->join();
+  orders_.Join();
+  reading_.Join();
   players_->stop();
   players_->join();
 }

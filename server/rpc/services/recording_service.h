@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "server/recording/recorder.h"
+#include "server/rpc/services/call_queue.h"
 #include "server/rpc/streams/preview_message.h"
 #include "server/rpc/streams/replay_desk.h"
 #include "server/rpc/streams/stream_registry.h"
@@ -61,18 +62,20 @@ class RecordingService final
   Unary* GetReplayPictures(grpc::CallbackServerContext* context, const v1::GetReplayPicturesRequest* request,
                            v1::GetReplayPicturesResponse* response) override;
 
-  /// `work` is done by the files' thread; the call ends with what it returns.
-  Unary* Later(grpc::CallbackServerContext* context, const char* method, std::function<Result<void>()> work);
+  /// `work` is done by the queue's thread; the call ends with what it returns.
+  Unary* Later(CallQueue& queue, grpc::CallbackServerContext* context, const char* method,
+               std::function<grpc::Status()> work);
 
   // Constant after construction.
   Recorder& recorder_;
   StreamRegistry& registry_;
   const std::shared_ptr<boost::asio::thread_pool> senders_;
-  const std::shared_ptr<boost::asio::thread_pool> files_;
+  // Two, so that orders to the recorder never wait for logs to be read.
+  CallQueue orders_{"waiting calls to the recorder"}, reading_{"waiting calls that read logs"};
   const std::shared_ptr<boost::asio::thread_pool> players_;
   const std::shared_ptr<ReplayDesk> desk_;
   const std::shared_ptr<const Security> security_;
-  PreviewMaker preview_;  // used by the files' thread
+  PreviewMaker preview_;  // used by the thread of reading_
 };
 
 }  // namespace taclink::server

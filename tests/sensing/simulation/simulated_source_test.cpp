@@ -127,6 +127,30 @@ TEST_F(SimulatedSourceTest, PacedByFramesSkipsNothing) {
   }
 }
 
+// However slow the machine, a scene that is paced by frames is not late by what its images took to make.
+TEST_F(SimulatedSourceTest, PacedByFramesTheTimeOfRenderingIsNoAge) {
+  for (const ScenePace pace : {ScenePace::kFrames, ScenePace::kClock}) {
+    auto source =
+        SimulatedSource::Make(Model("cylinder"), SceneWith("frame_rate_hz: 100\n"), clock_, pace, [this] {
+          clock_.now_ns += 700 * kMs;
+          return Handling();
+        });
+    ASSERT_TRUE(source.ok());
+    ASSERT_TRUE((*source)->Start().ok());
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_TRUE((*source)->Next(frame_, milliseconds(20)).ok());
+      const int64_t age_ns = clock_.now_ns - frame_.times.exposure_monotonic_ns;
+      EXPECT_EQ(frame_.times.exposure_utc_ns - frame_.times.exposure_monotonic_ns, 1'000'000'000'000);
+      if (pace == ScenePace::kFrames) {
+        EXPECT_LT(age_ns, 10 * kMs);
+      } else {
+        EXPECT_GE(age_ns, 700 * kMs);
+        EXPECT_LT(age_ns, 710 * kMs) << "the newest";
+      }
+    }
+  }
+}
+
 TEST_F(SimulatedSourceTest, TimesOutAndComesBack) {
   const auto source = Source("");
   ASSERT_TRUE(source->Start().ok());

@@ -23,7 +23,7 @@ constexpr const char* kEverything = R"(taclink_config: 1
 server: {listen: "127.0.0.1:1"}
 limits: {max_links: 33, max_streams: 3, max_streams_per_peer: 2, max_calls_per_connection: 4, max_message_kb: 65, memory_mb: 257,
   queue_messages: 5, queue_mb: 33, queue_mb_per_peer: 65, keepalive_s: 7, keepalive_timeout_s: 8, handshake_timeout_s: 9,
-  idle_timeout_s: 10}
+  idle_timeout_s: 10, max_frame_age_s: 0.25}
 http: {listen: "", web_root: /web, max_connections: 7, max_connections_per_peer: 5, header_timeout_s: 1.5, idle_timeout_s: 2.5,
   write_timeout_s: 3.5}
 security: {certificate: /s.pem, key: /s.key, client_ca: /c.pem, tokens: /tokens, tokens_on_error: keep, tokens_permissions: any,

@@ -411,6 +411,31 @@ TEST_F(EngineTest, FramesThatWereTooManyAreToldAsLost) {
   EXPECT_EQ(lost, 300u - 256u);
 }
 
+TEST_F(EngineTest, AStepOfTheClockIsToldOnceWithItsSize) {
+  const auto told = [this](EventEngine& engine) {
+    engine.Start();
+    engine.Stop();  // looks once more
+    std::vector<double> steps_s;
+    for (const auto& event : All(engine)) {
+      if (event->kind != EventKind::kClockStepped) continue;
+      EXPECT_FALSE(event->link) << "the whole arm";
+      steps_s.push_back(std::get<Operation>(event->detail).values.at("step_s"));
+    }
+    return steps_s;
+  };
+  const auto engine = Make();
+  clock_.Advance(std::chrono::seconds(3600));
+  EXPECT_THAT(told(*engine), ElementsAre()) << "time passes";
+  clock_.StepUtc(std::chrono::seconds(-60));
+  clock_.Advance(std::chrono::seconds(2));
+  EXPECT_THAT(told(*engine), ElementsAre(-60));
+  clock_.Advance(std::chrono::seconds(2));
+  EXPECT_THAT(told(*engine), ElementsAre(-60));
+  const auto audit = Audit();
+  ASSERT_EQ(audit.size(), 1U);
+  EXPECT_EQ(audit[0].at("what"), "clock_stepped");
+}
+
 TEST_F(EngineTest, ThresholdsAreSetToldAndAudited) {
   const auto engine = Make();
   engine->Start();

@@ -148,19 +148,49 @@ TEST(Gateway, WhoOnlyHoldsConnectionsKeepsNobodyOut) {
   EXPECT_GT(gateway.counts().refused, 0u);
 }
 
+// Begins a call that does not end.
+std::unique_ptr<RawHttp> BusyConnection(const std::string& address, const char* from) {
+  auto connection = std::make_unique<RawHttp>(address, from);
+  connection->Send(
+      "POST /taclink.v1.TactileService/StreamFrames HTTP/1.1\r\nHost: localhost\r\n"
+      "Content-Type: application/grpc-web+proto\r\nContent-Length: 5\r\n\r\n" +
+      std::string(5, '\0'));
+  return connection;
+}
+
 TEST(Gateway, OneAddressKeepsNobodyElseOut) {
   TestGateway gateway({.max_connections = 4, .max_connections_per_peer = 2});
   std::vector<std::unique_ptr<RawHttp>> held;
   for (int i = 0; i < 4; ++i) {
-    held.push_back(std::make_unique<RawHttp>(gateway.address(), "127.0.0.2"));
-    held.back()->Send(
-        "POST /taclink.v1.TactileService/StreamFrames HTTP/1.1\r\nHost: localhost\r\n"
-        "Content-Type: application/grpc-web+proto\r\nContent-Length: 5\r\n\r\n" +
-        std::string(5, '\0'));
-    EXPECT_EQ(held.back()->ReadHead().status, i < 2 ? 200 : 0) << i;
+    held.push_back(BusyConnection(gateway.address(), "127.0.0.2"));
+    EXPECT_EQ(held.back()->ReadHead().status, i < 2 ? 200 : 429) << i;
   }
   EXPECT_EQ(gateway.counts().refused, 2u);
   EXPECT_EQ(Get(gateway.address(), "/healthz").status, 200);
+}
+
+// What watches the server has the address of the programs that take all connections.
+TEST(Gateway, BusyConnectionsOfThisMachineLeaveRoomForProbes) {
+  for (const GatewayOptions& options :
+       {GatewayOptions{.max_connections_per_peer = 2},
+        GatewayOptions{.max_connections = 2, .max_connections_per_peer = 32}}) {
+    TestGateway gateway(options);
+    gateway.server().Publish(0, 1);
+    std::vector<std::unique_ptr<RawHttp>> held;
+    for (int i = 0; i < 2; ++i) {
+      held.push_back(BusyConnection(gateway.address(), "127.0.0.1"));
+      EXPECT_EQ(held.back()->ReadHead().status, 200);
+    }
+    // Those who connect and say nothing do not keep probes out either.
+    for (int i = 0; i < 20; ++i) held.push_back(std::make_unique<RawHttp>(gateway.address()));
+    for (int i = 0; i < 20; ++i) {
+      EXPECT_EQ(Get(gateway.address(), "/healthz").status, 200);
+      EXPECT_EQ(Get(gateway.address(), "/readyz").status, 200);
+    }
+    const RawResponse refused = Get(gateway.address(), "/");
+    EXPECT_EQ(refused.status, 429);
+    EXPECT_THAT(refused.body, HasSubstr("all 2 connections"));
+  }
 }
 
 TEST(Gateway, AHalfClosedConnectionIsStillAnswered) {

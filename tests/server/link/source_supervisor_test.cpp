@@ -40,6 +40,7 @@ TEST_F(SupervisorTest, StartsAndDelivers) {
   script_->Push(5);
   EXPECT_TRUE(Step());
   EXPECT_EQ(frame_.sequence, 5u);
+  EXPECT_EQ(frame_.period_ns, 1'000'000'000 / 30) << "for those who judge its age";
   const auto condition = supervisor_.condition();
   EXPECT_EQ(condition.state, State::kRunning);
   EXPECT_EQ(condition.reason, "");

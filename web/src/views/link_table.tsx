@@ -2,7 +2,7 @@ import { useSignal } from "@preact/signals";
 import { PressureOrigin } from "../api/gen/taclink/v1/pressure_pb";
 import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
 import { ForceLevel } from "../api/gen/taclink/v1/events_pb";
-import { LinkStatus } from "../api/gen/taclink/v1/frame_pb";
+import { LinkStatus, Reason } from "../api/gen/taclink/v1/frame_pb";
 import type { Baseline } from "../api/gen/taclink/v1/tare_pb";
 import { selectedLink, useApp } from "../app_state";
 import { totalMagnitudeN } from "../model/magnitude";
@@ -82,6 +82,7 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
   const record = app.store.value.link(link.name);
   const frame = record.newest;
   const others = (frame?.statusReasons ?? []).map((each) => each.text).filter((text) => text !== reason);
+  const late = frame?.statusReasons.find((each) => each.reason === Reason.LATE_FRAME);
   // Those are of now.
   const statistics = app.store.value.lookedAtS.value === undefined ? link.statistics : undefined;
   const grid = link.model?.markers;
@@ -121,6 +122,11 @@ function Row(props: { link: Link; status: LinkStatus; reason: string; level: num
       <td class="numbers">{statistics?.rateHz ? `${fixed(statistics.rateHz, 1)}/s` : "–"}</td>
       <td class="numbers">
         {milliseconds(statistics?.latencyP50S)} / {milliseconds(statistics?.latencyP99S)}
+        {late?.value !== undefined && (
+          <div class="bad" title={late.text}>
+            frame {duration(late.value)} old
+          </div>
+        )}
       </td>
       <td class="numbers">
         {frame ? frame.markersSeen : "–"}/{grid ? grid.paths * grid.rings : "–"}

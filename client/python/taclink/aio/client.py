@@ -87,12 +87,17 @@ class Client:
         every: bool = False,
         deadband_force_n: float = 0,
         deadband_move_m: float = 0,
+        max_age_s: float | None = None,
         reconnect: bool = False,
         on_reconnect: OnReconnect = None,
     ) -> FrameStream:
         request = _requests.frames(links, detail, max_rate_hz, every, deadband_force_n, deadband_move_m)
         return FrameStream(
-            self._connection, request, self._connection.timeout_s, attempts(reconnect, on_reconnect)
+            self._connection,
+            request,
+            self._connection.timeout_s,
+            attempts(reconnect, on_reconnect),
+            _requests.max_age(max_age_s),
         )
 
     def contacts(

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import taclink.streams
 from taclink import _calls, _requests
+from taclink._reconnect import Attempts
 from taclink._streams import ContactState, EventState, FrameState, PreviewState, ReplayState
 from taclink.aio._descriptions import described_by
 from taclink.aio._waiting import Connection, Stream, Writer
@@ -23,10 +24,22 @@ from taclink.messages.others import (
     pressure_summary_from,
 )
 from taclink.messages.recording import ReplayMessage
+from taclink.v1 import tactile_pb2
 
 
 class FrameStream(FrameState, Stream[Frame]):
     """Of Client.frames()."""
+
+    def __init__(
+        self,
+        connection: Connection,
+        request: tactile_pb2.StreamFramesRequest,
+        timeout_s: float,
+        attempts: Attempts | None = None,
+        max_age_s: float | None = None,
+    ) -> None:
+        self._max_age_s = max_age_s
+        super().__init__(connection, request, timeout_s, attempts)
 
 
 class ContactStream(ContactState, Stream[ArmContacts]):

@@ -94,6 +94,7 @@ class LinkStatistics:
     rate_hz: float  # frames solved, over the last 2 s
     latency_p50_s: float  # exposure to hand-over, last 300 frames; 0: none yet
     latency_p99_s: float
+    frame_age_s: float  # of the newest frame, when the server answered; 0: there is none
     frames: int
     frames_skipped: int  # exposed but not solved
     pairs_skipped: int  # of these, because a newer pair had come

@@ -240,9 +240,7 @@ class Frame:
     @property
     def latency_s(self) -> float | None:
         """From exposure to this client; right as far as both machines' clocks agree. None: not known."""
-        if self.times.exposure_utc_ns == 0 or self.times.client_utc_ns == 0 or self.replayed:
-            return None
-        return (self.times.client_utc_ns - self.times.exposure_utc_ns) * 1e-9
+        return latency_of(self.times.exposure_utc_ns, self.times.client_utc_ns, self.replayed)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -254,6 +252,12 @@ class StreamCounts:
     frames_dropped: int  # because this client was too slow
     frames_dropped_for_bytes: int  # of these, because of the bytes that waited, not their number
     frames_unchanged: int  # left out because of the deadband
+
+
+def latency_of(exposure_utc_ns: int, client_utc_ns: int, replayed: bool) -> float | None:
+    if exposure_utc_ns == 0 or client_utc_ns == 0 or replayed:
+        return None
+    return (client_utc_ns - exposure_utc_ns) * 1e-9
 
 
 def times_from(message: frame_pb2.FrameTimes, client_utc_ns: int) -> FrameTimes:
