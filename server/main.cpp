@@ -15,6 +15,7 @@
 
 #include "sensing/core/file_modes.h"
 #include "sensing/core/printable.h"
+#include "sensing/core/thread_start.h"
 #include "server/assembly/arm_builder.h"
 #include "server/assembly/config_check.h"
 #include "server/assembly/log_preamble.h"
@@ -209,8 +210,10 @@ Result<void> Run(const Options& options, const Config& config) {
   if (*publisher) (*publisher)->Close(config.shutdown.limit);
   recorder.Close();
   SPDLOG_INFO("stopped");
-  for (size_t link = 0; link < config.links.size(); ++link) {
-    if (!arm.worker(link).LeavesThreads()) continue;
+  bool leaves_threads = DetachedThreads() > 0;  // such as one whose camera does not open
+  for (size_t link = 0; link < config.links.size(); ++link)
+    leaves_threads = leaves_threads || arm.worker(link).LeavesThreads();
+  if (leaves_threads) {
     spdlog::default_logger()->flush();
     std::_Exit(0);  // such a thread may yet use what exit() destroys
   }

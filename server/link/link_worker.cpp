@@ -61,6 +61,13 @@ void LinkWorker::RunThread(const char* kind, void (LinkWorker::*loop)(const std:
   } catch (...) {
     Died("an exception of unknown type");
   }
+  // Closing a camera and waiting for a tangent may take long. Each thread does it for its own part and counts
+  // as running meanwhile: the watchdog, which joins it, does not wait.
+  if (loop == &LinkWorker::Capture) {
+    supervisor_.Close();
+  } else {
+    processor_.reset();
+  }
   const std::lock_guard lock(end_mutex_);
   --running_;
   ended_.notify_all();

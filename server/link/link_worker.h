@@ -51,8 +51,9 @@ struct LinkWorkerOptions {
   SupervisorOptions supervisor = {};
 };
 
-/// Runs one link: a capture thread (source -> mailbox) and a FEM thread (mailbox -> processor -> outlet).
-/// Where a shared_ptr holds it, its threads hold it too, so that they can be given up while they hang.
+/// Runs one link: a capture thread (source -> mailbox) and a FEM thread (mailbox -> processor -> outlet),
+/// which destroy the source and the processor as they end. Where a shared_ptr holds it, its threads hold it
+/// too, so that they can be given up while they hang.
 class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
  public:
   LinkWorker(std::string name, std::unique_ptr<FrameSource> source, std::unique_ptr<LinkProcessor> processor,
@@ -141,7 +142,7 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   bool calibration_closed_ = false;
 
   // Used by the FEM thread only.
-  const std::unique_ptr<LinkProcessor> processor_;
+  std::unique_ptr<LinkProcessor> processor_;
   std::optional<CalibrationJob> job_;
   int64_t job_frame_ns_ = 0;       // of its last frame
   int failing_ = 0;                // frames in a row that could not be processed

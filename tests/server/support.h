@@ -79,6 +79,13 @@ class SourceScript {
     changed_.notify_all();
   }
   using CameraOrders = std::vector<std::pair<CameraId, CameraSettings>>;
+  /// Called by each source as it is destroyed.
+  void OnClose(std::function<void()> hook) {
+    const std::lock_guard lock(mutex_);
+    on_close_ = std::move(hook);
+  }
+  /// Sources that are not destroyed.
+  std::atomic<int> living = 0;
   /// By Remember, of all sources.
   CameraOrders remembered() const {
     const std::lock_guard lock(mutex_);
@@ -146,13 +153,27 @@ class SourceScript {
   bool waiting_ = false;
   int starts_ = 0;
   CameraOrders remembered_;
+  std::function<void()> on_close_;
   int failing_starts_ = 0;  // < 0: all
   ErrorCode start_error_ = ErrorCode::kUnavailable;
 };
 
 class FakeSource final : public FrameSource {
  public:
-  explicit FakeSource(std::shared_ptr<SourceScript> script) : script_(std::move(script)) {}
+  explicit FakeSource(std::shared_ptr<SourceScript> script) : script_(std::move(script)) {
+    ++script_->living;
+  }
+  ~FakeSource() override {
+    std::function<void()> hook;
+    {
+      const std::lock_guard lock(script_->mutex_);
+      hook = script_->on_close_;
+    }
+    if (hook) hook();
+    --script_->living;
+  }
+  FakeSource(const FakeSource&) = delete;
+  FakeSource& operator=(const FakeSource&) = delete;
   Result<void> Start() override { return script_->Start(); }
   Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override {
     return script_->Next(frame, timeout);

@@ -34,7 +34,8 @@ class LinkSupervisorTest : public ::testing::Test {
  protected:
   void TearDown() override {
     link_.reset();
-    Until([this] { return *living_ == 0; });  // also threads that were given up use what is here
+    // Also threads that were given up use what is here.
+    Until([this] { return *living_ == 0 && script_->living == 0; });
   }
 
   // The clock is faster than threads that are about to end: only who wants it sees them given up.
@@ -380,6 +381,46 @@ TEST_F(LinkSupervisorTest, RestartReplacesAWorkerThatRuns) {
   link_->Wake();
   Pass(seconds(1));
   EXPECT_EQ(link_->supervision().restarts, 1u) << "it did not rest";
+}
+
+// The watchdog goes on while the source of the worker that it replaces does not end: Check returns.
+TEST_F(LinkSupervisorTest, ASourceThatHangsWhileItIsClosedHoldsOnlyItsOwnLinkUp) {
+  Gate gate;
+  Run(Measure);
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);
+  script_->OnClose([&gate] { gate.Pass(); });
+  link_->Restart();
+  link_->Check();
+  gate.WaitForArrival();
+  Pass(seconds(5));
+  EXPECT_EQ(link_->supervision().state, State::kRestarting);
+  EXPECT_EQ(made_, 0) << "a camera is closed before it is opened again";
+  script_->OnClose({});
+  gate.Open();
+  UntilRestarted(1);
+  script_->Push(2);
+  EXPECT_EQ(NextFrame()->state().sequence, 2u);
+  EXPECT_EQ(link_->supervision().abandoned, 0u);
+}
+
+TEST_F(LinkSupervisorTest, ASourceThatNeverClosesIsGivenUp) {
+  Gate gate;
+  Run(Measure, {});
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);
+  script_->OnClose([&gate] { gate.Pass(); });
+  link_->Restart();
+  link_->Check();
+  gate.WaitForArrival();
+  script_->OnClose({});
+  Pass(seconds(31));
+  UntilRestarted(1);
+  EXPECT_EQ(link_->supervision().abandoned, 1u);
+  script_->Push(2);
+  EXPECT_EQ(NextFrame()->state().sequence, 2u);
+  gate.Open();
+  Until([this] { return script_->living == 1; });
 }
 
 TEST_F(LinkSupervisorTest, WhatCamerasWereSetToOutlivesTheirWorker) {
