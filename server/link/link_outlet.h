@@ -19,9 +19,11 @@ namespace taclink::server {
 /// Clears all of `state` and sets its status and the reason; its buffers stay.
 void ResetTo(LinkState& state, LinkStatus status, std::string reason, std::optional<ReasonId> id = {});
 
-/// Where a link's states leave. It outlasts the workers that the link has one after the other: only the
-/// newest may publish, so that one that was given up can do no harm when it comes back. Also the hub may go
-/// before it.
+/// Where a link's states leave, and who may still act for the link: what a worker does outside its own memory
+/// (files, cameras) goes by IsCurrent; what follows from its answers (events, memory of the cameras'
+/// settings) ends with LinkWorker::Abandon, which answers in its place. It outlasts the workers that the link
+/// has one after the other: only the newest may publish, so that one that was given up can do no harm when it
+/// comes back. Also the hub may go before it.
 class LinkOutlet {
  public:
   LinkOutlet(size_t link, Hub& hub, Clock& clock) : link_(link), clock_(clock), hub_(&hub) {}

@@ -318,6 +318,90 @@ TEST_F(LinkSupervisorTest, AHungThreadIsGivenUpAndItsLateReturnIsIgnored) {
   EXPECT_EQ(NextFrame()->state().sequence, 3u) << "and not 1";
 }
 
+// The rest frame hangs; when it returns, the calibration is complete and would be saved.
+TEST_F(LinkSupervisorTest, ACalibrationOfAWorkerThatWasGivenUpWritesNoFileAndSaysNothingMore) {
+  Gate gate;
+  Run(
+      [&](const StereoFrame& frame, LinkState& state) {
+        if (frame.sequence == 2) gate.Pass();
+        Measure(frame, state);
+      },
+      {});
+  const int saves_before = FakeProcessor::saves;
+  std::atomic<int> calls = 0;
+  std::atomic<bool> failed = false;
+  const auto observer = [&](const CalibrationProgress& progress) {
+    if (progress.end) failed = !progress.end->ok();
+    ++calls;
+    return true;
+  };
+  ASSERT_TRUE(link_->Calibrate({.pairs = 2, .save = true}, observer).ok());
+  script_->Push(1);
+  Until([&] { return calls == 1; });
+  script_->Push(2);
+  gate.WaitForArrival();
+  hung_ = Hung::kFem;
+  Pass(seconds(31));
+  hung_ = Hung::kNone;
+  EXPECT_EQ(calls, 2);
+  EXPECT_TRUE(failed);
+  UntilRestarted(1);
+  gate.Open();
+  Until([this] { return *living_ == 1; });  // it came back and ended
+  EXPECT_EQ(FakeProcessor::saves, saves_before);
+  EXPECT_EQ(calls, 2);
+}
+
+TEST_F(LinkSupervisorTest, ACalibrationWithSavesOneFile) {
+  Run(Measure);
+  const int saves_before = FakeProcessor::saves;
+  std::atomic<bool> ended = false;
+  ASSERT_TRUE(link_
+                  ->Calibrate({.pairs = 1, .save = true},
+                              [&](const CalibrationProgress& progress) {
+                                ended = progress.end && progress.end->ok();
+                                return true;
+                              })
+                  .ok());
+  script_->Push(1);
+  Until([&] { return ended.load(); });
+  EXPECT_EQ(FakeProcessor::saves, saves_before + 1);
+}
+
+// The first camera hangs while it is set; when it returns, the second one is the next worker's.
+TEST_F(LinkSupervisorTest, AWorkerThatWasGivenUpSetsNoOtherCameraAndNothingIsRemembered) {
+  Gate gate;
+  Run(Measure, {});
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);
+  std::atomic<int> set_top = 0, set_bottom = 0, refused = 0;
+  script_->OnSetCamera([&](CameraId id) {
+    ++(id == CameraId::kTop ? set_top : set_bottom);
+    gate.Pass();
+  });
+  ASSERT_TRUE(link_
+                  ->SetCamera({.cameras = {true, true}, .settings = {.gain = 5}},
+                              [&](const Result<void>& done) { refused += done ? 100 : 1; })
+                  .ok());
+  gate.WaitForArrival();
+  hung_ = Hung::kCapture;
+  Pass(seconds(31));
+  hung_ = Hung::kNone;
+  EXPECT_EQ(refused, 1);
+  UntilRestarted(1);
+  gate.Open();
+  Until([this] { return script_->living == 1 && *living_ == 1; });
+  EXPECT_EQ(set_top, 1);
+  EXPECT_EQ(set_bottom, 0);
+  EXPECT_EQ(refused, 1);
+  script_->OnSetCamera({});
+  link_->Restart();
+  UntilRestarted(2);
+  const auto remembered = script_->remembered();
+  EXPECT_EQ(remembered.size(), 4u);
+  for (const auto& [camera, settings] : remembered) EXPECT_EQ(settings.gain, std::nullopt);
+}
+
 TEST_F(LinkSupervisorTest, StoppingDoesNotWaitForAHungThread) {
   Gate gate;
   Run([&](const StereoFrame& frame, LinkState& state) {
