@@ -10,6 +10,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -290,7 +291,11 @@ int Main(int argc, char** argv) {
   }
   if (options.check_config) return Check(options, *config);
   if (const auto log = SetUpLog(config->log); !log) return Complain(log.error().message, kFailed);
-  spdlog::flush_every(kLogFlush);  // also tells what the rate limit swallowed
+  try {
+    spdlog::flush_every(kLogFlush);  // also tells what the rate limit swallowed
+  } catch (const std::system_error& e) {
+    return Complain(NoThread("flushing the log", e.code().message()).message, kFailed);
+  }
   const auto exposure = CheckExposure(*config, options.insecure_open);
   if (!exposure) return Complain(exposure.error().message, kFailed);
   for (const std::string& warning : *exposure) SPDLOG_WARN("{}", warning);

@@ -127,6 +127,17 @@ foreach(file IN LISTS sources)
   endif()
 endforeach()
 
+# std::thread throws where the system has none to give, and the future of std::async waits in its destructor.
+foreach(file IN LISTS sources)
+  if(NOT file MATCHES "^(sensing|wire|mcap|server|client)/" OR file STREQUAL "sensing/core/thread_start.h")
+    continue()
+  endif()
+  file(STRINGS "${ROOT}/${file}" starts REGEX "std::j?thread ?[({]|std::async")
+  if(starts)
+    string(APPEND violations "${file} starts a thread otherwise than by sensing/core/thread_start.h\n")
+  endif()
+endforeach()
+
 if(violations)
   message(FATAL_ERROR "Includes against the direction of data (tests/include_directions.cmake):\n${violations}")
 endif()

@@ -6,8 +6,9 @@
 #include <exception>
 #include <stdexcept>
 #include <string_view>
-#include <system_error>
 #include <utility>
+
+#include "sensing/core/thread_start.h"
 
 namespace taclink::server {
 namespace {
@@ -43,22 +44,19 @@ std::jthread LinkWorker::StartThread(const char* kind, void (LinkWorker::*loop)(
     const std::lock_guard lock(end_mutex_);
     ++running_;
   }
-  try {
-    return std::jthread([this, kind, loop, self = weak_from_this().lock()](const std::stop_token& stop) {
-      RunThread(kind, loop, stop);
-    });
-  } catch (const std::system_error& e) {
-    Died(std::string("no thread for it: ") + e.what());
-    const std::lock_guard lock(end_mutex_);
-    --running_;
-    return {};
-  }
+  auto thread = taclink::StartThread(
+      std::string(kind) + ":" + name_,
+      [this, loop, self = weak_from_this().lock()](const std::stop_token& stop) { RunThread(loop, stop); });
+  if (thread) return *std::move(thread);
+  Died(thread.error().message);
+  const std::lock_guard lock(end_mutex_);
+  --running_;
+  return {};
 }
 
 // The root of both threads: what leaves a loop ends here and is the watchdog's to deal with.
-void LinkWorker::RunThread(const char* kind, void (LinkWorker::*loop)(const std::stop_token&),
-                           const std::stop_token& stop) {
-  SetUpThread(std::string(kind) + ":" + name_, options_.realtime);
+void LinkWorker::RunThread(void (LinkWorker::*loop)(const std::stop_token&), const std::stop_token& stop) {
+  SetUpThread(options_.realtime);
   try {
     (this->*loop)(stop);
   } catch (const std::exception& e) {

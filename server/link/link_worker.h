@@ -95,8 +95,7 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
 
  private:
   std::jthread StartThread(const char* kind, void (LinkWorker::*loop)(const std::stop_token&));
-  void RunThread(const char* kind, void (LinkWorker::*loop)(const std::stop_token&),
-                 const std::stop_token& stop);
+  void RunThread(void (LinkWorker::*loop)(const std::stop_token&), const std::stop_token& stop);
   void Died(const std::string& reason);
   bool IsCurrent() const { return outlet_->IsCurrent(life_); }  // false: it was given up or replaced
   void EndCalibrationFromOutside(const Error& error);

@@ -7,8 +7,8 @@
 #include <exception>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "sensing/core/units.h"
-#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 namespace {
@@ -37,8 +37,7 @@ PressureSensor::~PressureSensor() {
 
 void PressureSensor::Start() {
   if (!reader_) return;
-  thread_ = std::jthread([this](const std::stop_token& stop) {
-    SetUpThread("prs:" + name_, {});
+  thread_ = MustStartThread("prs:" + name_, [this](const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       try {
         Step(kPoll);

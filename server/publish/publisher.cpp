@@ -5,8 +5,8 @@
 #include <condition_variable>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "server/messages/event_message.h"
-#include "server/process/thread_setup.h"
 #include "wire/frame_codec.h"
 
 namespace taclink::server {
@@ -87,7 +87,10 @@ Result<std::unique_ptr<Publisher>> Publisher::Start(Arm& arm, const PublishConfi
   if (!connection) return connection.error();
   out->connection_ = std::move(*connection);
   out->Subscribe();
-  out->thread_ = std::jthread([self = out.get()](const std::stop_token& stop) { self->Run(stop); });
+  auto thread =
+      StartThread("publisher", [self = out.get()](const std::stop_token& stop) { self->Run(stop); });
+  if (!thread) return thread.error();
+  out->thread_ = *std::move(thread);
   return out;
 }
 
@@ -138,7 +141,6 @@ void Publisher::Close(std::chrono::milliseconds limit) {
 }
 
 void Publisher::Run(const std::stop_token& stop) {
-  SetUpThread("publisher", {});
   while (!stop.stop_requested()) {
     post_->Wait();
     try {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/process/thread_setup.h"
+#include "sensing/core/thread_start.h"
 #include "taclink/v1/log.pb.h"
 
 namespace taclink::server {
@@ -21,13 +21,12 @@ constexpr int64_t kPollNs = 50'000'000;
 JointReplay::JointReplay(std::unique_ptr<ReplayTrack> track, ArmPoses& poses, Clock& clock)
     : track_(std::move(track)), poses_(poses), clock_(clock) {
   for (const JointInfo& joint : poses.joints().joints()) joints_.emplace(joint.name, joints_.size());
-  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+  thread_ = MustStartThread("joint-replay", [this](const std::stop_token& stop) { Run(stop); });
 }
 
 JointReplay::~JointReplay() = default;
 
 void JointReplay::Run(const std::stop_token& stop) {
-  SetUpThread("joint-replay", {});
   try {
     while (true) {
       const auto item = track_->Next();

@@ -5,9 +5,11 @@
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
 
+#include <boost/system/system_error.hpp>
 #include <string_view>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "server/process/unix_socket.h"
 #include "server/rpc/credentials.h"
 
@@ -59,7 +61,12 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
   if (const auto free = CheckSocketIsFree(listen); !free) return free.error();
   EnablePlugins();
   if (!security) security = std::make_shared<const Security>();
-  std::unique_ptr<RpcServer> out(new RpcServer(arm, limits, security, recorder));
+  std::unique_ptr<RpcServer> out;
+  try {
+    out.reset(new RpcServer(arm, limits, security, recorder));
+  } catch (const boost::system::system_error& e) {  // of a pool
+    return NoThread("the pools of gRPC's calls", e.code().message());
+  }
   int port = 0;
   grpc::ServerBuilder builder;
   Apply(limits, builder);

@@ -3,6 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include <boost/asio/post.hpp>
+#include <exception>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -33,6 +35,15 @@ OpenedLog OpenLog(Recorder& recorder, const std::string& name) {
   return {.reader = nullptr, .status = OfLog(reader.error())};
 }
 
+// What work throws ends its call, not the pool's thread and the server with it.
+Result<void> Guarded(const std::function<Result<void>()>& work) {
+  try {
+    return work();
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInternal, e.what()};
+  }
+}
+
 }  // namespace
 
 RecordingService::RecordingService(Recorder& recorder, StreamRegistry& registry,
@@ -50,7 +61,7 @@ grpc::ServerUnaryReactor* RecordingService::Later(grpc::CallbackServerContext* c
                                                   std::function<Result<void>()> work) {
   auto* reactor = context->DefaultReactor();
   boost::asio::post(*files_, [reactor, method, peer = PeerOf(*context), work = std::move(work)] {
-    const Result<void> done = work();
+    const Result<void> done = Guarded(work);
     if (!done) SPDLOG_INFO("{}: {} refused: {}", peer, method, done.error().message);
     reactor->Finish(done ? grpc::Status::OK : ToGrpc(done.error()));
   });

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "sensing/core/thread_start.h"
 #include "server/link/watchdog.h"
 #include "tests/server/gate.h"
 #include "tests/server/support.h"
@@ -15,6 +16,7 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using State = Supervision::State;
 
@@ -505,6 +507,48 @@ TEST_F(LinkSupervisorTest, ASourceThatNeverClosesIsGivenUp) {
   EXPECT_EQ(NextFrame()->state().sequence, 2u);
   gate.Open();
   Until([this] { return script_->living == 1; });
+}
+
+TEST_F(LinkSupervisorTest, ARestartForWhichThereIsNoThreadIsTriedAgain) {
+  Run([](const StereoFrame& frame, LinkState& state) {
+    if (frame.sequence == 1) throw 42;
+    Measure(frame, state);
+  });
+  {
+    const ThreadShortage shortage("build:arm");
+    script_->Push(1);
+    Until([&] {
+      Pass(kStep);
+      return link_->supervision().last_failure.find("no thread") != std::string::npos;
+    });
+    EXPECT_EQ(shortage.refused(), 1);
+    EXPECT_THAT(link_->supervision().reason,
+                AllOf(HasSubstr("no thread can be started for build:arm"), HasSubstr("TasksMax")));
+    EXPECT_EQ(made_, 0);
+  }
+  UntilRestarted(1);
+  script_->Push(2);
+  EXPECT_EQ(NextFrame()->state().sequence, 2u);
+  Until([] { return DetachedThreads() == 0; });
+}
+
+TEST_F(LinkSupervisorTest, AWorkerThatGetsNoThreadIsReplaced) {
+  Run(Measure);
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);
+  {
+    const ThreadShortage shortage("cap:arm");
+    link_->Restart();
+    Until([&] {
+      Pass(kStep);
+      return link_->supervision().last_failure.find("no thread") != std::string::npos;
+    });
+    EXPECT_EQ(shortage.refused(), 1);
+  }
+  UntilRestarted(2);
+  script_->Push(2);
+  EXPECT_EQ(NextFrame()->state().sequence, 2u);
+  Until([this] { return *living_ == 1 && script_->living == 1; });
 }
 
 TEST_F(LinkSupervisorTest, WhatCamerasWereSetToOutlivesTheirWorker) {
