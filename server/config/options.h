@@ -30,7 +30,8 @@ struct LimitsConfig {
   void Describe(FieldVisitor& visit) {
     constexpr Range kCount{1, 10000}, kMegabytes{1, 65536}, kDay{1, 86400};
     visit("max_links", max_links, kCount, "Links of the arm; each takes some 100 MB.");
-    visit("max_streams", max_streams, kCount, "Streams of all clients; a quarter is for operators.");
+    visit("max_streams", max_streams, kCount,
+          "Streams; a quarter is for callers on this machine or with a token or certificate.");
     visit("max_streams_per_peer", max_streams_per_peer, kCount, "Streams of one caller or address.");
     visit("max_calls_per_connection", max_calls_per_connection, kCount, "Concurrent calls.");
     visit("max_message_kb", max_message_kb, {1, 65536}, "Size of a request.");
