@@ -10,11 +10,13 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
 #include "sensing/core/file_modes.h"
 #include "sensing/core/printable.h"
+#include "sensing/core/thread_start.h"
 #include "server/assembly/arm_builder.h"
 #include "server/assembly/config_check.h"
 #include "server/assembly/log_preamble.h"
@@ -214,8 +216,10 @@ Result<void> Run(const Options& options, const Config& config) {
   if (*publisher) (*publisher)->Close(config.shutdown.limit);
   recorder.Close();
   SPDLOG_INFO("stopped");
-  for (size_t link = 0; link < config.links.size(); ++link) {
-    if (!arm.worker(link).LeavesThreads()) continue;
+  bool leaves_threads = DetachedThreads() > 0;  // such as one whose camera does not open
+  for (size_t link = 0; link < config.links.size(); ++link)
+    leaves_threads = leaves_threads || arm.worker(link).LeavesThreads();
+  if (leaves_threads) {
     spdlog::default_logger()->flush();
     std::_Exit(0);  // such a thread may yet use what exit() destroys
   }
@@ -292,7 +296,11 @@ int Main(int argc, char** argv) {
   }
   if (options.check_config) return Check(options, *config);
   if (const auto log = SetUpLog(config->log); !log) return Complain(log.error().message, kFailed);
-  spdlog::flush_every(kLogFlush);  // also tells what the rate limit swallowed
+  try {
+    spdlog::flush_every(kLogFlush);  // also tells what the rate limit swallowed
+  } catch (const std::system_error& e) {
+    return Complain(NoThread("flushing the log", e.code().message()).message, kFailed);
+  }
   const auto exposure = CheckExposure(*config, options.insecure_open);
   if (!exposure) return Complain(exposure.error().message, kFailed);
   for (const std::string& warning : *exposure) SPDLOG_WARN("{}", warning);

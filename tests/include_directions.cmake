@@ -82,7 +82,7 @@ folder(server/listener sensing/core server/process server/security)
 folder(server/rpc/requests sensing/core server/config server/listener server/security)
 folder(server/rpc/streams sensing/core sensing/capture mcap wire wire/log server/hub server/link server/events server/security
        server/arm server/messages server/replay server/rpc/requests)
-folder(server/rpc/services sensing/core sensing/simulation wire server/link server/events server/simulation server/security
+folder(server/rpc/services server/process sensing/core sensing/simulation wire server/link server/events server/simulation server/security
        server/arm server/messages server/recording server/replay server/rpc/requests server/rpc/streams)
 folder(server/rpc sensing/core server/listener server/process server/security server/arm server/rpc/requests server/rpc/services)
 folder(server/publish sensing/core wire server/config server/process server/security server/arm server/messages)
@@ -125,6 +125,17 @@ foreach(file IN LISTS sources)
   cmake_path(GET file PARENT_PATH parent)
   if(NOT parent IN_LIST folders AND NOT file MATCHES "/node_modules/")
     string(APPEND violations "${file} is in a folder without a line\n")
+  endif()
+endforeach()
+
+# std::thread throws where the system has none to give, and the future of std::async waits in its destructor.
+foreach(file IN LISTS sources)
+  if(NOT file MATCHES "^(sensing|wire|mcap|server|client)/" OR file STREQUAL "sensing/core/thread_start.h")
+    continue()
+  endif()
+  file(STRINGS "${ROOT}/${file}" starts REGEX "std::j?thread ?[({]|std::async")
+  if(starts)
+    string(APPEND violations "${file} starts a thread otherwise than by sensing/core/thread_start.h\n")
   endif()
 endforeach()
 

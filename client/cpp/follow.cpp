@@ -9,6 +9,8 @@
 #include <thread>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
+
 namespace taclink::client {
 namespace {
 
@@ -30,8 +32,15 @@ class Subscription::Worker {
  public:
   /// `read` opens the stream, calls ReadAll and returns why it ended.
   using Read = std::function<Error(Worker&, Client&)>;
-  Worker(FollowOptions options, Read read)
-      : options_(std::move(options)), read_(std::move(read)), thread_([this] { Run(); }) {}
+  Worker(FollowOptions options, Read read) : options_(std::move(options)), read_(std::move(read)) {
+    auto thread = StartThread("taclink-follow", [this] { Run(); });
+    if (thread) {
+      thread_ = *std::move(thread);
+      return;
+    }
+    ended_ = true;
+    if (options_.on_refused) options_.on_refused(thread.error());
+  }
 
   void Stop() {
     {
@@ -114,7 +123,7 @@ class Subscription::Worker {
   bool stopping_ = false;         // guarded by mutex_
   std::function<void()> cancel_;  // guarded by mutex_; of the stream that is being read
 
-  std::thread thread_;  // last: it uses all else
+  std::jthread thread_;  // last: it uses all else
 };
 
 thread_local const Subscription::Worker* Subscription::Worker::running_here = nullptr;

@@ -100,8 +100,10 @@ Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& mode
 Result<StereoRig> ParseCalibration(const std::string& name, std::string_view content, const LinkModel& model);
 /// The file's text.
 std::string CalibrationText(const std::string& model_name, const CalibrationSummary& summary);
-/// Replaces the file as a whole. Errors: kUnavailable.
+/// Replaces the file as a whole. `may_replace` is asked when the new content is written and only its name is
+/// missing; empty: it may. Errors: kUnavailable, also where it may not; then the file is as it was.
 Result<void> SaveCalibration(const std::string& path, const std::string& model_name,
-                             const CalibrationSummary& summary);
+                             const CalibrationSummary& summary,
+                             const std::function<bool()>& may_replace = {});
 
 }  // namespace taclink

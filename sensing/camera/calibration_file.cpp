@@ -1,6 +1,8 @@
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <string>
 #include <system_error>
 
 #include "sensing/camera/calibration.h"
@@ -107,16 +109,24 @@ std::string CalibrationText(const std::string& model_name, const CalibrationSumm
 }
 
 Result<void> SaveCalibration(const std::string& path, const std::string& model_name,
-                             const CalibrationSummary& summary) {
-  const std::string part = path + ".part";
+                             const CalibrationSummary& summary, const std::function<bool()>& may_replace) {
+  // Of this call alone: another one may hang while it writes its own.
+  static std::atomic<unsigned> calls = 0;
+  const std::string part = path + ".part" + std::to_string(++calls);
   std::ofstream out(part, std::ios::trunc);
   out << CalibrationText(model_name, summary);
   out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(part, path, error);
-  if (!out || error)
-    return Error{ErrorCode::kUnavailable, "cannot write the calibration file '" + path + "'"};
-  return {};
+  const bool wanted = !may_replace || may_replace();
+  std::error_code error, ignored;
+  if (out && wanted) {
+    std::filesystem::rename(part, path, error);
+    if (!error) return {};
+  }
+  std::filesystem::remove(part, ignored);
+  if (!wanted)
+    return Error{ErrorCode::kUnavailable, "the calibration file '" + path +
+                                              "' is not replaced: nobody waits for the calibration any more"};
+  return Error{ErrorCode::kUnavailable, "cannot write the calibration file '" + path + "'"};
 }
 
 }  // namespace taclink

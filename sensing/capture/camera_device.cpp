@@ -1,6 +1,22 @@
 #include "sensing/capture/camera_device.h"
 
+#include <utility>
+
+#include "sensing/core/thread_start.h"
+
 namespace taclink {
+
+std::future<OpenedCamera> OpenDetached(std::unique_ptr<CameraDevice> old,
+                                       std::function<OpenedCamera()> open) {
+  auto opening = RunDetached("camera-open", [old = std::move(old), open = std::move(open)]() mutable {
+    old.reset();
+    return open();
+  });
+  if (opening) return *std::move(opening);
+  std::promise<OpenedCamera> refused;
+  refused.set_value(opening.error());
+  return refused.get_future();
+}
 
 void CopyPicture(std::span<const uint8_t> bytes, const CameraFormat& format, RawImage& image) {
   const auto line = static_cast<size_t>(format.width_px) * (format.pixels == PixelFormat::kYuyv ? 2 : 1);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -61,13 +62,19 @@ class CameraDevice {
 using OpenedCamera = Result<std::unique_ptr<CameraDevice>>;
 using CameraDevices = std::array<CameraDevice*, kCameraCount>;
 
+/// Closes `old` (null: none), then calls `open`, both on a detached thread that outlives the future where a
+/// camera hangs: `open` refers to nothing that may go before the process does. Without a thread `old` is
+/// closed by the caller's and the result is that error.
+std::future<OpenedCamera> OpenDetached(std::unique_ptr<CameraDevice> old, std::function<OpenedCamera()> open);
+
 /// What a pair of cameras needs of the machine; tests have one without any.
 class CameraSystem {
  public:
   virtual ~CameraSystem() = default;
 
   /// Closes `old` if there is one, then opens the camera and starts it. Returns at once: a camera that does
-  /// not answer can hold the kernel up for seconds, and the other one must not wait.
+  /// not answer can hold the kernel up for seconds, and the other one must not wait. Nor does who drops the
+  /// future: what is opened later is closed by the thread that opened it.
   virtual std::future<OpenedCamera> Open(CameraId id, std::unique_ptr<CameraDevice> old) = 0;
   /// Of what will be opened from now on.
   virtual void Remember(CameraId, const CameraSettings&) {}

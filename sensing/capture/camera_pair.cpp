@@ -88,7 +88,7 @@ class CameraPair final : public FrameSource {
 
   const CameraPairOptions options_;
   Clock& clock_;
-  const std::unique_ptr<CameraSystem> system_;  // outlives the openings
+  const std::unique_ptr<CameraSystem> system_;
   FramePairer pairer_;
   std::array<Camera, kCameraCount> cameras_;
   std::optional<FramePair> newest_;  // found, not delivered yet

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <functional>
+#include <future>
+#include <memory>
 #include <utility>
 
 #include "sensing/capture/camera_finder.h"
@@ -76,8 +79,8 @@ OpenedCamera OpenStreaming(const V4l2DeviceOptions& asked, const V4l2Options& op
       std::make_unique<V4l2Camera>(std::move(*device), DescribeNode(asked.path), options, clock));
 }
 
-OpenedCamera OpenByName(const V4l2Options& options, CameraId id, const CameraSettings& settings,
-                        Clock& clock) {
+OpenedCamera OpenByName(const V4l2Options& options, CameraId id, const CameraSettings& settings, Clock& clock,
+                        std::function<bool()> is_wanted) {
   const std::string& name = options.devices[Index(id)];
   const auto node = FindCamera(name);
   if (!node) return node.error();
@@ -87,7 +90,8 @@ OpenedCamera OpenByName(const V4l2Options& options, CameraId id, const CameraSet
                           .frame_rate_hz = options.frame_rate_hz,
                           .format = options.format,
                           .settings = settings,
-                          .buffers = options.buffers};
+                          .buffers = options.buffers,
+                          .is_wanted = std::move(is_wanted)};
   auto camera = OpenStreaming(asked, options, clock);
   if (!camera && camera.error().code == ErrorCode::kResourceExhausted && !options.format) {
     asked.format = PixelFormat::kMjpeg;  // a full bus may have room for compressed pictures
@@ -105,11 +109,11 @@ class V4l2CameraSystem final : public CameraSystem {
   }
 
   std::future<OpenedCamera> Open(CameraId id, std::unique_ptr<CameraDevice> old) override {
-    return std::async(std::launch::async,
-                      [this, id, settings = settings_[Index(id)], old = std::move(old)]() mutable {
-                        old.reset();
-                        return OpenByName(options_, id, settings, clock_);
-                      });
+    // The thread shares nothing with this object, which may go while a camera hangs.
+    return OpenDetached(std::move(old), [options = options_, id, settings = settings_[Index(id)],
+                                         &clock = clock_, owner = std::weak_ptr<const void>(owner_)] {
+      return OpenByName(options, id, settings, clock, [owner] { return !owner.expired(); });
+    });
   }
   void Remember(CameraId id, const CameraSettings& settings) override { settings_[Index(id)].Take(settings); }
 
@@ -119,6 +123,8 @@ class V4l2CameraSystem final : public CameraSystem {
   const V4l2Options options_;
   Clock& clock_;
   std::array<CameraSettings, kCameraCount> settings_;
+  const std::shared_ptr<const void> owner_ =
+      std::make_shared<int>();  // while this lives, it wants its cameras
 };
 
 std::array<std::string, kCameraCount> V4l2CameraSystem::Wait(const CameraDevices& devices, int64_t until_ns) {

@@ -103,6 +103,8 @@ Result<V4l2Device> V4l2Device::Open(const V4l2DeviceOptions& options) {
   if (device.fd_ < 0) return device.Failed("can't be opened");
   for (const auto step : {&V4l2Device::CheckIsCamera, &V4l2Device::Negotiate, &V4l2Device::SetAsAsked,
                           &V4l2Device::MapBuffers}) {
+    if (options.is_wanted && !options.is_wanted())
+      return Error{ErrorCode::kUnavailable, options.path + ": answered when nobody waited for it any more"};
     if (auto done = (device.*step)(); !done) return done.error();
   }
   return device;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,6 +24,9 @@ struct V4l2DeviceOptions {
   std::optional<PixelFormat> format = PixelFormat::kYuyv;  ///< none: the best it has at that size and rate
   CameraSettings settings = {};  ///< a time turns automatic exposure off, a gain automatic gain
   int buffers = 4;               ///< pictures that the driver can hold
+  /// Asked before each step of Open, one of which may have hung for long: a camera that nobody waits for any
+  /// more is not changed. Empty: it is wanted.
+  std::function<bool()> is_wanted = {};
 };
 
 /// One camera under Linux' V4L2 interface, with memory-mapped buffers. Owns the device: while it lives nobody
@@ -34,7 +38,8 @@ struct V4l2DeviceOptions {
 /// All messages name the device, what was asked and, where the camera decides, what it offers.
 class V4l2Device {
  public:
-  /// Sets format, rate and controls exactly as asked or fails. Does not stream yet.
+  /// Sets format, rate and controls exactly as asked or fails. Does not stream yet. kUnavailable also: it is
+  /// not wanted any more.
   static Result<V4l2Device> Open(const V4l2DeviceOptions& options);
 
   V4l2Device(V4l2Device&& other) noexcept;

@@ -1,13 +1,15 @@
 #include "server/assembly/arm_builder.h"
 
 #include <algorithm>
-#include <future>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "sensing/core/thread_start.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/state_estimator.h"
 #include "sensing/simulation/scene.h"
@@ -132,6 +134,16 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock, const Backgrou
                    .realtime = link.realtime};
 }
 
+// What building a link throws is that link's error.
+template <typename Build>
+Result<LinkParts> Guarded(Build build) {
+  try {
+    return build();
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInternal, e.what()};
+  }
+}
+
 }  // namespace
 
 Result<std::unique_ptr<ArmPoses>> BuildPoses(const Config& config) {
@@ -159,16 +171,25 @@ Result<std::unique_ptr<ArmPoses>> MakePoses(const Config& config,
 
 std::vector<Result<LinkParts>> BuildLinks(const Config& config, Clock& clock) {
   // One for all links: on a machine that is too slow for all of them, frames only wait as without it.
-  const auto thread = std::make_shared<BackgroundThread>();
-  const BackgroundRunner background = [thread](std::function<void()> job) { thread->Post(std::move(job)); };
+  const auto shared = std::make_shared<BackgroundThread>();
+  const BackgroundRunner background = [shared](std::function<void()> job) { shared->Post(std::move(job)); };
   // Simulated links solve their scenes first.
-  std::vector<std::future<Result<LinkParts>>> built;
-  for (const LinkConfig& link : config.links)
-    built.push_back(std::async(std::launch::async,
-                               [&link, &clock, &background] { return BuildLink(link, clock, background); }));
   std::vector<Result<LinkParts>> links;
-  for (size_t i = 0; i < built.size(); ++i) {
-    links.push_back(built[i].get());
+  for (const LinkConfig& link : config.links) links.emplace_back(Error{ErrorCode::kInternal, link.name});
+  {
+    std::vector<std::jthread> threads;
+    for (size_t i = 0; i < links.size(); ++i) {
+      auto thread = StartThread("build:" + config.links[i].name, [&, i] {
+        links[i] = Guarded([&] { return BuildLink(config.links[i], clock, background); });
+      });
+      if (thread) {
+        threads.push_back(*std::move(thread));
+      } else {
+        links[i] = thread.error();
+      }
+    }
+  }  // joins
+  for (size_t i = 0; i < links.size(); ++i) {
     if (links[i]) continue;
     const Error& error = links[i].error();
     links[i] = Error{error.code, "link '" + config.links[i].name + "': " + error.message};

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
+#include <functional>
 #include <utility>
 
 #include "sensing/camera/calibration.h"
@@ -48,6 +49,7 @@ class PipelineProcessor final : public LinkProcessor {
       return Error{ErrorCode::kFailedPrecondition,
                    "no file to save to: the link's configuration has no 'calibration'"};
     save_to_ = order.save ? file_ : std::nullopt;
+    may_save_ = order.may_save;
     pipeline_.BeginRest(order.pairs);
     return {};
   }
@@ -78,7 +80,7 @@ class PipelineProcessor final : public LinkProcessor {
                              .file_text = CalibrationText(pipeline_.model().name, *found),
                              .saved_to = {}};
     if (save_to_) {
-      const auto saved = SaveCalibration(*save_to_, pipeline_.model().name, *found);
+      const auto saved = SaveCalibration(*save_to_, pipeline_.model().name, *found, may_save_);
       if (!saved) return saved.error();
       result.saved_to = *save_to_;
     }
@@ -87,8 +89,10 @@ class PipelineProcessor final : public LinkProcessor {
 
   LinkPipeline pipeline_;
   const std::optional<std::string> file_;
-  bool touched_ = false;                // in the newest frame
-  std::optional<std::string> save_to_;  // by the calibration under way
+  bool touched_ = false;  // in the newest frame
+  // Of the calibration under way.
+  std::optional<std::string> save_to_;
+  std::function<bool()> may_save_;
 };
 
 }  // namespace

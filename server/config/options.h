@@ -36,7 +36,8 @@ struct LimitsConfig {
           "Connections of gRPC; a quarter is for this machine.");
     visit("max_connections_per_peer", max_connections_per_peer, kCount,
           "Connections of one other address; then the oldest without a good call gives way.");
-    visit("max_streams", max_streams, kCount, "Streams of all clients; a quarter is for operators.");
+    visit("max_streams", max_streams, kCount,
+          "Streams; a quarter is for callers on this machine or with a token or certificate.");
     visit("max_streams_per_peer", max_streams_per_peer, kCount, "Streams of one caller or address.");
     visit("max_calls_per_connection", max_calls_per_connection, kCount, "Concurrent calls.");
     visit("max_message_kb", max_message_kb, {1, 65536}, "Size of a request.");

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "sensing/core/printable.h"
+#include "sensing/core/thread_start.h"
 #include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 
@@ -86,7 +87,7 @@ void EventEngine::Subscribe() {
 
 void EventEngine::Start() {
   if (!subscription_) Subscribe();
-  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+  thread_ = MustStartThread("events", [this](const std::stop_token& stop) { Run(stop); });
 }
 
 void EventEngine::Stop() {
@@ -96,7 +97,6 @@ void EventEngine::Stop() {
 }
 
 void EventEngine::Run(const std::stop_token& stop) {
-  SetUpThread("events", {});
   while (!stop.stop_requested()) {
     signal_->Wait(kPoll);
     Drain();

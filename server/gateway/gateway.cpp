@@ -22,6 +22,8 @@
 #include <utility>
 
 #include "sensing/core/address.h"
+#include "sensing/core/thread_start.h"
+#include "server/config/config.h"
 #include "server/gateway/session.h"
 #include "server/process/socket_options.h"
 #include "server/process/system_limits.h"
@@ -291,10 +293,9 @@ Result<std::unique_ptr<Gateway>> Gateway::Start(GatewayOptions options, GatewayS
   Running* const self = running.get();
   asio::co_spawn(self->shared->loop, self->Accept(), asio::detached);
   asio::co_spawn(self->shared->loop, self->Sweep(), asio::detached);
-  self->thread = std::jthread([self] {
-    SetUpThread("http", {});
-    self->shared->loop.run();
-  });
+  auto thread = StartThread("http", [self] { self->shared->loop.run(); });
+  if (!thread) return thread.error();
+  self->thread = *std::move(thread);
   return std::unique_ptr<Gateway>(new Gateway(std::move(running)));
 }
 

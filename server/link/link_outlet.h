@@ -28,9 +28,11 @@ struct AgeLimit {
   int64_t Ns(int64_t period_ns) const;
 };
 
-/// Where a link's states leave. It outlasts the workers that the link has one after the other: only the
-/// newest may publish, so that one that was given up can do no harm when it comes back. Also the hub may go
-/// before it.
+/// Where a link's states leave, and who may still act for the link: what a worker does outside its own memory
+/// (files, cameras) goes by IsCurrent; what follows from its answers (events, memory of the cameras'
+/// settings) ends with LinkWorker::Abandon, which answers in its place. It outlasts the workers that the link
+/// has one after the other: only the newest may publish, so that one that was given up can do no harm when it
+/// comes back. Also the hub may go before it.
 class LinkOutlet {
  public:
   LinkOutlet(size_t link, Hub& hub, Clock& clock, std::optional<AgeLimit> age_limit = {})

@@ -21,6 +21,8 @@ struct CalibrationOrder {
   int pairs = 8;       ///< rest pairs to average over
   bool save = false;   ///< write the configured calibration file
   bool force = false;  ///< even while touched
+  /// Asked right before the file is replaced: a worker that was given up replaces nothing. Empty: it may.
+  std::function<bool()> may_save = {};
 };
 
 /// How well the cameras fit the rest markers. RMS.

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <exception>
-#include <thread>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "server/process/log.h"
 #include "server/process/system_limits.h"
 
@@ -268,12 +268,11 @@ void LinkSupervisor::BeginBuild(int64_t now_ns) {
     build_->done = true;
     return;
   }
-  ++*builds_;
-  std::thread([build = build_, factories = factories_, builds = builds_]() mutable {
-    build->Run(factories);
-    build.reset();
-    --*builds;
-  }).detach();
+  const auto started = StartDetachedThread(
+      "build:" + name_, [build = build_, factories = factories_] { build->Run(factories); });
+  if (started) return;
+  build_->result = started.error();
+  build_->done = true;
 }
 
 void LinkSupervisor::AwaitBuild(int64_t now_ns) {

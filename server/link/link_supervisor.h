@@ -70,9 +70,9 @@ class LinkSupervisor {
   void Wake();
 
   // Any thread.
-  /// Whether threads may still run after Stop that could not be waited for: the process must not destroy what
-  /// is global.
-  bool LeavesThreads() const { return *builds_ > 0 || supervision().abandoned > 0; }
+  /// Whether threads of workers may still run after Stop that could not be waited for: the process must not
+  /// destroy what is global. Those that open cameras or build parts are among DetachedThreads.
+  bool LeavesThreads() const { return supervision().abandoned > 0; }
   Supervision supervision() const;
   LinkStatistics Statistics() const { return outlet_->Statistics(); }
   const LinkHistograms& histograms() const { return outlet_->histograms(); }
@@ -125,7 +125,6 @@ class LinkSupervisor {
   const WatchdogOptions limits_;
   const std::shared_ptr<LinkOutlet> outlet_;
   const std::shared_ptr<CameraMemory> cameras_ = std::make_shared<CameraMemory>();
-  const std::shared_ptr<std::atomic<int>> builds_ = std::make_shared<std::atomic<int>>(0);  // threads
 
   std::atomic<Order> order_ = Order::kNone;
 

@@ -6,12 +6,17 @@
 #include <exception>
 #include <stdexcept>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "server/process/system_limits.h"
 
 namespace taclink::server {
+namespace {
+
+const Error kGivenUp{ErrorCode::kUnavailable, "the link's worker hangs and was given up"};
+
+}  // namespace
 
 LinkWorker::LinkWorker(std::string name, std::unique_ptr<FrameSource> source,
                        std::unique_ptr<LinkProcessor> processor, std::shared_ptr<LinkOutlet> outlet,
@@ -40,28 +45,32 @@ std::jthread LinkWorker::StartThread(const char* kind, void (LinkWorker::*loop)(
     const std::lock_guard lock(end_mutex_);
     ++running_;
   }
-  try {
-    return std::jthread([this, kind, loop, self = weak_from_this().lock()](const std::stop_token& stop) {
-      RunThread(kind, loop, stop);
-    });
-  } catch (const std::system_error& e) {
-    Died(std::string("no thread for it: ") + e.what());
-    const std::lock_guard lock(end_mutex_);
-    --running_;
-    return {};
-  }
+  auto thread = taclink::StartThread(
+      std::string(kind) + ":" + name_,
+      [this, loop, self = weak_from_this().lock()](const std::stop_token& stop) { RunThread(loop, stop); });
+  if (thread) return *std::move(thread);
+  Died(thread.error().message);
+  const std::lock_guard lock(end_mutex_);
+  --running_;
+  return {};
 }
 
 // The root of both threads: what leaves a loop ends here and is the watchdog's to deal with.
-void LinkWorker::RunThread(const char* kind, void (LinkWorker::*loop)(const std::stop_token&),
-                           const std::stop_token& stop) {
-  SetUpThread(std::string(kind) + ":" + name_, options_.realtime);
+void LinkWorker::RunThread(void (LinkWorker::*loop)(const std::stop_token&), const std::stop_token& stop) {
+  SetUpThread(options_.realtime);
   try {
     (this->*loop)(stop);
   } catch (const std::exception& e) {
     Died(DescribeLimit(e));
   } catch (...) {
     Died("an exception of unknown type");
+  }
+  // Closing a camera and waiting for a tangent may take long. Each thread does it for its own part and counts
+  // as running meanwhile: the watchdog, which joins it, does not wait.
+  if (loop == &LinkWorker::Capture) {
+    supervisor_.Close();
+  } else {
+    processor_.reset();
   }
   const std::lock_guard lock(end_mutex_);
   --running_;
@@ -91,10 +100,9 @@ int LinkWorker::WaitEnded(std::chrono::milliseconds limit) {
 void LinkWorker::Abandon() {
   RequestStop();
   if (outlet_->IsCurrent(life_)) outlet_->NewLife();  // nobody's, until the next worker is there
-  const Error error{ErrorCode::kUnavailable, "the link's worker hangs and was given up"};
-  EndCalibrationFromOutside(error);
-  tare_.EndFromOutside(error);
-  CloseCommands(error);
+  EndCalibrationFromOutside(kGivenUp);
+  tare_.EndFromOutside(kGivenUp);
+  CloseCommands(kGivenUp);
   if (capture_.joinable()) capture_.detach();
   if (solve_.joinable()) solve_.detach();
 }
@@ -163,17 +171,20 @@ Result<void> LinkWorker::Calibrate(const CalibrationOrder& order, CalibrationObs
   if (calibrating_)
     return Error{ErrorCode::kFailedPrecondition, "a calibration of link '" + name_ + "' is under way"};
   calibrating_ = true;
-  watching_ = observer;
-  ordered_ = CalibrationJob{order, std::move(observer)};
+  watching_ = std::move(observer);
+  ordered_ = order;
   return {};
 }
 
 Result<void> LinkWorker::SetCamera(const CameraOrder& order, CommandObserver done) {
   return capture_commands_.Post(
-      [order](SourceSupervisor& source) {
+      [this, order](SourceSupervisor& source) {
         Result<void> set;
-        for (const CameraId id : kBothCameras)
-          if (set && order.cameras[Index(id)]) set = source.SetCamera(id, order.settings);
+        for (const CameraId id : kBothCameras) {
+          if (!set || !order.cameras[Index(id)]) continue;
+          // The first camera may have hung: the second one may be another worker's by now.
+          set = IsCurrent() ? source.SetCamera(id, order.settings) : Result<void>(kGivenUp);
+        }
         return set;
       },
       std::move(done));
@@ -197,22 +208,30 @@ void LinkWorker::TakeCalibrationOrder() {
     job_ = std::exchange(ordered_, std::nullopt);
   }
   job_frame_ns_ = clock_.MonotonicNs();
-  const auto begun = processor_->BeginCalibration(job_->order);
+  job_->may_save = [this] { return MayEndCalibration(); };
+  const auto begun = processor_->BeginCalibration(*job_);
   if (!begun) EndCalibrationWithout(begun.error());
 }
 
 void LinkWorker::TellCalibration() {
   if (!job_) return;
+  // Nobody is told any more what becomes of it: it must not become anything.
+  if (!MayEndCalibration()) return EndCalibrationWithout({ErrorCode::kUnavailable, "ended from outside"});
   job_frame_ns_ = clock_.MonotonicNs();
   const CalibrationProgress progress = processor_->PollCalibration();
   if (progress.end) {
     SPDLOG_INFO("link {}: calibration: {}", name_, *progress.end ? "done" : progress.end->error().message);
     if (const auto observer = ForgetCalibration()) observer(progress);
-  } else if (!job_->observer(progress)) {
+  } else if (const auto observer = Watching(); observer && !observer(progress)) {
     processor_->CancelCalibration();
     SPDLOG_INFO("link {}: calibration: cancelled", name_);
     ForgetCalibration();
   }
+}
+
+CalibrationObserver LinkWorker::Watching() {
+  const std::lock_guard lock(calibration_mutex_);
+  return watching_;
 }
 
 // Who is to be told of the end; none: it was told from outside.

@@ -52,8 +52,9 @@ struct LinkWorkerOptions {
   SupervisorOptions supervisor = {};
 };
 
-/// Runs one link: a capture thread (source -> mailbox) and a FEM thread (mailbox -> processor -> outlet).
-/// Where a shared_ptr holds it, its threads hold it too, so that they can be given up while they hang.
+/// Runs one link: a capture thread (source -> mailbox) and a FEM thread (mailbox -> processor -> outlet),
+/// which destroy the source and the processor as they end. Where a shared_ptr holds it, its threads hold it
+/// too, so that they can be given up while they hang.
 class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
  public:
   LinkWorker(std::string name, std::unique_ptr<FrameSource> source, std::unique_ptr<LinkProcessor> processor,
@@ -95,9 +96,9 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
 
  private:
   std::jthread StartThread(const char* kind, void (LinkWorker::*loop)(const std::stop_token&));
-  void RunThread(const char* kind, void (LinkWorker::*loop)(const std::stop_token&),
-                 const std::stop_token& stop);
+  void RunThread(void (LinkWorker::*loop)(const std::stop_token&), const std::stop_token& stop);
   void Died(const std::string& reason);
+  bool IsCurrent() const { return outlet_->IsCurrent(life_); }  // false: it was given up or replaced
   void EndCalibrationFromOutside(const Error& error);
   void Capture(const std::stop_token& stop);
   void Solve(const std::stop_token& stop);
@@ -105,6 +106,8 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   void PublishStatusIfDue();
   void TakeCalibrationOrder();
   void TellCalibration();
+  CalibrationObserver Watching();
+  bool MayEndCalibration() { return IsCurrent() && Watching(); }
   CalibrationObserver ForgetCalibration();
   void EndCalibrationWithout(const Error& error);
 
@@ -129,21 +132,16 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   std::optional<std::string> failure_;
   int running_ = 0;  // threads
 
-  struct CalibrationJob {
-    CalibrationOrder order;
-    CalibrationObserver observer;
-  };
   std::mutex calibration_mutex_;
   // Guarded by calibration_mutex_.
-  std::optional<CalibrationJob> ordered_;
-  CalibrationObserver
-      watching_;              // of the one ordered or under way, for when the FEM thread can't tell its end
-  bool calibrating_ = false;  // ordered or under way
+  std::optional<CalibrationOrder> ordered_;
+  CalibrationObserver watching_;  // of the one ordered or under way; null: it was told the end
+  bool calibrating_ = false;      // ordered or under way
   bool calibration_closed_ = false;
 
   // Used by the FEM thread only.
-  const std::unique_ptr<LinkProcessor> processor_;
-  std::optional<CalibrationJob> job_;
+  std::unique_ptr<LinkProcessor> processor_;
+  std::optional<CalibrationOrder> job_;
   int64_t job_frame_ns_ = 0;       // of its last frame
   int failing_ = 0;                // frames in a row that could not be processed
   bool settled_ = false;           // the last frame was measured

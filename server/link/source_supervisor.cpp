@@ -29,10 +29,10 @@ Result<void> Guarded(F call) {
 SourceSupervisor::SourceSupervisor(std::string name, std::unique_ptr<FrameSource> source, Clock& clock,
                                    SupervisorOptions options, StageMark* mark)
     : name_(std::move(name)),
-      source_(std::move(source)),
       clock_(clock),
       options_(options),
       mark_(mark),
+      source_(std::move(source)),
       backoff_(options.first_backoff) {}
 
 bool SourceSupervisor::Next(StereoFrame& frame, milliseconds timeout) {

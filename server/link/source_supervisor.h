@@ -47,6 +47,9 @@ class SourceSupervisor {
   /// As FrameSource::SetCamera. Next's thread.
   Result<void> SetCamera(CameraId id, const CameraSettings& settings);
 
+  /// Destroys the source, which closes its cameras. Next's thread, after which it makes no other call.
+  void Close() { source_.reset(); }
+
   /// As FrameSource::WaitsForReader.
   bool WaitsForReader() const { return source_->WaitsForReader(); }
 
@@ -63,12 +66,12 @@ class SourceSupervisor {
 
   // Constant after construction.
   const std::string name_;
-  const std::unique_ptr<FrameSource> source_;
   Clock& clock_;
   const SupervisorOptions options_;
   StageMark* const mark_;  // of Next's thread; null: nobody watches
 
   // Used by Next's thread only.
+  std::unique_ptr<FrameSource> source_;
   bool started_ = false;
   bool ever_tried_ = false;
   int64_t retry_at_ns_ = 0;

@@ -5,6 +5,7 @@
 #include <exception>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 
@@ -12,8 +13,7 @@ namespace taclink::server {
 
 void Watchdog::Start(std::vector<LinkSupervisor*> links) {
   links_ = std::move(links);
-  thread_ = std::jthread([this](const std::stop_token& stop) {
-    SetUpThread("watchdog", {});
+  thread_ = MustStartThread("watchdog", [this](const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       Round();
       clock_.SleepUntilMonotonicNs(clock_.MonotonicNs() + std::chrono::nanoseconds(interval_).count());

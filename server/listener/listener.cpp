@@ -23,10 +23,10 @@
 #include <vector>
 
 #include "sensing/core/clock.h"
+#include "sensing/core/thread_start.h"
 #include "server/listener/listening_socket.h"
 #include "server/listener/read_guard.h"
 #include "server/process/socket_options.h"
-#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 namespace {
@@ -158,7 +158,6 @@ void Listener::Running::Wake() const {
 }
 
 void Listener::Running::Run(const std::stop_token& stop) {
-  SetUpThread("listener", {});
   std::array<epoll_event, 64> events{};
   while (!stop.stop_requested()) {
     const int count = ::epoll_wait(poll, events.data(), static_cast<int>(events.size()), TimeoutMs());
@@ -355,7 +354,10 @@ Listener::~Listener() {
 
 Result<void> Listener::Begin(HandOver hand_over) {
   running_->hand_over = std::move(hand_over);
-  running_->thread = std::jthread([self = running_.get()](const std::stop_token& stop) { self->Run(stop); });
+  auto thread =
+      StartThread("listener", [self = running_.get()](const std::stop_token& stop) { self->Run(stop); });
+  if (!thread) return thread.error();
+  running_->thread = *std::move(thread);
   return {};
 }
 

@@ -7,6 +7,7 @@
 #include <exception>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "sensing/core/units.h"
 #include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
@@ -38,8 +39,7 @@ PressureSensor::~PressureSensor() {
 
 void PressureSensor::Start() {
   if (!reader_) return;
-  thread_ = std::jthread([this](const std::stop_token& stop) {
-    SetUpThread("prs:" + name_, {});
+  thread_ = MustStartThread("prs:" + name_, [this](const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       try {
         Step(kPoll);

@@ -2,10 +2,11 @@
 
 #include <utility>
 
-#include "server/process/thread_setup.h"
+#include "sensing/core/thread_start.h"
 
 namespace taclink::server {
-BackgroundThread::BackgroundThread() : thread_([this] { Run(); }) {}
+
+BackgroundThread::BackgroundThread() : thread_(MustStartThread("background", [this] { Run(); })) {}
 
 BackgroundThread::~BackgroundThread() {
   {
@@ -25,7 +26,6 @@ void BackgroundThread::Post(std::function<void()> job) {
 }
 
 void BackgroundThread::Run() {
-  SetUpThread("background", {});
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [this] { return !jobs_.empty() || is_ending_; });

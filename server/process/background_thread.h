@@ -29,7 +29,7 @@ class BackgroundThread {
   std::deque<std::function<void()>> jobs_;
   bool is_ending_ = false;
 
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace taclink::server

@@ -8,16 +8,13 @@
 #include <cstdlib>
 #include <utility>
 
-#include "server/process/thread_setup.h"
+#include "sensing/core/thread_start.h"
 
 namespace taclink::server {
 
 Signals::Signals() : stop_signals_(context_, SIGINT, SIGTERM), reload_signals_(context_, SIGHUP) {
   AwaitStop();
-  thread_ = std::jthread([this] {
-    SetUpThread("signals", {});
-    context_.run();
-  });
+  thread_ = MustStartThread("signals", [this] { context_.run(); });
 }
 
 Signals::~Signals() {

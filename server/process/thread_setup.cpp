@@ -6,12 +6,11 @@
 
 #include <atomic>
 #include <cerrno>
+#include <string>
 #include <system_error>
 
 namespace taclink::server {
 namespace {
-
-constexpr size_t kNameLength = 15;
 
 // Every link has two threads: one warning says it for all.
 bool FirstTime(std::atomic<bool>& told) {
@@ -54,8 +53,7 @@ void SetCpus(const std::vector<int>& cpus) {
 
 }  // namespace
 
-void SetUpThread(const std::string& name, const RealtimeOptions& options) {
-  pthread_setname_np(pthread_self(), name.substr(0, kNameLength).c_str());
+void SetUpThread(const RealtimeOptions& options) {
   if (!options.cpus.empty()) SetCpus(options.cpus);
   if (options.priority > 0) SetPriority(options.priority);
 }

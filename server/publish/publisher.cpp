@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "server/messages/event_message.h"
 #include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
@@ -88,7 +89,10 @@ Result<std::unique_ptr<Publisher>> Publisher::Start(Arm& arm, const PublishConfi
   if (!connection) return connection.error();
   out->connection_ = std::move(*connection);
   out->Subscribe();
-  out->thread_ = std::jthread([self = out.get()](const std::stop_token& stop) { self->Run(stop); });
+  auto thread =
+      StartThread("publisher", [self = out.get()](const std::stop_token& stop) { self->Run(stop); });
+  if (!thread) return thread.error();
+  out->thread_ = *std::move(thread);
   return out;
 }
 
@@ -139,7 +143,6 @@ void Publisher::Close(std::chrono::milliseconds limit) {
 }
 
 void Publisher::Run(const std::stop_token& stop) {
-  SetUpThread("publisher", {});
   while (!stop.stop_requested()) {
     post_->Wait();
     try {

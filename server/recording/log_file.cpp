@@ -17,11 +17,15 @@ Result<std::unique_ptr<LogFile>> LogFile::Create(const LogFolder& folder, const 
   }
   std::unique_ptr<LogFile> file(new LogFile(folder, name, std::move(*sink), utc_ns));
   if (const auto begun = file->Begin(preamble, std::move(options)); !begun) {
-    std::error_code ignored;  // nothing is in it
-    std::filesystem::remove(folder.PartPath(name), ignored);
+    file->Discard();
     return begun.error();
   }
   return file;
+}
+
+void LogFile::Discard() {
+  std::error_code ignored;
+  std::filesystem::remove(folder_.PartPath(name_), ignored);
 }
 
 Result<void> LogFile::Begin(const LogPreamble& preamble, mcap::WriterOptions options) {

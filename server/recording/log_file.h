@@ -30,6 +30,9 @@ class LogFile {
                                                  const LogPreamble& preamble, mcap::WriterOptions options,
                                                  int64_t utc_ns);
 
+  /// Deletes the file of a log in which there is nothing yet.
+  void Discard();
+
   wire::log::LogWriter& writer() { return *writer_; }
   const std::string& name() const { return name_; }
   int64_t started_utc_ns() const { return started_utc_ns_; }

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "sensing/core/name.h"
+#include "sensing/core/thread_start.h"
 #include "server/arm/link_names.h"
-#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 namespace {
@@ -66,13 +66,18 @@ void Recorder::Open() {
   }
   const std::vector<LogFileEntry> unfinished = folder_.Unfinished();
   if (!unfinished.empty()) {
-    mender_ = std::jthread([unfinished, folder = folder_](const std::stop_token& stop) {
-      SetUpThread("log-mender", {});
+    auto mender = StartThread("log-mender", [unfinished, folder = folder_](const std::stop_token& stop) {
       for (const LogFileEntry& log : unfinished) {
         if (stop.stop_requested()) return;
         if (const auto outcome = folder.Recover(log.name, stop)) SPDLOG_WARN("recording: {}", *outcome);
       }
     });
+    if (mender) {
+      mender_ = *std::move(mender);
+    } else {
+      SPDLOG_ERROR("recording: {} unfinished logs stay as they are until the next start: {}",
+                   unfinished.size(), mender.error().message);
+    }
   }
   if (!config_.at_start) return;
   v1::StartRecordingRequest request;

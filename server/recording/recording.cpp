@@ -9,6 +9,7 @@
 #include <limits>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 #include "taclink/v1/frame.pb.h"
@@ -87,7 +88,13 @@ Result<std::unique_ptr<Recording>> Recording::Start(Arm& arm, const RecordingCon
                                             .pictures = order.pictures},
                                            [] {});
   out->UpdateStatus();
-  out->thread_ = std::jthread([self = out.get()](const std::stop_token& stop) { self->Run(stop); });
+  auto thread =
+      StartThread("recording", [self = out.get()](const std::stop_token& stop) { self->Run(stop); });
+  if (!thread) {
+    out->file_->Discard();
+    return thread.error();
+  }
+  out->thread_ = *std::move(thread);
   return out;
 }
 
@@ -115,7 +122,6 @@ Result<std::unique_ptr<LogFile>> Recording::NewFile() {
 }
 
 void Recording::Run(const std::stop_token& stop) {
-  SetUpThread("recording", {});
   std::mutex mutex;
   std::condition_variable_any stopped;
   while (!stop.stop_requested()) {

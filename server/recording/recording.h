@@ -35,7 +35,8 @@ struct RecordingOrder {
 /// own. What the disk does not take is counted, and named in the log once it takes something again.
 class Recording {
  public:
-  /// The first log is there when it returns. The arm must outlive it. Errors: as LogFile::Create.
+  /// The first log is there when it returns. The arm must outlive it. Errors: as LogFile::Create,
+  /// kResourceExhausted (no thread; then there is no log).
   static Result<std::unique_ptr<Recording>> Start(Arm& arm, const RecordingConfig& config,
                                                   const LogFolder& folder, const RecordingOrder& order,
                                                   LogPreamble preamble);

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "sensing/core/thread_start.h"
 #include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
 #include "taclink/v1/log.pb.h"
@@ -22,13 +23,12 @@ constexpr int64_t kPollNs = 50'000'000;
 JointReplay::JointReplay(std::unique_ptr<ReplayTrack> track, ArmPoses& poses, Clock& clock)
     : track_(std::move(track)), poses_(poses), clock_(clock) {
   for (const JointInfo& joint : poses.joints().joints()) joints_.emplace(joint.name, joints_.size());
-  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+  thread_ = MustStartThread("joint-replay", [this](const std::stop_token& stop) { Run(stop); });
 }
 
 JointReplay::~JointReplay() = default;
 
 void JointReplay::Run(const std::stop_token& stop) {
-  SetUpThread("joint-replay", {});
   try {
     while (true) {
       const auto item = track_->Next();

@@ -5,6 +5,7 @@
 #include <grpcpp/server_builder.h>
 #include <grpcpp/support/server_interceptor.h>
 
+#include <boost/system/system_error.hpp>
 #include <functional>
 #include <set>
 #include <string>
@@ -12,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "sensing/core/thread_start.h"
 #include "server/rpc/credentials.h"
 #include "server/security/access.h"
 
@@ -73,7 +75,12 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
                                                     Recorder* recorder) {
   EnablePlugins();
   if (!security) security = std::make_shared<const Security>();
-  std::unique_ptr<RpcServer> out(new RpcServer(arm, limits, security, recorder));
+  std::unique_ptr<RpcServer> out;
+  try {
+    out.reset(new RpcServer(arm, limits, security, recorder));
+  } catch (const boost::system::system_error& e) {  // of a pool
+    return NoThread("the pools of gRPC's calls", e.code().message());
+  }
   auto listener = Listener::Open({.address = listen,
                                   .has_tls = HasTls(listen, *security),
                                   .user_timeout = limits.keepalive_timeout,

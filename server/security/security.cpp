@@ -7,6 +7,7 @@
 #include <exception>
 #include <utility>
 
+#include "sensing/core/thread_start.h"
 #include "sensing/core/utc_time.h"
 #include "server/process/system_limits.h"
 #include "server/process/thread_setup.h"
@@ -252,11 +253,10 @@ std::vector<std::string> Security::TakeChanges() {
 
 std::jthread Security::Watch() {
   if (config_.certificate.empty() && !needs_token()) return {};
-  return std::jthread([this](const std::stop_token& stop) { Run(stop); });
+  return MustStartThread("security", [this](const std::stop_token& stop) { Run(stop); });
 }
 
 void Security::Run(const std::stop_token& stop) {
-  SetUpThread("security", {});
   while (true) {
     {
       std::unique_lock lock(mutex_);

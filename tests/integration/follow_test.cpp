@@ -8,6 +8,7 @@
 #include <functional>
 #include <mutex>
 
+#include "sensing/core/thread_start.h"
 #include "tests/integration/support.h"
 
 namespace taclink::server {
@@ -97,6 +98,16 @@ TEST_F(FollowTest, ARefusalIsTheEnd) {
   EXPECT_THAT(refusals[0].message, HasSubstr("elbow"));
   subscription->Stop();
   EXPECT_TRUE(subscription->ended());
+}
+
+TEST_F(FollowTest, WithoutAThreadItIsRefusedAtOnce) {
+  const ThreadShortage shortage("taclink-follow");
+  const auto subscription = client::FollowFrames(options_, Every(), {});
+  EXPECT_TRUE(subscription->ended());
+  const auto refusals = refused_.Wait(1);
+  ASSERT_EQ(refusals.size(), 1U);
+  EXPECT_EQ(refusals[0].code, ErrorCode::kResourceExhausted);
+  subscription->Stop();
 }
 
 TEST_F(FollowTest, ContactsAndEventsCome) {

@@ -88,6 +88,18 @@ class SourceScript {
     changed_.notify_all();
   }
   using CameraOrders = std::vector<std::pair<CameraId, CameraSettings>>;
+  /// Called by SetCamera.
+  void OnSetCamera(std::function<void(CameraId)> hook) {
+    const std::lock_guard lock(mutex_);
+    on_set_camera_ = std::move(hook);
+  }
+  /// Called by each source as it is destroyed.
+  void OnClose(std::function<void()> hook) {
+    const std::lock_guard lock(mutex_);
+    on_close_ = std::move(hook);
+  }
+  /// Sources that are not destroyed.
+  std::atomic<int> living = 0;
   /// By Remember, of all sources.
   CameraOrders remembered() const {
     const std::lock_guard lock(mutex_);
@@ -155,18 +167,39 @@ class SourceScript {
   bool waiting_ = false;
   int starts_ = 0;
   CameraOrders remembered_;
+  std::function<void()> on_close_;
+  std::function<void(CameraId)> on_set_camera_;
   int failing_starts_ = 0;  // < 0: all
   ErrorCode start_error_ = ErrorCode::kUnavailable;
 };
 
 class FakeSource final : public FrameSource {
  public:
-  explicit FakeSource(std::shared_ptr<SourceScript> script) : script_(std::move(script)) {}
+  explicit FakeSource(std::shared_ptr<SourceScript> script) : script_(std::move(script)) {
+    ++script_->living;
+  }
+  ~FakeSource() override {
+    std::function<void()> hook;
+    {
+      const std::lock_guard lock(script_->mutex_);
+      hook = script_->on_close_;
+    }
+    if (hook) hook();
+    --script_->living;
+  }
+  FakeSource(const FakeSource&) = delete;
+  FakeSource& operator=(const FakeSource&) = delete;
   Result<void> Start() override { return script_->Start(); }
   Result<void> Next(StereoFrame& frame, std::chrono::milliseconds timeout) override {
     return script_->Next(frame, timeout);
   }
-  Result<void> SetCamera(CameraId, const CameraSettings& settings) override {
+  Result<void> SetCamera(CameraId id, const CameraSettings& settings) override {
+    std::function<void(CameraId)> hook;
+    {
+      const std::lock_guard lock(script_->mutex_);
+      hook = script_->on_set_camera_;
+    }
+    if (hook) hook(id);
     if (settings.gain == 99) return Error{ErrorCode::kInvalidArgument, "gain must be 0 to 64"};
     return {};
   }
@@ -182,9 +215,12 @@ class FakeSource final : public FrameSource {
   const std::shared_ptr<SourceScript> script_;
 };
 
-/// Processes with a function, and calibrates as the test says.
+/// Processes with a function, and calibrates as the test says. `saves` counts the calibrations that would
+/// have written a file.
 class FakeProcessor final : public LinkProcessor {
  public:
+  static inline std::atomic<int> saves = 0;
+
   using Function = std::function<void(const StereoFrame&, LinkState&)>;
   explicit FakeProcessor(Function process, std::optional<Error> refusal = {})
       : process_(std::move(process)), refusal_(std::move(refusal)) {}
@@ -198,12 +234,14 @@ class FakeProcessor final : public LinkProcessor {
     wanted_ = order.pairs;
     taken_ = 0;
     calibrating_ = true;
+    order_ = order;
     return {};
   }
   CalibrationProgress PollCalibration() override {
     CalibrationProgress progress{.taken = taken_, .wanted = wanted_, .end = {}};
     if (taken_ < wanted_) return progress;
     calibrating_ = false;
+    if (order_.save && (!order_.may_save || order_.may_save())) ++saves;
     progress.end =
         CalibrationResult{.markers_used = 200, .rms_px = 0.25, .rmse_r_mm = 0.5, .file_text = "text"};
     return progress;
@@ -228,6 +266,7 @@ class FakeProcessor final : public LinkProcessor {
   const std::optional<Error> refusal_;
   bool calibrating_ = false;
   int taken_ = 0, wanted_ = 0;
+  CalibrationOrder order_;
   std::optional<TareOptions> tare_;
   int tare_taken_ = 0;
 };

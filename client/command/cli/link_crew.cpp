@@ -1,10 +1,12 @@
 #include "client/command/cli/link_crew.h"
 
+#include "sensing/core/thread_start.h"
+
 namespace taclink::command {
 
 LinkCrew::LinkCrew(size_t links, size_t threads) : lines_(links) {
   for (size_t i = 0; i < threads; ++i)
-    threads_.emplace_back([this](const std::stop_token& stop) { Run(stop); });
+    threads_.push_back(MustStartThread("log-links", [this](const std::stop_token& stop) { Run(stop); }));
 }
 
 LinkCrew::~LinkCrew() {

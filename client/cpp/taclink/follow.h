@@ -29,7 +29,8 @@ struct FollowOptions {
   std::function<void()> on_connected = {};  ///< the server has accepted, for the first time or again
   std::function<void(const Disconnection&)> on_disconnected = {};
   /// The server refuses for good (kInvalidArgument, kNotFound, kUnauthenticated, kPermissionDenied,
-  /// kUnsupported, or files that cannot be read): the subscription has ended.
+  /// kUnsupported, or files that cannot be read): the subscription has ended. Also, on the caller's thread
+  /// before Follow... returns, that the system has no thread for it (kResourceExhausted).
   std::function<void(const Error&)> on_refused = {};
   /// Of FollowFrames, as FrameReader::SetMaxAge; 0: any age.
   std::chrono::nanoseconds max_age{0};

@@ -2,9 +2,13 @@
 
 #include <spdlog/spdlog.h>
 
+#include <boost/asio/post.hpp>
+#include <exception>
+#include <functional>
 #include <string>
 #include <utility>
 
+#include "server/process/system_limits.h"
 #include "server/replay/log_pictures.h"
 #include "server/rpc/requests/refusal.h"
 #include "server/rpc/requests/request_check.h"
@@ -32,6 +36,15 @@ OpenedLog OpenLog(Recorder& recorder, const std::string& name) {
   return {.reader = nullptr, .status = OfLog(reader.error())};
 }
 
+// What work throws ends its call, not the pool's thread and the server with it.
+grpc::Status Guarded(const std::function<grpc::Status()>& work) {
+  try {
+    return work();
+  } catch (const std::exception& e) {
+    return {grpc::StatusCode::INTERNAL, DescribeLimit(e)};
+  }
+}
+
 }  // namespace
 
 RecordingService::RecordingService(Recorder& recorder, StreamRegistry& registry,
@@ -48,7 +61,7 @@ grpc::ServerUnaryReactor* RecordingService::Later(CallQueue& queue, grpc::Callba
                                                   const char* method, std::function<grpc::Status()> work) {
   auto* reactor = context->DefaultReactor();
   const auto answer = [reactor, method, peer = PeerOf(*context), work = std::move(work)] {
-    const grpc::Status done = work();
+    const grpc::Status done = Guarded(work);
     if (!done.ok()) SPDLOG_INFO("{}: {} refused: {}", peer, method, done.error_message());
     reactor->Finish(done);
   };

@@ -125,6 +125,29 @@ TEST(Calibration, FilesKeepTheRig) {
   EXPECT_FALSE(SaveCalibration("/nowhere/at/all.yaml", "barrel", summary).ok());
 }
 
+TEST(Calibration, AFileThatNobodyWaitsForAnyMoreIsNotReplaced) {
+  CalibrationSummary summary;
+  summary.rig = LoadLinkModel("barrel")->nominal_rig;
+  const TemporaryFolder folder;
+  const std::string path = folder / "calibration.yaml";
+  std::ofstream(path) << "as it was\n";
+  bool was_asked_early = false;
+  const auto may_replace = [&] {
+    const auto entries = std::filesystem::directory_iterator(folder.path());
+    was_asked_early = std::distance(begin(entries), end(entries)) != 2;  // the file, and the new one
+    return false;
+  };
+  const auto saved = SaveCalibration(path, "barrel", summary, may_replace);
+  ASSERT_FALSE(saved.ok());
+  EXPECT_EQ(saved.error().code, ErrorCode::kUnavailable);
+  EXPECT_FALSE(was_asked_early);
+  std::string line;
+  std::getline(std::ifstream(path), line);
+  EXPECT_EQ(line, "as it was");
+  const auto entries = std::filesystem::directory_iterator(folder.path());
+  EXPECT_EQ(std::distance(begin(entries), end(entries)), 1) << "nothing else is left";
+}
+
 TEST(Calibration, FilesKeepTheLensAndItsDeviations) {
   const LinkModel model = LoadLinkModel("barrel").value();
   CalibrationSummary summary;

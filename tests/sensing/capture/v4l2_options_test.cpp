@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "sensing/capture/v4l2_device.h"
 #include "sensing/capture/v4l2_source.h"
 #include "tests/sensing/capture/pictures.h"
 
@@ -31,6 +32,15 @@ TEST(V4l2Options, WhatIsNoCameraIsSaid) {
     EXPECT_EQ(StartError(options).code, ErrorCode::kInvalidArgument);
     EXPECT_THAT(StartError(options).message, AllOf(HasSubstr(path), HasSubstr("not a camera")));
   }
+}
+
+// /dev/null stands for a camera that answered too late: that it is none would be the next step's finding.
+TEST(V4l2Options, ACameraThatNobodyWaitsForAnyMoreIsNotTouched) {
+  int asked = 0;
+  V4l2DeviceOptions options{.path = "/dev/null"};
+  options.is_wanted = [&asked] { return ++asked > 1; };
+  EXPECT_THAT(V4l2Device::Open(options).error().message, HasSubstr("nobody waited"));
+  EXPECT_THAT(V4l2Device::Open(options).error().message, HasSubstr("not a camera"));
 }
 
 TEST(V4l2Options, ImpossibleOptionsAreNamed) {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "sensing/core/thread_start.h"
 #include "server/link/watchdog.h"
 #include "tests/server/gate.h"
 #include "tests/server/support.h"
@@ -15,6 +16,7 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using State = Supervision::State;
 
@@ -34,7 +36,8 @@ class LinkSupervisorTest : public ::testing::Test {
  protected:
   void TearDown() override {
     link_.reset();
-    Until([this] { return *living_ == 0; });  // also threads that were given up use what is here
+    // Also threads that were given up use what is here.
+    Until([this] { return *living_ == 0 && script_->living == 0; });
   }
 
   // The clock is faster than threads that are about to end: only who wants it sees them given up.
@@ -317,6 +320,90 @@ TEST_F(LinkSupervisorTest, AHungThreadIsGivenUpAndItsLateReturnIsIgnored) {
   EXPECT_EQ(NextFrame()->state().sequence, 3u) << "and not 1";
 }
 
+// The rest frame hangs; when it returns, the calibration is complete and would be saved.
+TEST_F(LinkSupervisorTest, ACalibrationOfAWorkerThatWasGivenUpWritesNoFileAndSaysNothingMore) {
+  Gate gate;
+  Run(
+      [&](const StereoFrame& frame, LinkState& state) {
+        if (frame.sequence == 2) gate.Pass();
+        Measure(frame, state);
+      },
+      {});
+  const int saves_before = FakeProcessor::saves;
+  std::atomic<int> calls = 0;
+  std::atomic<bool> failed = false;
+  const auto observer = [&](const CalibrationProgress& progress) {
+    if (progress.end) failed = !progress.end->ok();
+    ++calls;
+    return true;
+  };
+  ASSERT_TRUE(link_->Calibrate({.pairs = 2, .save = true}, observer).ok());
+  script_->Push(1);
+  Until([&] { return calls == 1; });
+  script_->Push(2);
+  gate.WaitForArrival();
+  hung_ = Hung::kFem;
+  Pass(seconds(31));
+  hung_ = Hung::kNone;
+  EXPECT_EQ(calls, 2);
+  EXPECT_TRUE(failed);
+  UntilRestarted(1);
+  gate.Open();
+  Until([this] { return *living_ == 1; });  // it came back and ended
+  EXPECT_EQ(FakeProcessor::saves, saves_before);
+  EXPECT_EQ(calls, 2);
+}
+
+TEST_F(LinkSupervisorTest, ACalibrationWithSavesOneFile) {
+  Run(Measure);
+  const int saves_before = FakeProcessor::saves;
+  std::atomic<bool> ended = false;
+  ASSERT_TRUE(link_
+                  ->Calibrate({.pairs = 1, .save = true},
+                              [&](const CalibrationProgress& progress) {
+                                ended = progress.end && progress.end->ok();
+                                return true;
+                              })
+                  .ok());
+  script_->Push(1);
+  Until([&] { return ended.load(); });
+  EXPECT_EQ(FakeProcessor::saves, saves_before + 1);
+}
+
+// The first camera hangs while it is set; when it returns, the second one is the next worker's.
+TEST_F(LinkSupervisorTest, AWorkerThatWasGivenUpSetsNoOtherCameraAndNothingIsRemembered) {
+  Gate gate;
+  Run(Measure, {});
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);
+  std::atomic<int> set_top = 0, set_bottom = 0, refused = 0;
+  script_->OnSetCamera([&](CameraId id) {
+    ++(id == CameraId::kTop ? set_top : set_bottom);
+    gate.Pass();
+  });
+  ASSERT_TRUE(link_
+                  ->SetCamera({.cameras = {true, true}, .settings = {.gain = 5}},
+                              [&](const Result<void>& done) { refused += done ? 100 : 1; })
+                  .ok());
+  gate.WaitForArrival();
+  hung_ = Hung::kCapture;
+  Pass(seconds(31));
+  hung_ = Hung::kNone;
+  EXPECT_EQ(refused, 1);
+  UntilRestarted(1);
+  gate.Open();
+  Until([this] { return script_->living == 1 && *living_ == 1; });
+  EXPECT_EQ(set_top, 1);
+  EXPECT_EQ(set_bottom, 0);
+  EXPECT_EQ(refused, 1);
+  script_->OnSetCamera({});
+  link_->Restart();
+  UntilRestarted(2);
+  const auto remembered = script_->remembered();
+  EXPECT_EQ(remembered.size(), 4u);
+  for (const auto& [camera, settings] : remembered) EXPECT_EQ(settings.gain, std::nullopt);
+}
+
 TEST_F(LinkSupervisorTest, StoppingDoesNotWaitForAHungThread) {
   Gate gate;
   Run([&](const StereoFrame& frame, LinkState& state) {
@@ -380,6 +467,88 @@ TEST_F(LinkSupervisorTest, RestartReplacesAWorkerThatRuns) {
   link_->Wake();
   Pass(seconds(1));
   EXPECT_EQ(link_->supervision().restarts, 1u) << "it did not rest";
+}
+
+// The watchdog goes on while the source of the worker that it replaces does not end: Check returns.
+TEST_F(LinkSupervisorTest, ASourceThatHangsWhileItIsClosedHoldsOnlyItsOwnLinkUp) {
+  Gate gate;
+  Run(Measure);
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);
+  script_->OnClose([&gate] { gate.Pass(); });
+  link_->Restart();
+  link_->Check();
+  gate.WaitForArrival();
+  Pass(seconds(5));
+  EXPECT_EQ(link_->supervision().state, State::kRestarting);
+  EXPECT_EQ(made_, 0) << "a camera is closed before it is opened again";
+  script_->OnClose({});
+  gate.Open();
+  UntilRestarted(1);
+  script_->Push(2);
+  EXPECT_EQ(NextFrame()->state().sequence, 2u);
+  EXPECT_EQ(link_->supervision().abandoned, 0u);
+}
+
+TEST_F(LinkSupervisorTest, ASourceThatNeverClosesIsGivenUp) {
+  Gate gate;
+  Run(Measure, {});
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);
+  script_->OnClose([&gate] { gate.Pass(); });
+  link_->Restart();
+  link_->Check();
+  gate.WaitForArrival();
+  script_->OnClose({});
+  Pass(seconds(31));
+  UntilRestarted(1);
+  EXPECT_EQ(link_->supervision().abandoned, 1u);
+  script_->Push(2);
+  EXPECT_EQ(NextFrame()->state().sequence, 2u);
+  gate.Open();
+  Until([this] { return script_->living == 1; });
+}
+
+TEST_F(LinkSupervisorTest, ARestartForWhichThereIsNoThreadIsTriedAgain) {
+  Run([](const StereoFrame& frame, LinkState& state) {
+    if (frame.sequence == 1) throw 42;
+    Measure(frame, state);
+  });
+  {
+    const ThreadShortage shortage("build:arm");
+    script_->Push(1);
+    Until([&] {
+      Pass(kStep);
+      return link_->supervision().last_failure.find("no thread") != std::string::npos;
+    });
+    EXPECT_EQ(shortage.refused(), 1);
+    EXPECT_THAT(link_->supervision().reason,
+                AllOf(HasSubstr("no thread can be started for build:arm"), HasSubstr("TasksMax")));
+    EXPECT_EQ(made_, 0);
+  }
+  UntilRestarted(1);
+  script_->Push(2);
+  EXPECT_EQ(NextFrame()->state().sequence, 2u);
+  Until([] { return DetachedThreads() == 0; });
+}
+
+TEST_F(LinkSupervisorTest, AWorkerThatGetsNoThreadIsReplaced) {
+  Run(Measure);
+  script_->Push(1);
+  ASSERT_NE(NextFrame(), nullptr);
+  {
+    const ThreadShortage shortage("cap:arm");
+    link_->Restart();
+    Until([&] {
+      Pass(kStep);
+      return link_->supervision().last_failure.find("no thread") != std::string::npos;
+    });
+    EXPECT_EQ(shortage.refused(), 1);
+  }
+  UntilRestarted(2);
+  script_->Push(2);
+  EXPECT_EQ(NextFrame()->state().sequence, 2u);
+  Until([this] { return *living_ == 1 && script_->living == 1; });
 }
 
 TEST_F(LinkSupervisorTest, WhatCamerasWereSetToOutlivesTheirWorker) {

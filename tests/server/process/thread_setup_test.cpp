@@ -5,7 +5,7 @@
 #include <pthread.h>
 #include <sched.h>
 
-#include <array>
+#include <string>
 #include <thread>
 
 #include "tests/support/log_capture.h"
@@ -16,19 +16,15 @@ namespace {
 using ::testing::HasSubstr;
 
 struct Seen {
-  std::string name;
   int policy = -1;
   int priority = -1;
   cpu_set_t cpus;
 };
 
-Seen Try(const std::string& name, const RealtimeOptions& options) {
+Seen Try(const RealtimeOptions& options) {
   Seen seen;
   std::thread([&] {
-    SetUpThread(name, options);
-    std::array<char, 16> text{};
-    pthread_getname_np(pthread_self(), text.data(), text.size());
-    seen.name = text.data();
+    SetUpThread(options);
     sched_param param{};
     pthread_getschedparam(pthread_self(), &seen.policy, &param);
     seen.priority = param.sched_priority;
@@ -37,24 +33,19 @@ Seen Try(const std::string& name, const RealtimeOptions& options) {
   return seen;
 }
 
-TEST(ThreadSetup, NamesAreCutToWhatTheSystemKeeps) {
-  EXPECT_EQ(Try("fem:upper", {}).name, "fem:upper");
-  EXPECT_EQ(Try("cap:a-link-with-a-long-name", {}).name, "cap:a-link-with");
-}
-
 TEST(ThreadSetup, AThreadRunsWhereItIsTold) {
   cpu_set_t mine;
   pthread_getaffinity_np(pthread_self(), sizeof(mine), &mine);
   int cpu = 0;
   while (!CPU_ISSET(static_cast<size_t>(cpu), &mine)) ++cpu;
-  const Seen seen = Try("x", {.cpus = {cpu}});
+  const Seen seen = Try({.cpus = {cpu}});
   EXPECT_EQ(CPU_COUNT(&seen.cpus), 1);
   EXPECT_TRUE(CPU_ISSET(static_cast<size_t>(cpu), &seen.cpus));
 }
 
 TEST(ThreadSetup, CpusThatAreNotThereAreRefusedKindly) {
   const LogCapture log;
-  const Seen seen = Try("x", {.cpus = {CPU_SETSIZE - 1}});
+  const Seen seen = Try({.cpus = {CPU_SETSIZE - 1}});
   EXPECT_GE(CPU_COUNT(&seen.cpus), 1);
   EXPECT_THAT(log.text(), HasSubstr(std::to_string(CPU_SETSIZE - 1)));
 }
@@ -62,7 +53,7 @@ TEST(ThreadSetup, CpusThatAreNotThereAreRefusedKindly) {
 // With the right the priority is there; without it a warning says what to grant.
 TEST(ThreadSetup, PriorityIsGivenOrTheMissingRightNamed) {
   const LogCapture log;
-  const Seen seen = Try("x", {.priority = 1});
+  const Seen seen = Try({.priority = 1});
   if (seen.policy == SCHED_FIFO) {
     EXPECT_EQ(seen.priority, 1);
     EXPECT_THAT(log.text(), ::testing::IsEmpty());
