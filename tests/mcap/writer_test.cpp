@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -284,7 +285,25 @@ TEST_F(McapFile, ErrorsNameThePathAndWhatToDo) {
   EXPECT_THAT(again.error().message, ::testing::HasSubstr(path));
   EXPECT_EQ(FileSink::Create(folder_ / "none" / "log").error().code, ErrorCode::kNotFound);
   EXPECT_EQ(FileSource::Open(folder_ / "none").error().code, ErrorCode::kNotFound);
-  EXPECT_FALSE(FileSource::Open(folder_).ok());
+}
+
+// Each but the first would keep the reader waiting, or can't be read at a place.
+TEST_F(McapFile, WhatIsNoRegularFileIsSaidToBe) {
+  const std::string pipe = folder_ / "pipe", socket = folder_ / "socket";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  ASSERT_EQ(mknod(socket.c_str(), S_IFSOCK | 0600, 0), 0);
+  const std::pair<std::string, const char*> cases[] = {
+      {folder_, "a folder; name a log in it"},
+      {pipe, "a pipe (FIFO); logs are read at random places"},
+      {socket, "a socket"},
+      {"/dev/zero", "a device"}};
+  for (const auto& [path, what] : cases) {
+    const auto source = FileSource::Open(path);
+    ASSERT_FALSE(source.ok()) << path;
+    EXPECT_EQ(source.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(source.error().message,
+                ::testing::AllOf(::testing::HasSubstr(path), ::testing::HasSubstr(what)));
+  }
 }
 
 TEST_F(McapFile, AFullDiskLeavesAReadableFileThatCanGoOn) {
