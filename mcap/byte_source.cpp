@@ -8,6 +8,8 @@
 #include <cerrno>
 #include <system_error>
 
+#include "sensing/core/file_kind.h"
+
 namespace taclink::mcap {
 namespace {
 
@@ -16,6 +18,12 @@ Error FileError(int number, const std::string& doing, const std::string& path) {
   if (number == ENOENT || number == ENOTDIR) return {ErrorCode::kNotFound, what + "; check the name"};
   if (number == EACCES) return {ErrorCode::kPermissionDenied, what + "; make it readable"};
   return {ErrorCode::kUnavailable, what + "; check the disk"};
+}
+
+Error NotRegular(const std::string& path, mode_t mode) {
+  const char* advice =
+      S_ISDIR(mode) ? "name a log in it" : "logs are read at random places: copy it to a regular file first";
+  return {ErrorCode::kInvalidArgument, "can't read '" + path + "': it is " + FileKind(mode) + "; " + advice};
 }
 
 Error PastEnd(uint64_t offset, size_t bytes, uint64_t size) {
@@ -32,13 +40,16 @@ Result<void> MemorySource::Read(uint64_t offset, std::span<std::byte> out) const
 }
 
 Result<std::unique_ptr<FileSource>> FileSource::Open(const std::string& path) {
+  struct stat status{};
+  // Before it is opened: opening acts on some devices, and sockets can't be opened.
+  if (stat(path.c_str(), &status) != 0) return FileError(errno, "can't open", path);
+  if (!S_ISREG(status.st_mode)) return NotRegular(path, status.st_mode);
   const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe does not keep it waiting
   if (file < 0) return FileError(errno, "can't open", path);
-  struct stat status{};
-  const int number = fstat(file, &status) != 0 ? errno : S_ISREG(status.st_mode) ? 0 : EINVAL;
-  if (number != 0) {
+  const int number = fstat(file, &status) != 0 ? errno : 0;
+  if (number != 0 || !S_ISREG(status.st_mode)) {  // replaced meanwhile
     close(file);
-    return FileError(number, "can't read", path);
+    return number != 0 ? FileError(number, "can't read", path) : NotRegular(path, status.st_mode);
   }
   return std::unique_ptr<FileSource>(new FileSource(path, file, static_cast<uint64_t>(status.st_size)));
 }

@@ -33,7 +33,8 @@ class MemorySource : public ByteSource {
 /// A file of the length that it had when it was opened.
 class FileSource : public ByteSource {
  public:
-  /// Errors: kNotFound, kPermissionDenied, kUnavailable.
+  /// Only a regular file; others are not opened. Errors: kNotFound, kPermissionDenied, kInvalidArgument (a
+  /// pipe, a device, a folder), kUnavailable.
   static Result<std::unique_ptr<FileSource>> Open(const std::string& path);
   ~FileSource() override;
   FileSource(const FileSource&) = delete;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "mcap/check.h"
+
 namespace taclink::mcap {
 
 /// Makes a summary and the blocks of what a scan finds.
@@ -88,6 +90,21 @@ class IndexingVisitor : public ScanVisitor {
   Statistics& statistics_;
 };
 
+namespace {
+
+/// Of a log whose summary can't be used, for `why`: what is damaged. Empty: nothing, it only lacks indexes.
+std::string DamageOf(const ByteSource& source, const Limits& limits, const std::string& why) {
+  if (!ReadFooter(source)) return why;  // not closed, or cut off: Check would say no more
+  const auto report = Check(source, limits);
+  if (!report) return report.error().message;
+  if (report->ok()) return {};
+  const auto first = std::ranges::find(report->findings, Severity::kError, &Finding::severity);
+  if (first == report->findings.end()) return why;
+  return At(first->offset, first->what).message;
+}
+
+}  // namespace
+
 Result<std::unique_ptr<Reader>> Reader::Open(std::shared_ptr<const ByteSource> source, Limits limits) {
   std::array<std::byte, kMagic.size()> start{};
   if (source->size() < start.size())
@@ -98,12 +115,14 @@ Result<std::unique_ptr<Reader>> Reader::Open(std::shared_ptr<const ByteSource> s
   }
   std::unique_ptr<Reader> reader(new Reader(std::move(source), limits));
   auto summary = ReadSummary(*reader->source_, limits);
-  reader->summary_problem_ = summary.ok() ? Incomplete(*summary) : summary.error().message;
-  if (reader->summary_problem_.empty()) {
+  const std::string why = summary.ok() ? Incomplete(*summary) : summary.error().message;
+  if (why.empty()) {
     reader->UseSummary(std::move(*summary));
-  } else if (const auto scanned = reader->UseScan(); !scanned) {
-    return scanned.error();
+    return reader;
   }
+  reader->summary_problem_ = DamageOf(*reader->source_, limits, why);
+  if (const auto scanned = reader->UseScan(reader->summary_problem_.empty()); !scanned)
+    return scanned.error();
   return reader;
 }
 
@@ -118,9 +137,9 @@ void Reader::UseSummary(Summary summary) {
   }
 }
 
-Result<void> Reader::UseScan() {
+Result<void> Reader::UseScan(bool is_intact) {
   IndexingVisitor visitor(*this);
-  auto report = Scan(*source_, visitor, {.limits = limits_});
+  auto report = Scan(*source_, visitor, {.limits = limits_, .is_intact = is_intact});
   if (!report) return report.error();
   visitor.Finish();
   scan_ = std::move(*report);

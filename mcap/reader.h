@@ -27,8 +27,9 @@ struct MessageBlock {
 class Reader {
  public:
   /// From the summary, if there is one, and it is intact and complete; otherwise by a scan of all bytes,
-  /// which finds what is intact. Errors: kInvalidArgument (not an MCAP log, or channels that change their
-  /// meaning midway; see Recover), or the source's.
+  /// which finds what is intact. A log without such a summary is damaged only if Check finds an error: the
+  /// specification demands neither summary nor indexes nor chunks. Errors: kInvalidArgument (not an MCAP log,
+  /// or channels that change their meaning midway; see Recover), or the source's.
   static Result<std::unique_ptr<Reader>> Open(std::shared_ptr<const ByteSource> source, Limits limits = {});
 
   const Header& header() const { return summary_.header; }
@@ -43,7 +44,7 @@ class Reader {
 
   /// What the scan found; nullopt: the summary was used.
   const std::optional<ScanReport>& scan() const { return scan_; }
-  /// Why the summary was not used; empty: it was.
+  /// What is damaged, or that the log was not closed; empty: the summary was used, or Check finds no error.
   const std::string& summary_problem() const { return summary_problem_; }
 
   /// The attachment's `data` lie in `buffer`. Errors: kInvalidArgument (damaged, with its offset),
@@ -58,7 +59,7 @@ class Reader {
   Reader(std::shared_ptr<const ByteSource> source, Limits limits)
       : source_(std::move(source)), limits_(limits) {}
 
-  Result<void> UseScan();
+  Result<void> UseScan(bool is_intact);
   void UseSummary(Summary summary);
 
   const std::shared_ptr<const ByteSource> source_;

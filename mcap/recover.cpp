@@ -18,7 +18,7 @@ class CopyingVisitor : public ScanVisitor {
 
   Result<void> OnSchema(const Schema& schema) override {
     if (const auto begun = Begin(); !begun) return begun;
-    return Keep(schema, schemas_, &Writer::AddSchema);
+    return Keep(schema, schemas_, &Writer::KeepSchema, &Writer::AddSchema);
   }
 
   Result<void> OnChannel(const Channel& channel) override {
@@ -29,7 +29,7 @@ class CopyingVisitor : public ScanVisitor {
       if (schema == schemas_.end()) ++channels_without_schema_;
       copy.schema_id = schema == schemas_.end() ? uint16_t{0} : schema->second;
     }
-    return Keep(copy, channels_, &Writer::AddChannel);
+    return Keep(copy, channels_, &Writer::KeepChannel, &Writer::AddChannel);
   }
 
   Result<void> OnMessage(const Message& message, const MessagePlace& /*place*/) override {
@@ -67,16 +67,14 @@ class CopyingVisitor : public ScanVisitor {
     return {};
   }
 
+  /// Under its id, or under another one where the log gives that a second meaning.
   template <typename T>
-  Result<void> Keep(T record, Ids& ids, Result<uint16_t> (Writer::*add)(T)) {
-    const uint16_t id = record.id;
-    auto added = (writer_.get()->*add)(record);
-    if (!added) {
-      record.id = 0;
-      added = (writer_.get()->*add)(record);
-    }
-    if (!added) return added.error();
-    ids[id] = *added;
+  Result<void> Keep(const T& record, Ids& ids, Result<void> (Writer::*keep)(T),
+                    Result<uint16_t> (Writer::*add)(T)) {
+    Result<uint16_t> id = record.id;
+    if (!(writer_.get()->*keep)(record)) id = (writer_.get()->*add)(record);
+    if (!id) return id.error();
+    ids[record.id] = *id;
     return {};
   }
 

@@ -193,9 +193,10 @@ bool IsMessageIndex(Bytes content) {
 Result<void> Scanner::TakeTopMessage(const Place& place, Bytes content) {
   if (!place.length_is_right()) return At(place.offset, "a damaged Message");
   if (data_ended_) return At(place.offset, "a message in the summary");
-  if (has_chunks_ && IsMessageIndex(content)) return At(place.offset, "a damaged MessageIndex");
+  const bool in_doubt = (place.doubtful || has_chunks_) && !options_.is_intact;
+  if (has_chunks_ && in_doubt && IsMessageIndex(content)) return At(place.offset, "a damaged MessageIndex");
   // In a log with chunks hardly a message lies outside, but one wrong bit makes one of other records.
-  if ((place.doubtful || has_chunks_) && !options_.keep_unverified) {
+  if (in_doubt && !options_.keep_unverified) {
     ++report_.dropped;
     return At(place.offset, "a message outside of chunks: what is left of one, or no message");
   }

@@ -43,6 +43,8 @@ struct ScanOptions {
   /// Also what lies in a damaged chunk and still parses. Off: it is dropped and counted, for its bytes may be
   /// wrong.
   bool keep_unverified = false;
+  /// Check finds no error in the log: messages outside of its chunks are no remains of damaged ones.
+  bool is_intact = false;
 };
 
 struct LostRange {

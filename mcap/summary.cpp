@@ -136,11 +136,32 @@ Result<Summary> FindMovedSummary(const ByteSource& source) {
   return Error{ErrorCode::kNotFound, "no summary is where the log's end has its checksum of"};
 }
 
+namespace {
+
+/// Messages that the chunks' message indexes name, from their sizes: 16 bytes a message, after the record's
+/// header, the channel and the length of the list. Nullopt: a chunk has no message indexes.
+std::optional<uint64_t> IndexedMessages(const std::vector<ChunkIndex>& chunks) {
+  constexpr uint64_t kMessageBytes = 16;
+  constexpr uint64_t kIndexBytes = kRecordHeaderBytes + sizeof(uint16_t) + sizeof(uint32_t);
+  uint64_t messages = 0;
+  for (const ChunkIndex& chunk : chunks) {
+    const uint64_t around = chunk.message_index_offsets.size() * kIndexBytes;
+    if (chunk.message_index_length <= around) return std::nullopt;
+    messages += (chunk.message_index_length - around) / kMessageBytes;
+  }
+  return messages;
+}
+
+}  // namespace
+
 std::string Incomplete(const Summary& summary) {
   if (!summary.statistics) return "the summary has no statistics";
   const Statistics& statistics = *summary.statistics;
   if (statistics.chunk_count != summary.chunk_indexes.size()) return "the summary lacks chunk indexes";
-  if (statistics.chunk_count == 0 && statistics.message_count != 0) return "messages are not in chunks";
+  if (IndexedMessages(summary.chunk_indexes).value_or(UINT64_MAX) < statistics.message_count)
+    return "the summary's indexes lack messages, as of those that are not in chunks";
+  if (statistics.channel_message_counts.empty() && statistics.message_count != 0)
+    return "the statistics lack the numbers of messages by channel";
   if (statistics.attachment_count != summary.attachment_indexes.size())
     return "the summary lacks attachment indexes";
   if (statistics.metadata_count != summary.metadata_indexes.size())

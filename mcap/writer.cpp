@@ -11,22 +11,25 @@ namespace {
 
 template <typename T>
 Result<uint16_t> AddTo(std::map<uint16_t, T>& all, T record, const char* what) {
-  if (record.id == 0) {
-    uint32_t next = all.empty() ? 1 : uint32_t{all.rbegin()->first} + 1;
-    if (next > UINT16_MAX) {
-      for (next = 1; next <= UINT16_MAX && all.contains(static_cast<uint16_t>(next));) ++next;
-    }
-    if (next > UINT16_MAX) {
-      return Error{ErrorCode::kResourceExhausted, std::string("a log has no more than 65535 ") + what + "s"};
-    }
-    record.id = static_cast<uint16_t>(next);
+  uint32_t next = all.empty() ? 1 : uint32_t{all.rbegin()->first} + 1;
+  if (next > UINT16_MAX) {
+    for (next = 1; next <= UINT16_MAX && all.contains(static_cast<uint16_t>(next));) ++next;
   }
-  const auto [found, added] = all.try_emplace(record.id, record);
-  if (!added && !(found->second == record)) {
-    return Error{ErrorCode::kInvalidArgument, std::string(what) + " " + std::to_string(record.id) +
-                                                  " is there already and is another one"};
+  if (next > UINT16_MAX) {
+    return Error{ErrorCode::kResourceExhausted,
+                 std::string("no ") + what + " id from 1 to 65535 is free; write several logs"};
   }
-  return record.id;
+  record.id = static_cast<uint16_t>(next);
+  return all.emplace(record.id, std::move(record)).first->first;
+}
+
+template <typename T>
+Result<void> KeepIn(std::map<uint16_t, T>& all, T record, const char* what) {
+  const uint16_t id = record.id;
+  const auto [found, added] = all.try_emplace(id, record);
+  if (added || found->second == record) return {};
+  return Error{ErrorCode::kInvalidArgument,
+               std::string(what) + " " + std::to_string(id) + " is there already and is another one"};
 }
 
 }  // namespace
@@ -62,11 +65,28 @@ Result<uint16_t> Writer::AddSchema(Schema schema) {
 }
 
 Result<uint16_t> Writer::AddChannel(Channel channel) {
-  if (channel.schema_id != 0 && !schemas_.contains(channel.schema_id)) {
-    return Error{ErrorCode::kInvalidArgument, "channel '" + channel.topic + "' names schema " +
-                                                  std::to_string(channel.schema_id) + ", which is not there"};
-  }
+  if (const auto known = CheckSchemaOf(channel); !known) return known.error();
   return AddTo(channels_, std::move(channel), "channel");
+}
+
+Result<void> Writer::KeepSchema(Schema schema) {
+  if (schema.id == 0) {
+    return Error{
+        ErrorCode::kInvalidArgument,
+        "schema '" + schema.name + "' has the id 0, which means no schema; let the writer choose one"};
+  }
+  return KeepIn(schemas_, std::move(schema), "schema");
+}
+
+Result<void> Writer::KeepChannel(Channel channel) {
+  if (const auto known = CheckSchemaOf(channel); !known) return known;
+  return KeepIn(channels_, std::move(channel), "channel");
+}
+
+Result<void> Writer::CheckSchemaOf(const Channel& channel) const {
+  if (channel.schema_id == 0 || schemas_.contains(channel.schema_id)) return {};
+  return Error{ErrorCode::kInvalidArgument, "channel '" + channel.topic + "' names schema " +
+                                                std::to_string(channel.schema_id) + ", which is not there"};
 }
 
 Result<void> Writer::CheckOpen() const {

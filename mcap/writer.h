@@ -31,11 +31,16 @@ class Writer {
   /// Writes the header; `sink` is empty and outlives the writer. Errors: kInvalidArgument, or the sink's.
   static Result<std::unique_ptr<Writer>> Create(ByteSink& sink, WriterOptions options = {});
 
-  /// Returns the id. An id of 0 is replaced by the next free one; any other must be free, or its owner the
-  /// same. They are written with the first message that needs them, or by Close.
-  /// Errors: kInvalidArgument (id in use, no such schema), kResourceExhausted (no id is free).
+  /// Returns the id: the next free one from 1 on; the record's own is ignored. They are written with the
+  /// first message that needs them, or by Close. Errors: kInvalidArgument (no such schema),
+  /// kResourceExhausted (no id is free).
   Result<uint16_t> AddSchema(Schema schema);
   Result<uint16_t> AddChannel(Channel channel);
+  /// The same with the id that the record has, as copies of logs need it: it is free, or in use by the same
+  /// record. A channel may have the id 0; of schemas, 0 means none. Errors: kInvalidArgument (in use by
+  /// another one, a schema 0, no such schema).
+  Result<void> KeepSchema(Schema schema);
+  Result<void> KeepChannel(Channel channel);
 
   /// Errors: kInvalidArgument (unknown channel, larger than half of kMaxChunkBytes; nothing is lost), or the
   /// sink's, when the chunk is full; then this message is lost with it.
@@ -67,6 +72,7 @@ class Writer {
   Writer(ByteSink& sink, WriterOptions options);
 
   Result<void> CheckOpen() const;
+  Result<void> CheckSchemaOf(const Channel& channel) const;
   void Declare(const Channel& channel);
   Result<void> Hand(std::span<const Bytes> pieces);
   Result<void> EndChunk();

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "sensing/core/file_kind.h"
+
 namespace taclink {
 
 Error FileError(const std::string& path, int number) {
@@ -58,24 +60,21 @@ Error TooLarge(const std::string& path, uint64_t most_bytes) {
                                            " MiB, the most that is read of such a file"};
 }
 
-const char* KindOf(mode_t mode) {
-  if (S_ISDIR(mode)) return "a folder";
-  if (S_ISFIFO(mode)) return "a pipe";
-  return "a device";
+Error NotRegular(const std::string& path, mode_t mode) {
+  const char* advice = S_ISDIR(mode) ? "name a file in it" : "copy its content to one";
+  return {ErrorCode::kInvalidArgument,
+          path + ": is " + FileKind(mode) + ", and must be a regular file; " + advice};
 }
-
-}  // namespace
-
-namespace {
 
 // `most_size`: of the file, whatever is read of it.
 Result<std::string> Read(const std::string& path, size_t bytes, uint64_t most_size) {
-  const OpenFile file(path);
   struct stat status{};
+  // Before it is opened: opening acts on some devices, and sockets can't be opened.
+  if (::stat(path.c_str(), &status) != 0) return FileError(path, errno);
+  if (!S_ISREG(status.st_mode)) return NotRegular(path, status.st_mode);
+  const OpenFile file(path);
   if (file.number() < 0 || ::fstat(file.number(), &status) != 0) return FileError(path, errno);
-  if (!S_ISREG(status.st_mode))
-    return Error{ErrorCode::kInvalidArgument,
-                 path + ": is " + KindOf(status.st_mode) + ", and must be a regular file"};
+  if (!S_ISREG(status.st_mode)) return NotRegular(path, status.st_mode);  // replaced meanwhile
   if (static_cast<uint64_t>(status.st_size) > most_size) return TooLarge(path, most_size);
   std::string out;
   constexpr size_t kBlock = size_t{1} << 16;

@@ -14,6 +14,7 @@
 namespace taclink {
 namespace {
 
+constexpr int kMostDepth = 100;        // of lists and mappings
 constexpr size_t kMostProblems = 100;  // a file of another kind would fill the screen
 
 // Lines count from 1; nodes that are not from the file have none.
@@ -53,7 +54,8 @@ double Within(Range range, double value) {
   return std::isfinite(value) ? std::clamp(value, range.min, range.max) : 0;
 }
 
-// Of a stream, without making nodes of them.
+// Of a stream, without making nodes of them. The parser recurses into what is nested, and so does what works
+// on its nodes: it is stopped here, before there are any.
 class DocumentCounter final : public YAML::EventHandler {
  public:
   int count() const { return count_; }
@@ -64,14 +66,24 @@ class DocumentCounter final : public YAML::EventHandler {
   void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
   void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
   void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
-  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
-                       YAML::EmitterStyle::value) override {}
-  void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    Enter(mark);
   }
-  void OnMapEnd() override {}
+  void OnSequenceEnd() override { --depth_; }
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    Enter(mark);
+  }
+  void OnMapEnd() override { --depth_; }
+  void Enter(const YAML::Mark& mark) {
+    if (++depth_ > kMostDepth)
+      throw YAML::ParserException(mark, "lists and mappings are nested to a depth of more than " +
+                                            std::to_string(kMostDepth) + ", the most that is read");
+  }
 
   int count_ = 0;
+  int depth_ = 0;
 };
 
 int CountDocuments(std::string_view content) {
@@ -365,6 +377,10 @@ Result<YamlFile> YamlFile::Load(const std::string& path) {
 
 Result<YamlFile> YamlFile::Parse(const std::string& name, std::string_view content) {
   try {
+    if (content.size() > kMostTextBytes)
+      return Error{ErrorCode::kInvalidArgument, name + ": has " + std::to_string(content.size()) +
+                                                    " bytes; at most " + std::to_string(kMostTextBytes) +
+                                                    " are read"};
     if (CountDocuments(content) > 1)
       return Error{ErrorCode::kInvalidArgument, name + ": holds more than one document, separated by '---'"};
     const YAML::Node node = YAML::Load(std::string(content));

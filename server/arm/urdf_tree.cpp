@@ -3,15 +3,22 @@
 #include <console_bridge/console.h>
 #include <urdf_parser/urdf_parser.h>
 
+#include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <string_view>
+
+#include "sensing/core/read_file.h"
+#include "server/arm/xml_tags.h"
 
 namespace taclink::server {
 namespace {
 
 constexpr double kMmPerMetre = 1e3;
 constexpr size_t kMaxVisuals = 1000;
-constexpr size_t kMaxLinks = 1000;  // every frame keeps its own chain of joints
+constexpr size_t kMaxLinks = 1000;        // every frame keeps its own chain of joints
+constexpr size_t kMaxElements = 100'000;  // of which the parser makes objects, a hundred times their text
+constexpr size_t kMaxDepth = 100;         // of elements
 
 /// Keeps urdfdom's complaints, which it has only for the console.
 class Complaints final : public console_bridge::OutputHandler {
@@ -59,7 +66,6 @@ class Reader {
   std::string Read(UrdfTree& out) {
     out.root = model_.getRoot()->name;
     out.tree = KDL::Tree(out.root);
-    if (model_.links_.size() > kMaxLinks) return "more than " + std::to_string(kMaxLinks) + " links";
     ReadLink(*model_.getRoot(), out);
     if (trouble_.empty() && out.frames.size() != model_.links_.size())
       trouble_ = "some links hang on no joint that leads to the root link '" + out.root + "'";
@@ -188,6 +194,33 @@ class Reader {
   std::string trouble_;
 };
 
+std::string Exceeds(size_t found, const std::string& what, size_t most) {
+  return "it has " + std::to_string(found) + " " + what + "; at most " + std::to_string(most) + " are read";
+}
+
+/// Why the parser does not get the text; empty: it does. The parser recurses into nested elements, and along
+/// a chain of links when it frees them: both would overflow the stack.
+std::string Refusal(std::string_view xml) {
+  if (xml.size() > kMostTextBytes) return Exceeds(xml.size(), "bytes", kMostTextBytes);
+  size_t depth = 0, deepest = 0, elements = 0, links = 0;
+  XmlTags tags(xml);
+  while (const auto tag = tags.Next()) {
+    if (tag->Uses("xacro:")) return "it holds xacro commands; expand it first: xacro FILE.xacro > FILE.urdf";
+    if (tag->is_end) {
+      depth -= std::min<size_t>(depth, 1);
+      continue;
+    }
+    ++elements;
+    deepest = std::max(deepest, depth + 1);
+    if (depth == 1 && tag->name == "link") ++links;
+    if (!tag->is_empty) ++depth;
+  }
+  if (deepest > kMaxDepth) return Exceeds(deepest, "levels of nested elements", kMaxDepth);
+  if (elements > kMaxElements) return Exceeds(elements, "elements", kMaxElements);
+  if (links > kMaxLinks) return Exceeds(links, "links", kMaxLinks);
+  return {};
+}
+
 }  // namespace
 
 Result<UrdfTree> ReadUrdf(const std::string& name, const std::string& xml) {
@@ -196,8 +229,7 @@ Result<UrdfTree> ReadUrdf(const std::string& name, const std::string& xml) {
   const auto invalid = [&name](const std::string& what) {
     return Error{ErrorCode::kInvalidArgument, name + ": no valid URDF: " + what};
   };
-  if (xml.find("<xacro:") != std::string::npos)
-    return invalid("it holds xacro commands; expand it first: xacro FILE.xacro > FILE.urdf");
+  if (const std::string refusal = Refusal(xml); !refusal.empty()) return invalid(refusal);
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(xml);
   if (!model || !model->getRoot()) return invalid(complaints.First());
   UrdfTree out;

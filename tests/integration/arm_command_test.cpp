@@ -78,6 +78,13 @@ TEST(JointLines, MistakesAreNamedWithTheirLine) {
   EXPECT_THAT(Complaint({"{\"a\": 1}"}), HasSubstr("\"positions\""));
   EXPECT_THAT(Complaint({"{"}), HasSubstr("no JSON object"));
   EXPECT_THAT(Complaint({R"({"positions": ["x"]})"}), HasSubstr("must be"));
+  const auto nested = [](size_t depth) {
+    return R"({"positions": {"a": 1}, "b": )" + std::string(depth, '[') + std::string(depth, ']') + "}";
+  };
+  JointLineReader reader;
+  EXPECT_TRUE(reader.Read(nested(99)).ok());
+  EXPECT_THAT(Complaint({nested(100)}), HasSubstr("a depth of 101; at most 100"));
+  EXPECT_THAT(Complaint({nested(500'000)}), HasSubstr("a depth of 500001; at most 100"));
 }
 
 v1::StreamContactsResponse MakeArm() {

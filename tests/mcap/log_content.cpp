@@ -1,6 +1,9 @@
 #include "tests/mcap/log_content.h"
 
 #include <random>
+#include <ranges>
+
+#include "mcap/summary_writer.h"
 
 namespace taclink::mcap::testing {
 namespace {
@@ -185,6 +188,41 @@ Buffer SmallLog(Compression compression) {
       {.channel_id = one, .sequence = 2, .log_time_ns = 4, .publish_time_ns = 2, .data = AsBytes("z")});
   (void)writer->Close();
   return sink.bytes();
+}
+
+Buffer AsOthersWrite(Bytes log, ForeignForm form) {
+  const auto reader = std::move(*Reader::Open(std::make_shared<MemorySource>(log)));
+  const bool no_summary = form == ForeignForm::kNoSummary || form == ForeignForm::kNoChunksNoSummary;
+  size_t kept = reader->chunk_indexes().size();
+  if (form == ForeignForm::kNoChunks || form == ForeignForm::kNoChunksNoSummary) kept = 0;
+  if (form == ForeignForm::kLastChunkInPieces) --kept;
+  Buffer out(kMagic.begin(), kMagic.end()), loaded;
+  size_t chunks = 0;
+  for (Bytes rest = log.subspan(kMagic.size());;) {
+    const Bytes before = rest;
+    const RawRecord record = *TakeRecord(rest);
+    if (record.opcode == Opcode::kDataEnd) break;
+    if (record.opcode == Opcode::kChunk) ++chunks;
+    if (record.opcode == Opcode::kMessageIndex && chunks > kept) continue;
+    if (record.opcode == Opcode::kChunk && chunks > kept) {
+      AppendBytes(*LoadChunk(*Decode<Chunk>(record.content), {}, loaded), out);
+    } else {
+      AppendBytes(before.first(before.size() - rest.size()), out);
+    }
+  }
+  Append(DataEnd{}, out);
+  SummaryWriter summary(0, true, out);
+  if (!no_summary) {
+    Statistics statistics = reader->statistics();
+    statistics.chunk_count = static_cast<uint32_t>(kept);
+    summary.Add(Opcode::kSchema, reader->schemas() | std::views::values);
+    summary.Add(Opcode::kChannel, reader->channels() | std::views::values);
+    if (form != ForeignForm::kNoStatistics) summary.Add(Opcode::kStatistics, std::span(&statistics, 1));
+    if (form != ForeignForm::kNoChunkIndexes)
+      summary.Add(Opcode::kChunkIndex, std::span(reader->chunk_indexes()).first(kept));
+  }
+  summary.Finish();
+  return out;
 }
 
 LogContent ReadAll(Bytes bytes, std::string* error, MessageOrder order) {

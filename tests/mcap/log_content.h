@@ -57,6 +57,21 @@ Buffer RandomLogBytes(const RandomLog& log, LogContent* content = nullptr);
 /// A log of a few hundred bytes that holds every type of record.
 Buffer SmallLog(Compression compression = Compression::kNone);
 
+/// What the specification leaves open, and other writers leave out.
+enum class ForeignForm {
+  kNoSummary,
+  kNoStatistics,
+  kNoChunkIndexes,
+  kNoChunks,  ///< their messages stand in the data section; with statistics
+  kNoChunksNoSummary,
+  kLastChunkInPieces,  ///< only the last chunk's messages stand in the data section
+};
+inline constexpr ForeignForm kForeignForms[] = {
+    ForeignForm::kNoSummary, ForeignForm::kNoStatistics,      ForeignForm::kNoChunkIndexes,
+    ForeignForm::kNoChunks,  ForeignForm::kNoChunksNoSummary, ForeignForm::kLastChunkInPieces};
+/// The content of a log that is whole in that form.
+Buffer AsOthersWrite(Bytes log, ForeignForm form);
+
 /// Everything in a log, as a reader finds it. Empty with `*error` set at the first error.
 LogContent ReadAll(Bytes bytes, std::string* error, MessageOrder order = MessageOrder::kFile);
 

@@ -5,13 +5,20 @@
 
 #include <algorithm>
 #include <atomic>
+#include <ranges>
 
+#include "mcap/summary_writer.h"
 #include "tests/mcap/log_content.h"
 
 namespace taclink::mcap {
 namespace {
 
+using ::testing::AllOf;
+using testing::AsOthersWrite;
+using testing::FindingsOf;
+using testing::ForeignForm;
 using ::testing::HasSubstr;
+using testing::kForeignForms;
 using testing::LogContent;
 using testing::RandomLogBytes;
 using testing::ReadAll;
@@ -180,6 +187,73 @@ TEST(McapReader, ReadsMessagesOutsideOfChunks) {
   EXPECT_EQ(reader->metadata().size(), 1U);
   EXPECT_EQ(reader->schemas().at(1).data, "d");
   EXPECT_TRUE(Check(MemorySource(bytes))->ok());
+  EXPECT_EQ(reader->summary_problem(), "");
+}
+
+TEST(McapReader, WhatCheckCallsGoodIsReadWholeWhateverItLacks) {
+  LogContent written;
+  const Buffer own = RandomLogBytes(
+      {.seed = 11, .options = {.compression = Compression::kZstd, .chunk_bytes = 8000}}, &written);
+  for (const ForeignForm form : kForeignForms) {
+    const Buffer bytes = AsOthersWrite(own, form);
+    const CheckReport check = *Check(MemorySource(bytes));
+    EXPECT_TRUE(check.ok()) << FindingsOf(check);
+    EXPECT_EQ(Open(bytes)->summary_problem(), "") << static_cast<int>(form);
+    std::string error;
+    EXPECT_EQ(ReadAll(bytes, &error), written) << static_cast<int>(form) << error;
+  }
+}
+
+TEST(McapReader, WhatLacksIndexesAndIsDamagedSaysWhatIs) {
+  const Buffer own = ChunksOf({{1, 2}, {3, 4}, {5, 6}});
+  const ChunkIndex hit = Open(own)->chunk_indexes()[1];
+  for (const ForeignForm form : {ForeignForm::kNoSummary, ForeignForm::kNoStatistics}) {
+    Buffer bytes = AsOthersWrite(own, form);
+    bytes[hit.chunk_start + hit.chunk_length - 1] ^= std::byte{1};
+    const auto reader = Open(bytes);
+    EXPECT_THAT(reader->summary_problem(),
+                AllOf(HasSubstr("offset " + std::to_string(hit.chunk_start)), HasSubstr("CRC")));
+    EXPECT_EQ(Sequences(*reader, {}), (Numbers{1, 2, 5, 6}));
+  }
+}
+
+// Its sequence and size make its content that of a message index, as a wrong bit in such a record's type
+// would.
+TEST(McapReader, AMessageBesideChunksIsReadEvenIfItLooksLikeAnIndex) {
+  BufferSink sink;
+  const auto writer = std::move(*Writer::Create(sink));
+  const uint16_t id = *writer->AddChannel({.topic = "a"});
+  for (const uint32_t sequence : {31, 32}) {
+    ASSERT_TRUE(writer
+                    ->Write({.channel_id = id,
+                             .sequence = sequence,
+                             .log_time_ns = sequence,
+                             .data = AsBytes("sixteen bytes is")})
+                    .ok());
+    ASSERT_TRUE(writer->Flush().ok());
+  }
+  ASSERT_TRUE(writer->Close().ok());
+  const Buffer bytes = AsOthersWrite(sink.bytes(), ForeignForm::kLastChunkInPieces);
+  const auto reader = Open(bytes);
+  EXPECT_EQ(Sequences(*reader, {}), (Numbers{31, 32}));
+  EXPECT_EQ(reader->summary_problem(), "");
+}
+
+TEST(McapReader, CountsTheMessagesOfChannelsThatTheStatisticsLeaveOut) {
+  const Buffer own = ChunksOf({{1, 2}, {3}});
+  const auto whole = Open(own);
+  Statistics statistics = whole->statistics();
+  statistics.channel_message_counts.clear();
+  Buffer bytes = AsOthersWrite(own, ForeignForm::kNoSummary);
+  bytes.resize(bytes.size() - kMagic.size() - kFooterBytes - kRecordHeaderBytes);
+  SummaryWriter summary(0, true, bytes);
+  summary.Add(Opcode::kChannel, whole->channels() | std::views::values);
+  summary.Add(Opcode::kStatistics, std::span(&statistics, 1));
+  summary.Add(Opcode::kChunkIndex, whole->chunk_indexes());
+  summary.Finish();
+  const auto reader = Open(bytes);
+  EXPECT_EQ(reader->summary_problem(), "");
+  EXPECT_EQ(reader->statistics().channel_message_counts, whole->statistics().channel_message_counts);
 }
 
 TEST(McapReader, RefusesWhatIsNoLog) {

@@ -3,12 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <csignal>
 #include <filesystem>
 
 #include "mcap/file_sink.h"
+#include "mcap/recover.h"
 #include "tests/mcap/log_content.h"
 
 namespace taclink::mcap {
@@ -87,13 +89,51 @@ TEST(McapWriter, RefusesWhatCantBeWritten) {
   const auto writer = std::move(*Writer::Create(sink));
   EXPECT_EQ(writer->Write({.channel_id = 9}).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(writer->AddChannel({.schema_id = 4}).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_EQ(*writer->AddChannel({.id = 65535, .topic = "a"}), 65535);
-  EXPECT_EQ(*writer->AddChannel({.id = 65535, .topic = "a"}), 65535);
-  EXPECT_FALSE(writer->AddChannel({.id = 65535, .topic = "b"}).ok());
+  EXPECT_EQ(writer->KeepChannel({.schema_id = 4}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(writer->KeepSchema({.id = 0, .name = "s"}).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_TRUE(writer->KeepChannel({.id = 65535, .topic = "a"}).ok());
+  EXPECT_TRUE(writer->KeepChannel({.id = 65535, .topic = "a"}).ok());
+  EXPECT_EQ(writer->KeepChannel({.id = 65535, .topic = "b"}).error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(*writer->AddChannel({.topic = "b"}), 1);
   ASSERT_TRUE(writer->Close().ok());
   EXPECT_EQ(writer->Write({.channel_id = 1}).error().code, ErrorCode::kFailedPrecondition);
   EXPECT_FALSE(Writer::Create(sink).ok()) << "the sink is not empty";
+}
+
+// Only schemas reserve the id 0.
+TEST(McapWriter, AChannelMayHaveTheId0) {
+  BufferSink sink;
+  const auto writer = std::move(*Writer::Create(sink));
+  ASSERT_TRUE(writer->KeepSchema({.id = 1, .name = "s"}).ok());
+  ASSERT_TRUE(writer->KeepChannel({.id = 0, .schema_id = 1, .topic = "zero"}).ok());
+  ASSERT_TRUE(writer->KeepChannel({.id = 1, .schema_id = 1, .topic = "one"}).ok());
+  EXPECT_EQ(*writer->AddChannel({.id = 1, .topic = "new"}), 2) << "its own id is ignored";
+  EXPECT_EQ(*writer->AddSchema({.id = 1, .name = "new"}), 2);
+  for (uint16_t id = 0; id < 2; ++id) {
+    ASSERT_TRUE(writer->Write({.channel_id = id, .log_time_ns = id, .data = AsBytes("data")}).ok());
+  }
+  ASSERT_TRUE(writer->Close().ok());
+  EXPECT_EQ(FindingsOf(Checked(sink.bytes())), "");
+  std::string error;
+  const LogContent content = ReadAll(sink.bytes(), &error);
+  ASSERT_EQ(content.messages.size(), 2U) << error;
+  EXPECT_EQ(content.messages[0].topic, "zero");
+  EXPECT_EQ(content.messages[1].topic, "one");
+}
+
+TEST(McapRecover, KeepsChannel0AndItsNeighbor) {
+  BufferSink sink, recovered;
+  const auto writer = std::move(*Writer::Create(sink));
+  for (uint16_t id = 0; id < 2; ++id) {
+    ASSERT_TRUE(writer->KeepChannel({.id = id, .topic = std::to_string(id)}).ok());
+    ASSERT_TRUE(writer->Write({.channel_id = id, .log_time_ns = id, .data = AsBytes("data")}).ok());
+  }
+  ASSERT_TRUE(writer->Flush().ok());
+  ASSERT_TRUE(Recover(MemorySource(sink.bytes()), recovered).ok());
+  const auto reader = std::move(*Reader::Open(std::make_shared<MemorySource>(recovered.bytes())));
+  ASSERT_EQ(reader->channels().size(), 2U);
+  EXPECT_EQ(reader->channels().at(0).topic, "0");
+  EXPECT_EQ(reader->channels().at(1).topic, "1");
 }
 
 TEST(McapWriter, LargeDataAreNotCopiedAndLetGoWhenWritten) {
@@ -245,7 +285,25 @@ TEST_F(McapFile, ErrorsNameThePathAndWhatToDo) {
   EXPECT_THAT(again.error().message, ::testing::HasSubstr(path));
   EXPECT_EQ(FileSink::Create(folder_ / "none" / "log").error().code, ErrorCode::kNotFound);
   EXPECT_EQ(FileSource::Open(folder_ / "none").error().code, ErrorCode::kNotFound);
-  EXPECT_FALSE(FileSource::Open(folder_).ok());
+}
+
+// Each but the first would keep the reader waiting, or can't be read at a place.
+TEST_F(McapFile, WhatIsNoRegularFileIsSaidToBe) {
+  const std::string pipe = folder_ / "pipe", socket = folder_ / "socket";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  ASSERT_EQ(mknod(socket.c_str(), S_IFSOCK | 0600, 0), 0);
+  const std::pair<std::string, const char*> cases[] = {
+      {folder_, "a folder; name a log in it"},
+      {pipe, "a pipe (FIFO); logs are read at random places"},
+      {socket, "a socket"},
+      {"/dev/zero", "a device"}};
+  for (const auto& [path, what] : cases) {
+    const auto source = FileSource::Open(path);
+    ASSERT_FALSE(source.ok()) << path;
+    EXPECT_EQ(source.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_THAT(source.error().message,
+                ::testing::AllOf(::testing::HasSubstr(path), ::testing::HasSubstr(what)));
+  }
 }
 
 TEST_F(McapFile, AFullDiskLeavesAReadableFileThatCanGoOn) {

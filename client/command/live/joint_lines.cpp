@@ -13,6 +13,7 @@ namespace {
 
 constexpr const char* kTime = "time_s";
 constexpr double kMostTime = 1e9;   // s, some 30 years; nanoseconds of it fit 64 bits
+constexpr int kMostDepth = 100;     // of objects and lists
 constexpr size_t kMostQuoted = 40;  // bytes of a cell in a message
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 
@@ -62,7 +63,18 @@ Result<std::optional<JointLine>> JointLineReader::Read(const std::string& raw) {
 }
 
 Result<std::optional<JointLine>> JointLineReader::ReadJson(const std::string& line) {
-  const Json json = Json::parse(line, nullptr, false);
+  int deepest = 0;
+  // What lies deeper is not made: who works on values recurses into them.
+  const auto limit_depth = [&deepest](int depth, Json::parse_event_t event, const Json&) {
+    const bool begins =
+        event == Json::parse_event_t::object_start || event == Json::parse_event_t::array_start;
+    deepest = std::max(deepest, depth + (begins ? 1 : 0));
+    return deepest <= kMostDepth;
+  };
+  const Json json = Json::parse(line, limit_depth, false);
+  if (deepest > kMostDepth)
+    return Wrong("its JSON is nested to a depth of " + std::to_string(deepest) + "; at most " +
+                 std::to_string(kMostDepth) + " is read");
   if (!json.is_object() || !json.contains("positions")) return Wrong("no JSON object with \"positions\"");
   JointLine out;
   try {

@@ -2,7 +2,6 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>
@@ -14,6 +13,7 @@
 #include "client/command/cli/log_text.h"
 #include "client/command/cli/progress.h"
 #include "client/command/live/connect.h"
+#include "client/command/live/download_target.h"
 #include "client/cpp/taclink/recordings.h"
 #include "sensing/core/printable.h"
 
@@ -163,35 +163,47 @@ Result<void> List(const RecordOptions& options) {
   return {};
 }
 
-// What is there already stays, and the rest is fetched.
+std::string FetchPath(const RecordOptions& options) {
+  const std::string path = options.output.empty() ? options.log : options.output;
+  return path != "-" && std::filesystem::is_directory(path) ? path + "/" + options.log : path;
+}
+
+Error FetchError(Error error, const DownloadTarget& target) {
+  if (error.code == ErrorCode::kUnavailable && target.can_resume())
+    error.message += "; the same command again fetches the rest";
+  return error;
+}
+
+// What a file has already stays, and the rest is fetched.
 Result<void> Download(const RecordOptions& options) {
   auto recordings = Connect(options);
   if (!recordings) return recordings.error();
-  std::string path = options.output.empty() ? options.log : options.output;
-  if (std::filesystem::is_directory(path)) path += "/" + options.log;
-  std::error_code none;
-  const bool is_new = !std::filesystem::exists(path);
-  const uint64_t there = is_new ? 0 : std::filesystem::file_size(path, none);
-  std::ofstream out(path, std::ios::binary | std::ios::app);
-  if (!out) return Error{ErrorCode::kPermissionDenied, path + " cannot be written"};
-  bool written = true;
-  uint64_t end = there;
-  Progress progress(options.log);
-  const auto done =
-      recordings->Download(options.log, there, [&](std::string_view data, uint64_t offset, uint64_t size) {
-        progress.Show(static_cast<double>(end - there) / static_cast<double>(size - there));
-        written = offset == end && out.write(data.data(), static_cast<std::streamsize>(data.size())).good();
-        end += data.size();
-        return written;
-      });
-  out.close();
-  if (is_new && end == 0 && !done) std::filesystem::remove(path, none);
-  if (!written || !out)
-    return Error{ErrorCode::kResourceExhausted, path + " cannot be written; is the disk full?"};
-  if (!done && done.error().code == ErrorCode::kUnavailable)
-    return Error{ErrorCode::kUnavailable, done.error().message + "; the same command again fetches the rest"};
-  if (!done) return done.error();
-  fmt::print("{}: {}{}\n", path, SizeText(end),
+  auto target = DownloadTarget::Open(FetchPath(options));
+  if (!target) return target.error();
+  const uint64_t there = target->there();
+  Result<void> written;
+  const auto done = [&] {
+    Progress progress(options.log);
+    return recordings->Download(
+        options.log, there, [&](std::string_view data, uint64_t offset, uint64_t size) {
+          progress.Show(static_cast<double>(target->size() - there) / static_cast<double>(size - there));
+          if (offset != target->size()) {
+            written = Error{ErrorCode::kInternal,
+                            fmt::format("the server sent byte {} of {} where byte {} comes next", offset,
+                                        options.log, target->size())};
+          } else {
+            written = target->Write(data);
+          }
+          return written.ok();
+        });
+  }();
+  if (!written) return written;
+  if (const auto closed = target->Close(); !closed) return closed;
+  if (!done) {
+    target->RemoveIfNew();
+    return FetchError(done.error(), *target);
+  }
+  fmt::print(target->is_stdout() ? stderr : stdout, "{}: {}{}\n", target->name(), SizeText(target->size()),
              there > 0 ? ", of which " + SizeText(there) + " were there" : "");
   return {};
 }
@@ -236,7 +248,8 @@ void AddRecord(const Arguments& app, Selected& selected) {
     command.AddFlag("--json", options->json, "JSON");
   const Arguments fetch = AddOne(record, "fetch", "Copy a log from the server; goes on where it broke off",
                                  options, selected, Download);
-  fetch.AddOption("-o,--output", options->output, "File or folder (default: its name, here)");
+  fetch.AddOption("-o,--output", options->output,
+                  "File, folder or pipe; - is standard output (default: its name, here)");
   const Arguments remove = AddOne(record, "delete", "Delete a log on the server", options, selected, Delete);
   for (const Arguments& command : {fetch, remove})
     command.AddOption("log", options->log, "Name of the log, as 'list' shows it").Required();

@@ -54,11 +54,11 @@ Result<void> CopyDefinitions(const mcap::Reader& reader, const std::set<uint16_t
     mcap::Channel channel = reader.channels().at(id);
     const auto schema = reader.schemas().find(channel.schema_id);
     if (schema == reader.schemas().end()) {
-      channel.schema_id = 0;  // lost with what is damaged
-    } else if (const auto added = out.AddSchema(schema->second); !added) {
+      channel.schema_id = 0;  // none, or lost with what is damaged
+    } else if (const auto added = out.KeepSchema(schema->second); !added) {
       return added.error();
     }
-    if (const auto added = out.AddChannel(std::move(channel)); !added) return added.error();
+    if (const auto added = out.KeepChannel(std::move(channel)); !added) return added.error();
   }
   return {};
 }

@@ -42,7 +42,6 @@ class Merger {
       const auto schema = SchemaIdOf(reader, channel);
       if (!schema) return schema.error();
       channel.schema_id = *schema;
-      channel.id = 0;
       auto key = std::tuple(channel.topic, channel.schema_id, channel.message_encoding, channel.metadata);
       auto known = channels_.find(key);
       if (known == channels_.end()) {
@@ -88,7 +87,6 @@ class Merger {
     const auto source = reader.schemas().find(channel.schema_id);
     if (source == reader.schemas().end()) return uint16_t{0};  // none, or lost with what is damaged
     mcap::Schema schema = source->second;
-    schema.id = 0;
     auto key = std::tuple(schema.name, schema.encoding, schema.data);
     const auto known = schemas_.find(key);
     if (known != schemas_.end()) return known->second;

@@ -134,7 +134,7 @@ Result<void> LogSource::Report() const {
                                damage_.empty() ? problem : *damage_.begin(), kAdvice));
     }
     fmt::print(stderr, "taclink: {}: not closed, or damaged; what is intact was used; {}\n", file_, kAdvice);
-    if (const auto& scan = reader_->scan())
+    if (const auto& scan = reader_->scan(); scan && !problem.empty())
       fmt::print(stderr, "  {}; found instead: {}\n", problem, scan->Text());
     PrintNotes(damage_);
   }

@@ -130,7 +130,6 @@ Result<uint16_t> SolvedLog::SchemaOf(uint16_t channel, uint16_t old) {
     schema = wire::log::ProtobufSchema(*fresh->second);
   } else if (const auto at = log_.schemas().find(old); at != log_.schemas().end()) {
     schema = at->second;
-    schema.id = 0;
   } else {
     return uint16_t{0};  // none
   }
@@ -144,7 +143,6 @@ Result<uint16_t> SolvedLog::ChannelOf(uint16_t old) {
   mcap::Channel channel = log_.channels().at(old);
   const auto schema = SchemaOf(old, channel.schema_id);
   if (!schema) return schema.error();
-  channel.id = 0;
   channel.schema_id = *schema;
   const auto id = writer_->mcap().AddChannel(std::move(channel));
   if (id) channels_.emplace(old, *id);

@@ -265,8 +265,9 @@ std::string FileText(const std::string& path) {
 
 LogToolTest::LogToolTest() {
   const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-  folder_ = std::filesystem::temp_directory_path() /
-            fmt::format("{}.{}.{}", test->test_suite_name(), test->name(), getpid());
+  std::string name = fmt::format("{}.{}.{}", test->test_suite_name(), test->name(), getpid());
+  std::ranges::replace(name, '/', '_');  // of parameters
+  folder_ = std::filesystem::temp_directory_path() / name;
   std::filesystem::create_directories(folder_);
 }
 

@@ -3,6 +3,8 @@
 
 #include <fstream>
 
+#include "mcap/file_sink.h"
+#include "mcap/writer.h"
 #include "tests/client/command/log_content.h"
 
 namespace taclink::testing {
@@ -107,6 +109,31 @@ TEST_F(LogCutTest, TheHalvesMergeToTheWhole) {
   EXPECT_EQ(OpenLog(out_)->channels().size(), OpenLog(log_)->channels().size());
   EXPECT_EQ(AttachmentsIn(out_), AttachmentsIn(log_));
   EXPECT_EQ(MetadataIn(out_), MetadataIn(log_));
+}
+
+// Of the ids that a log may use, 0 is reserved among schemas only.
+TEST_F(LogCutTest, AChannelOfTheId0KeepsIt) {
+  const std::string zero = Path("zero.mcap");
+  {
+    const auto sink = std::move(*mcap::FileSink::Create(zero));
+    const auto writer = std::move(*mcap::Writer::Create(*sink));
+    ASSERT_TRUE(writer->KeepSchema({.id = 7, .name = "Thing", .encoding = "jsonschema", .data = "{}"}).ok());
+    for (uint16_t id = 0; id < 2; ++id) {
+      const std::string topic = "/thing" + std::to_string(id);
+      ASSERT_TRUE(
+          writer->KeepChannel({.id = id, .schema_id = 7, .topic = topic, .message_encoding = "json"}).ok());
+      ASSERT_TRUE(writer->Write({.channel_id = id, .log_time_ns = id, .data = mcap::AsBytes("{}")}).ok());
+    }
+    ASSERT_TRUE(writer->Close().ok());
+  }
+  LogDoes({"cut", zero, "-o", out_});
+  EXPECT_EQ(MessagesIn(out_), MessagesIn(zero));
+  EXPECT_EQ(OpenLog(out_)->channels(), OpenLog(zero)->channels());
+  EXPECT_EQ(OpenLog(out_)->schemas(), OpenLog(zero)->schemas());
+  EXPECT_TRUE(IsWhole(out_));
+  LogDoes({"merge", zero, zero, "-o", Path("merged.mcap")});
+  EXPECT_EQ(MessagesIn(Path("merged.mcap")).size(), 4u);
+  EXPECT_EQ(OpenLog(Path("merged.mcap"))->channels().size(), 2u);
 }
 
 TEST_F(LogCutTest, WhatCannotBeIsRefusedAndNothingIsLeftBehind) {

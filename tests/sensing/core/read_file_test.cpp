@@ -72,6 +72,9 @@ TEST_F(ReadFileTest, OnlyRegularFiles) {
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   ExpectRefused(pipe, ErrorCode::kInvalidArgument, "is a pipe");
   ExpectRefused("/dev/zero", ErrorCode::kInvalidArgument, "is a device");
+  const std::string socket = folder_ / "socket";
+  ASSERT_EQ(::mknod(socket.c_str(), S_IFSOCK | 0600, 0), 0);
+  ExpectRefused(socket, ErrorCode::kInvalidArgument, "is a socket");
   ExpectRefused(folder_ / "none", ErrorCode::kNotFound, "check the path");
   ExpectRefused(Write("file", "x") + "/below", ErrorCode::kNotFound, "check the path");
 }

@@ -76,5 +76,38 @@ TEST(YamlReader, AFileOfAnotherKindDoesNotFillTheScreen) {
   EXPECT_THAT(errors, EndsWith("\nf.yaml: has 50 more errors"));
 }
 
+// What nests, `depth` times: flow and block, lists and mappings.
+std::string Nested(const std::string& form, int depth) {
+  std::string text = "a: ";
+  for (int i = 0; i < depth; ++i) {
+    if (form == "block") text += "\n" + std::string(static_cast<size_t>(i) + 1, ' ') + "b:";
+    if (form == "dash") text += (i == 0 ? "\n" : "") + std::string("- ");
+    if (form == "[" || form == "{b: " || form == "[{b: ") text += form;
+  }
+  text += " 1";
+  for (int i = 0; i < depth; ++i)
+    text += form == "[" ? "]" : form == "{b: " ? "}" : form == "[{b: " ? "}]" : "";
+  return text;
+}
+
+TEST(YamlReader, DepthIsLimitedBeforeTheParserRecurses) {
+  for (const std::string form : {"[", "{b: ", "block", "dash"}) {
+    EXPECT_TRUE(YamlFile::Parse("f.yaml", Nested(form, 99)).ok()) << form << ", with the root 100";
+    for (const int depth : {100, 600, form == "block" ? 1000 : 40'000}) {
+      const auto file = YamlFile::Parse("f.yaml", Nested(form, depth));
+      ASSERT_FALSE(file.ok()) << form << depth;
+      EXPECT_THAT(file.error().message, HasSubstr("f.yaml:")) << form;
+      EXPECT_THAT(file.error().message, HasSubstr("nested to a depth of more than 100")) << form << depth;
+    }
+  }
+  EXPECT_THAT(YamlFile::Parse("f.yaml", Nested("[{b: ", 20'000)).error().message, HasSubstr("more than 100"));
+}
+
+TEST(YamlReader, SizeIsLimited) {
+  const auto file = YamlFile::Parse("f.yaml", std::string((size_t{16} << 20) + 1, '#'));
+  ASSERT_FALSE(file.ok());
+  EXPECT_THAT(file.error().message, HasSubstr("16777217 bytes; at most 16777216"));
+}
+
 }  // namespace
 }  // namespace taclink

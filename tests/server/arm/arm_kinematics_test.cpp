@@ -203,5 +203,63 @@ TEST(ArmKinematics, BadFilesAreRefusedWithTheReason) {
   EXPECT_FALSE(ArmKinematics::Load("/").ok());
 }
 
+// `content` as a part of a robot that is good otherwise.
+std::string WithContent(const std::string& content, const std::string& attributes = "") {
+  return "<robot name='a'" + attributes + "><link name='b'/>" + content + "</robot>";
+}
+
+std::string Repeated(const std::string& text, size_t times) {
+  std::string out;
+  for (size_t i = 0; i < times; ++i) out += text;
+  return out;
+}
+
+TEST(ArmKinematics, OnlyElementsAndAttributesAreXacro) {
+  const std::string declared = " xmlns:xacro='http://www.ros.org/wiki/xacro'";
+  for (const char* harmless :
+       {"", "<!-- was: <xacro:property name='c'/> -->", "<!--> <xacro:if/> -->",
+        "<c>  xacro:text <![CDATA[<xacro:if>]]></c>", "<c d=' xacro:value &lt;xacro:if>'/>"}) {
+    EXPECT_EQ(Complaint(WithContent(harmless, declared)), "accepted") << harmless;
+  }
+  for (const char* command : {"<xacro:property name='c'/>", "<!-- --><xacro:if value='1'></xacro:if>",
+                              "<link name='c' xacro:d='1'/>", "<c d='>'\n\txacro:e=''/>"}) {
+    EXPECT_THAT(Complaint(WithContent(command, declared)), HasSubstr("expand it first")) << command;
+  }
+}
+
+// The parser would recurse as deep.
+TEST(ArmKinematics, DepthIsLimitedBeforeTheParser) {
+  const auto nested = [](size_t depth) { return Repeated("<c>", depth) + Repeated("</c>", depth); };
+  EXPECT_EQ(Complaint(WithContent(nested(99))), "accepted") << "with the robot 100";
+  EXPECT_EQ(Complaint(WithContent(Repeated("<c></c><d/>", 200))), "accepted") << "one beside the other";
+  EXPECT_THAT(Complaint(WithContent(nested(100))),
+              HasSubstr("it has 101 levels of nested elements; at most 100"));
+  EXPECT_THAT(Complaint(WithContent(nested(40'000))), HasSubstr("it has 40001 levels"));
+  EXPECT_THAT(Complaint(Repeated("<c>", 40'000)), HasSubstr("it has 40000 levels"));
+  EXPECT_THAT(Complaint(Repeated("</d>", 1000) + "<? ?>" + Repeated("<c d='>'>", 40'000)),
+              HasSubstr("it has 40000 levels"))
+      << "ends without beginnings count for nothing";
+  EXPECT_THAT(Complaint("<?c " + Repeated("<c>", 40'000) + "?>"), HasSubstr("it has 40000 levels"))
+      << "the parser takes this for elements";
+}
+
+TEST(ArmKinematics, SizeIsLimitedBeforeTheParser) {
+  EXPECT_THAT(Complaint(WithContent(std::string(size_t{16} << 20, ' '))), HasSubstr("at most 16777216"));
+  EXPECT_THAT(Complaint(WithContent(Repeated("<c/>", 100'000))),
+              HasSubstr("it has 100002 elements; at most 100000"));
+  // A chain of links is freed link by link, each within the one before it.
+  std::string chain;
+  for (int i = 0; i < 40'000; ++i) {
+    const std::string name = std::to_string(i), next = std::to_string(i + 1);
+    chain += "<link name='" + name + "'/>";
+    if (i < 39'999)
+      chain += "<joint name='" + name + "' type='fixed'><parent link='" + name + "'/><child link='" + next +
+               "'/></joint>";
+  }
+  EXPECT_THAT(Complaint("<robot name='a'>" + chain + "</robot>"), HasSubstr("; at most"));
+  EXPECT_THAT(Complaint(WithContent(Repeated("<link name='c'/>", 1000))),
+              HasSubstr("it has 1001 links; at most 1000"));
+}
+
 }  // namespace
 }  // namespace taclink::server
