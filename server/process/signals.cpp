@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "server/process/log.h"
 #include "server/process/thread_setup.h"
 
 namespace taclink::server {
@@ -42,7 +43,7 @@ void Signals::AwaitStop() {
     const char* const name = number == SIGTERM ? "SIGTERM" : "SIGINT";
     if (stopping_) {
       SPDLOG_WARN("{} again: ending at once", name);
-      spdlog::default_logger()->flush();
+      EndLog();
       std::_Exit(1);
     }
     stopping_ = true;
