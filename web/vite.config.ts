@@ -5,6 +5,7 @@ import { defineConfig } from "vitest/config";
 
 // The server embeds the files by name, so that names are fixed; it tells browsers whether one has changed.
 export default defineConfig({
+  base: "./", // a proxy may serve the page below a path of its own
   esbuild: { jsx: "automatic", jsxImportSource: "preact" },
   // By number: systems without a name for themselves have tests too.
   server: { host: "127.0.0.1", proxy: { "/taclink.v1": "http://127.0.0.1:8080" } },
@@ -28,7 +29,7 @@ export default defineConfig({
           ? [
               {
                 tag: "link",
-                attrs: { rel: "modulepreload", href: "/arm_scene.js" },
+                attrs: { rel: "modulepreload", href: "./arm_scene.js" },
                 injectTo: "head" as const,
               },
             ]
