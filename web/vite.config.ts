@@ -1,7 +1,9 @@
 import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
+import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
 import { defineConfig } from "vitest/config";
+import { licensesOf } from "./licenses.config";
 
 // The server embeds the files by name, so that names are fixed; it tells browsers whether one has changed.
 export default defineConfig({
@@ -34,6 +36,16 @@ export default defineConfig({
               },
             ]
           : [],
+    },
+    {
+      name: "licenses",
+      generateBundle(_, bundle) {
+        const modules = Object.values(bundle).flatMap((file) =>
+          file.type === "chunk" ? Object.keys(file.modules) : [],
+        );
+        const apache = fileURLToPath(new URL("../LICENSE", import.meta.url));
+        this.emitFile({ type: "asset", fileName: "licenses.txt", source: licensesOf(modules, apache) });
+      },
     },
     {
       name: "compressed-copies",

@@ -34,6 +34,9 @@ TEST(Gateway, ServesTheBuiltInPage) {
   EXPECT_EQ(again.status, 304);
   EXPECT_TRUE(again.body.empty());
   EXPECT_EQ(Get(gateway.address(), "/no-such.js").status, 404);
+  const bool is_dashboard = page.body.find("index.js") != std::string::npos;
+  EXPECT_EQ(Get(gateway.address(), "/licenses.txt").status, is_dashboard ? 200 : 404)
+      << "the licenses of what the page contains";
 }
 
 class WebRoot {
