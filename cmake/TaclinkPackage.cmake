@@ -9,6 +9,10 @@ install(FILES deploy/package/completion.bash DESTINATION "${CMAKE_INSTALL_DATADI
         RENAME taclink COMPONENT server)
 install(DIRECTORY client/cpp/example DESTINATION "${docs}-client" COMPONENT development)
 install(FILES LICENSE DESTINATION "${docs}" RENAME copyright COMPONENT server)
+if(TACLINK_WEB)
+  install(FILES "${PROJECT_BINARY_DIR}/web/dist/licenses.txt" DESTINATION "${docs}" RENAME dashboard-licenses.txt
+          COMPONENT server)
+endif()
 
 option(TACLINK_PACKAGE "Make manual pages and the list of parts for packages (needs help2man and python3)" OFF)
 if(NOT TACLINK_PACKAGE)

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -67,7 +68,9 @@ std::vector<std::string> LinesOf(const std::string& message) {
   return lines;
 }
 
+// After what the log still has to say.
 int Complain(const std::string& message, int code) {
+  EndLog();
   for (const std::string& line : LinesOf(message)) std::fprintf(stderr, "taclinkd: %s\n", line.c_str());
   return code;
 }
@@ -220,7 +223,7 @@ Result<void> Run(const Options& options, const Config& config) {
   for (size_t link = 0; link < config.links.size(); ++link)
     leaves_threads = leaves_threads || arm.worker(link).LeavesThreads();
   if (leaves_threads) {
-    spdlog::default_logger()->flush();
+    EndLog();
     std::_Exit(0);  // such a thread may yet use what exit() destroys
   }
   return {};
@@ -234,6 +237,7 @@ int Check(const Options& options, const Config& config) {
       findings.errors.push_back(publish.error().message);
   if (const auto page = StaticFiles::Open(config.http.web_root); !page)
     findings.errors.push_back(page.error().message);
+  EndLog();
   for (const auto& note : findings.notes)
     std::fprintf(stderr, "taclinkd: note: %s\n", Printable(note).c_str());
   for (const auto& error : findings.errors) Complain(error, kFailed);
@@ -316,9 +320,13 @@ int main(int argc, char** argv) {
   taclink::server::LimitGrpcCiphers();
   taclink::server::ReturnLargeBlocks();
   taclink::server::RaiseDescriptorLimit();
+  std::signal(SIGPIPE, SIG_IGN);  // whoever reads the log, or another output, may go away
   try {
-    return taclink::server::Main(argc, argv);
+    const int code = taclink::server::Main(argc, argv);
+    taclink::server::EndLog();
+    return code;
   } catch (const std::exception& e) {
+    taclink::server::EndLog();
     std::fprintf(stderr, "taclinkd: failed unexpectedly: %s\n",
                  taclink::Printable(taclink::server::DescribeLimit(e)).c_str());
     return 1;

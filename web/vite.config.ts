@@ -1,10 +1,13 @@
 import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
+import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
 import { defineConfig } from "vitest/config";
+import { licensesOf } from "./licenses.config";
 
 // The server embeds the files by name, so that names are fixed; it tells browsers whether one has changed.
 export default defineConfig({
+  base: "./", // a proxy may serve the page below a path of its own
   esbuild: { jsx: "automatic", jsxImportSource: "preact" },
   // By number: systems without a name for themselves have tests too.
   server: { host: "127.0.0.1", proxy: { "/taclink.v1": "http://127.0.0.1:8080" } },
@@ -28,11 +31,21 @@ export default defineConfig({
           ? [
               {
                 tag: "link",
-                attrs: { rel: "modulepreload", href: "/arm_scene.js" },
+                attrs: { rel: "modulepreload", href: "./arm_scene.js" },
                 injectTo: "head" as const,
               },
             ]
           : [],
+    },
+    {
+      name: "licenses",
+      generateBundle(_, bundle) {
+        const modules = Object.values(bundle).flatMap((file) =>
+          file.type === "chunk" ? Object.keys(file.modules) : [],
+        );
+        const apache = fileURLToPath(new URL("../LICENSE", import.meta.url));
+        this.emitFile({ type: "asset", fileName: "licenses.txt", source: licensesOf(modules, apache) });
+      },
     },
     {
       name: "compressed-copies",

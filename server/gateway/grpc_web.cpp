@@ -30,21 +30,6 @@ std::string Frame(uint8_t flags, std::string_view payload) {
   return out.append(payload);
 }
 
-// As gRPC sends it in headers: printable ASCII but '%', the rest as %XX.
-std::string PercentEncoded(std::string_view text) {
-  constexpr std::string_view kHex = "0123456789ABCDEF";
-  std::string out;
-  for (const char c : text) {
-    const auto byte = static_cast<uint8_t>(c);
-    if (byte >= 0x20 && byte < 0x7f && c != '%') {
-      out += c;
-    } else {
-      out += {'%', kHex[byte >> 4], kHex[byte & 0xf]};
-    }
-  }
-  return out;
-}
-
 Result<std::vector<std::string>> DecodeFrames(std::string_view body) {
   std::vector<std::string> messages;
   while (!body.empty()) {
@@ -114,6 +99,20 @@ std::string EncodeTrailers(WebFormat format, const WebStatus& status) {
   if (!status.message.empty()) text += "grpc-message: " + PercentEncoded(status.message) + "\r\n";
   const std::string frame = Frame(kTrailers, text);
   return format == WebFormat::kText ? EncodeBase64(frame) : frame;
+}
+
+std::string PercentEncoded(std::string_view text) {
+  constexpr std::string_view kHex = "0123456789ABCDEF";
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<uint8_t>(c);
+    if (byte >= 0x20 && byte < 0x7f && c != '%') {
+      out += c;
+    } else {
+      out += {'%', kHex[byte >> 4], kHex[byte & 0xf]};
+    }
+  }
+  return out;
 }
 
 std::optional<std::chrono::nanoseconds> ParseGrpcTimeout(std::string_view text) {

@@ -36,6 +36,9 @@ struct WebStatus {
 /// The last frame of a body.
 std::string EncodeTrailers(WebFormat format, const WebStatus& status);
 
+/// As gRPC sends it in headers: printable ASCII but '%', the rest as %XX.
+std::string PercentEncoded(std::string_view text);
+
 /// Of a `grpc-timeout` header ("10S", "500m"); none: it is no such text, or longer than a year.
 std::optional<std::chrono::nanoseconds> ParseGrpcTimeout(std::string_view text);
 

@@ -28,6 +28,14 @@ HttpFailure FailureOf(const boost::system::error_code& error, const HttpLimits& 
   return {400, "this is no HTTP request: " + error.message()};
 }
 
+std::string HeadOf(int status, const HttpHeaders& headers, const std::string& framing, bool keep_alive) {
+  const auto reason = http::obsolete_reason(http::int_to_status(static_cast<unsigned>(status)));
+  std::string out = "HTTP/1.1 " + std::to_string(status) + " " + std::string(reason) + "\r\n";
+  for (const auto& [name, value] : headers) out.append(name).append(": ").append(value).append("\r\n");
+  out += framing;
+  return out += keep_alive ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
+}
+
 }  // namespace
 
 struct HttpRequestParser::Parser {
@@ -128,22 +136,24 @@ HttpRequest HttpRequestParser::Take() {
   return out;
 }
 
-std::string ResponseHead(int status, const HttpHeaders& headers, std::optional<size_t> length,
-                         bool keep_alive) {
-  const auto reason = http::obsolete_reason(http::int_to_status(static_cast<unsigned>(status)));
-  std::string out = "HTTP/1.1 " + std::to_string(status) + " " + std::string(reason) + "\r\n";
-  for (const auto& [name, value] : headers) out.append(name).append(": ").append(value).append("\r\n");
-  out += length ? "Content-Length: " + std::to_string(*length) + "\r\n"
-                : std::string("Transfer-Encoding: chunked\r\n");
-  out += keep_alive ? "Connection: keep-alive\r\n\r\n" : "Connection: close\r\n\r\n";
-  return out;
+std::string ResponseHead(int status, const HttpHeaders& headers, size_t length, bool keep_alive) {
+  return HeadOf(status, headers, "Content-Length: " + std::to_string(length) + "\r\n", keep_alive);
 }
 
-std::string Chunk(std::string_view bytes) {
+std::string StreamedResponse::Head(int status, const HttpHeaders& headers) const {
+  return HeadOf(status, headers, in_chunks_ ? "Transfer-Encoding: chunked\r\n" : "", keeps_alive_);
+}
+
+std::string StreamedResponse::Piece(std::string_view bytes) const {
+  if (!in_chunks_) return std::string(bytes);
   char head[24];
   const int size = std::snprintf(head, sizeof head, "%zx\r\n", bytes.size());
   std::string out(head, static_cast<size_t>(size));
   return out.append(bytes).append("\r\n");
+}
+
+std::string StreamedResponse::End() const {
+  return in_chunks_ ? "0\r\n\r\n" : "";
 }
 
 }  // namespace taclink::server

@@ -13,12 +13,12 @@ namespace taclink::server {
 
 /// One HTTP/1 request, whole.
 struct HttpRequest {
-  std::string method;
-  std::string target;  ///< as sent
+  std::string method = {};
+  std::string target = {};  ///< as sent
   bool http_1_0 = false;
   bool keep_alive = true;
-  std::vector<std::pair<std::string, std::string>> headers;  ///< names in lower case
-  std::string body;
+  std::vector<std::pair<std::string, std::string>> headers = {};  ///< names in lower case
+  std::string body = {};
 
   /// Empty: not sent.
   std::string_view Header(std::string_view lower_name) const;
@@ -73,10 +73,26 @@ class HttpRequestParser {
 
 using HttpHeaders = std::vector<std::pair<std::string_view, std::string>>;
 
-/// The head of a response, with the blank line. `length` none: the body comes in chunks.
-std::string ResponseHead(int status, const HttpHeaders& headers, std::optional<size_t> length,
-                         bool keep_alive);
-/// A piece of a body in chunks; an empty one ends it.
-std::string Chunk(std::string_view bytes);
+/// The head of a response whose body has `length` bytes, with the blank line.
+std::string ResponseHead(int status, const HttpHeaders& headers, size_t length, bool keep_alive);
+
+/// A response whose length is not known beforehand: its body comes in chunks, or, for a client of HTTP/1.0,
+/// which has none, ends with the connection.
+class StreamedResponse {
+ public:
+  explicit StreamedResponse(const HttpRequest& request)
+      : in_chunks_(!request.http_1_0), keeps_alive_(in_chunks_ && request.keep_alive) {}
+
+  /// Whether another request can follow.
+  bool keeps_alive() const { return keeps_alive_; }
+  std::string Head(int status, const HttpHeaders& headers) const;
+  /// A piece of the body, which is not empty.
+  std::string Piece(std::string_view bytes) const;
+  /// What ends the body.
+  std::string End() const;
+
+ private:
+  const bool in_chunks_, keeps_alive_;
+};
 
 }  // namespace taclink::server

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/gateway/http_target.h"
+#include "server/gateway/page_origin.h"
 #include "server/security/party.h"
 
 namespace taclink::server {
@@ -194,15 +195,7 @@ std::optional<HttpFailure> Session::Objection(const HttpRequest& request) const 
     SPDLOG_INFO("http {}: {} refused: {}", peer_, request.target, busy_);
     return HttpFailure{429, busy_};
   }
-  const std::string_view origin = request.Header("origin"), host = request.Header("host");
-  if (!origin.empty() && !SameOrigin(origin, host))
-    return HttpFailure{403, "pages of other origins may not call this server"};
-  // Without tokens only being on this machine protects; a name of another site that was made to point here
-  // would let its pages in.
-  if (shared_->loopback_only && !shared_->services.security->needs_token() && !request.http_1_0 &&
-      !IsLoopbackHost(host))
-    return HttpFailure{421, "this server only answers as localhost"};
-  return std::nullopt;
+  return ForeignPage(request, shared_->loopback_only && !shared_->services.security->needs_token());
 }
 
 Session::Outcome Session::Answer(const HttpRequest& request) {
@@ -240,6 +233,9 @@ Session::Outcome Session::AnswerText(const HttpRequest& request, int status, std
   if (status == 401) headers.emplace_back("WWW-Authenticate", "Bearer");
   if (status == 429) headers.emplace_back("Retry-After", "60");
   if (status == 405) headers.emplace_back("Allow", "GET, HEAD, POST");
+  // The page shows it, in place of the status.
+  if (status != 200 && WebFormatOf(request.Header("content-type")))
+    headers.emplace_back("Grpc-Message", PercentEncoded(text.substr(0, text.find('\n'))));
   std::string out = ResponseHead(status, headers, text.size(), keep);
   if (request.method != "HEAD") out += text;
   co_return co_await Write(out) && keep;
@@ -294,22 +290,26 @@ Result<GrpcCallRequest> Session::ToCall(const HttpRequest& request, WebFormat fo
 }
 
 Session::Outcome Session::AnswerCall(const HttpRequest& request, WebFormat format) {
-  if (request.http_1_0) co_return co_await AnswerText(request, 505, kPlainText, "gRPC-Web needs HTTP/1.1\n");
+  const StreamedResponse response(request);
   auto call = ToCall(request, format);
-  const std::string head = ResponseHead(200, CommonHeaders(ContentTypeOf(format), "no-store"), {}, true);
+  HttpHeaders headers = CommonHeaders(ContentTypeOf(format), "no-store");
+  headers.emplace_back("X-Accel-Buffering", "no");  // a proxy that collects answers would hold frames back
+  const std::string head = response.Head(200, headers);
   if (!call) {
     const WebStatus status{GrpcStatusOf(call.error().code), call.error().message};
-    co_return co_await Write(head + Chunk(EncodeTrailers(format, status)) + Chunk({})) && request.keep_alive;
+    co_return co_await Write(head + response.Piece(EncodeTrailers(format, status)) + response.End()) &&
+        response.keeps_alive();
   }
   if (!co_await Write(head)) co_return false;
   ++shared_->services.counts->calls;
-  const bool whole = co_await Forward(std::move(*call), format);
+  const bool whole = co_await Forward(std::move(*call), format, response);
   --shared_->services.counts->calls;
-  co_return whole&& request.keep_alive;
+  co_return whole&& response.keeps_alive();
 }
 
 // Each answer is written before the next one is read.
-Session::Outcome Session::Forward(GrpcCallRequest call_request, WebFormat format) {
+Session::Outcome Session::Forward(GrpcCallRequest call_request, WebFormat format,
+                                  const StreamedResponse& response) {
   const auto call =
       shared_->calls.Start(std::move(call_request), [weak = weak_from_this(), shared = shared_] {
         asio::post(shared->loop, [weak] {
@@ -323,8 +323,8 @@ Session::Outcome Session::Forward(GrpcCallRequest call_request, WebFormat format
       continue;
     }
     if (const auto* status = std::get_if<WebStatus>(&*event))
-      co_return co_await Write(Chunk(EncodeTrailers(format, *status)) + Chunk({}));
-    if (!co_await Write(Chunk(EncodeMessage(format, std::get<std::string>(*event))))) break;
+      co_return co_await Write(response.Piece(EncodeTrailers(format, *status)) + response.End());
+    if (!co_await Write(response.Piece(EncodeMessage(format, std::get<std::string>(*event))))) break;
   }
   co_return false;
 }

@@ -87,7 +87,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome AnswerPage(const HttpRequest& request, const std::string& path);
   Outcome AnswerFile(const HttpRequest& request, const std::string& path);
   Outcome AnswerCall(const HttpRequest& request, WebFormat format);
-  Outcome Forward(GrpcCallRequest call_request, WebFormat format);
+  Outcome Forward(GrpcCallRequest call_request, WebFormat format, const StreamedResponse& response);
   Result<GrpcCallRequest> ToCall(const HttpRequest& request, WebFormat format) const;
 
   // Constant after construction.

@@ -10,7 +10,7 @@
 namespace taclink::server {
 namespace {
 
-constexpr double kLocalBurst = 512, kLocalPerS = 200;  // programs and scripts on this machine
+constexpr double kLocalBurst = 4096, kLocalPerS = 4096;  // no limit for programs and scripts on this machine
 constexpr double kRemoteBurst = 128, kRemotePerS = 40;
 constexpr double kPunishedBurst = 1, kPunishedPerS = 20;
 constexpr int64_t kPunishmentNs = 10'000'000'000;
@@ -75,22 +75,29 @@ Result<ConnectionTable::Admission> ConnectionTable::Admit(const std::string& pee
                      "limits.max_connections_per_peer"};
   admission.id = ++last_;
   connections_[admission.id] = {.place = place, .key = KeyOf(peer, place)};
+  id_of_peer_[connections_[admission.id].key] = admission.id;
   return admission;
 }
 
 void ConnectionTable::Remove(Id id) {
-  connections_.erase(id);
+  const auto at = connections_.find(id);
+  if (at == connections_.end()) return;
+  const auto named = id_of_peer_.find(at->second.key);
+  if (named != id_of_peer_.end() && named->second == id) id_of_peer_.erase(named);
+  connections_.erase(at);
 }
 
 std::optional<ConnectionTable::Id> ConnectionTable::GiveWay() {
   return OldestUnproven([](const Connection&) { return true; });
 }
 
-void ConnectionTable::Prove(const std::string& peer) {
-  const std::string key = KeyOf(peer, PlaceOf(peer));
-  for (auto& [id, connection] : connections_) {
-    if (connection.key == key) connection.proven = true;
-  }
+std::optional<ConnectionTable::Id> ConnectionTable::Prove(const std::string& peer) {
+  const auto named = id_of_peer_.find(KeyOf(peer, PlaceOf(peer)));
+  if (named == id_of_peer_.end()) return std::nullopt;
+  const Id id = named->second;
+  id_of_peer_.erase(named);
+  connections_.at(id).proven = true;
+  return id;
 }
 
 ConnectionTable::Pace& ConnectionTable::PaceOf(const Place& place, int64_t now_ns) {

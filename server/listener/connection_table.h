@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <unordered_map>
 
 #include "sensing/core/result.h"
 #include "server/listener/token_bucket.h"
@@ -38,8 +39,8 @@ class ConnectionTable {
   /// The oldest unproven connection, which does not count from now on: descriptors have run out. None: there
   /// is none.
   std::optional<Id> GiveWay();
-  /// Somebody who may has called over the connection from `peer`.
-  void Prove(const std::string& peer);
+  /// Somebody who may has called over the connection from `peer`. None: it is not here, or was proven before.
+  std::optional<Id> Prove(const std::string& peer);
 
   /// How long the next connection of this address must wait before gRPC gets it; 0: not, and it is counted.
   int64_t WaitNs(Id id, int64_t now_ns);
@@ -69,8 +70,9 @@ class ConnectionTable {
   Pace& PaceOf(const Place& place, int64_t now_ns);
 
   const ConnectionLimits limits_;
-  std::map<Id, Connection> connections_;  // the oldest first
-  std::map<std::string, Pace> paces_;     // by address
+  std::map<Id, Connection> connections_;            // the oldest first
+  std::unordered_map<std::string, Id> id_of_peer_;  // by key; of those that are not proven
+  std::map<std::string, Pace> paces_;               // by address
   Id last_ = 0;
 };
 

@@ -15,14 +15,17 @@ constexpr uint8_t kAck = 0x1, kEndStream = 0x1, kEndHeaders = 0x4;
 Http2Inspector::Http2Inspector(const Http2Limits& limits)
     : limits_(limits),
       resets_(limits.reset_burst, limits.resets_per_s),
-      controls_(limits.control_burst, limits.controls_per_s) {}
+      controls_(limits.control_burst, limits.controls_per_s),
+      updates_(limits.update_burst, limits.updates_per_s),
+      calls_(limits.call_burst, limits.calls_per_s),
+      frames_(limits.frame_burst, limits.frames_per_s) {}
 
 bool Http2Inspector::Refuse(std::string why) {
   violation_ = std::move(why);
   return false;
 }
 
-bool Http2Inspector::Feed(std::span<const std::byte> bytes, int64_t now_ns) {
+bool Http2Inspector::Feed(std::span<const std::byte> bytes, int64_t now_ns, bool proven) {
   if (!violation_.empty()) return false;
   const auto skip = [&bytes](size_t& left) {
     const size_t taken = std::min(left, bytes.size());
@@ -40,21 +43,20 @@ bool Http2Inspector::Feed(std::span<const std::byte> bytes, int64_t now_ns) {
     const bool has_increment =
         header_size_ >= kHeaderBytes && header_[3] == static_cast<uint8_t>(FrameType::kWindowUpdate);
     if (header_size_ < (has_increment ? header_.size() : kHeaderBytes)) continue;
-    if (!OnFrame(now_ns)) return false;
+    if (!OnFrame(now_ns, proven)) return false;
     header_size_ = 0;
   }
   return true;
 }
 
-bool Http2Inspector::OnFrame(int64_t now_ns) {
+bool Http2Inspector::OnFrame(int64_t now_ns, bool proven) {
   const size_t length = size_t{header_[0]} << 16 | size_t{header_[1]} << 8 | header_[2];
   const uint8_t flags = header_[4];
   payload_left_ = length;
+  if (!proven && !Spend(frames_, now_ns, "frames without a good call", limits_.frames_per_s)) return false;
   switch (static_cast<FrameType>(header_[3])) {
     case FrameType::kHeaders:
-      block_bytes_ = 0;
-      continuations_ = 0;
-      return OnHeaderBlock(length, (flags & kEndHeaders) != 0);
+      return OnHeaders(length, (flags & kEndHeaders) != 0, now_ns, proven);
     case FrameType::kContinuation:
       if (++continuations_ > limits_.continuations)
         return Refuse(
@@ -77,6 +79,14 @@ bool Http2Inspector::OnFrame(int64_t now_ns) {
   return Spend(controls_, now_ns, "SETTINGS, PING, PRIORITY or empty frames", limits_.controls_per_s);
 }
 
+bool Http2Inspector::OnHeaders(size_t length, bool ends, int64_t now_ns, bool proven) {
+  block_bytes_ = 0;
+  continuations_ = 0;
+  if (!proven && !Spend(calls_, now_ns, "calls none of which is a good one", limits_.calls_per_s))
+    return false;
+  return OnHeaderBlock(length, ends);
+}
+
 bool Http2Inspector::OnHeaderBlock(size_t length, bool ends) {
   block_bytes_ += length;
   if (block_bytes_ > limits_.header_bytes)
@@ -91,8 +101,9 @@ bool Http2Inspector::OnWindowUpdate(int64_t now_ns) {
   payload_left_ -= std::min(payload_left_, kIncrementBytes);
   const bool is_zero =
       std::all_of(header_.begin() + kHeaderBytes, header_.end(), [](uint8_t byte) { return byte == 0; });
-  return !is_zero ||
-         Spend(resets_, now_ns, "streams that an empty WINDOW_UPDATE resets", limits_.resets_per_s);
+  if (is_zero)
+    return Spend(resets_, now_ns, "streams that an empty WINDOW_UPDATE resets", limits_.resets_per_s);
+  return Spend(updates_, now_ns, "WINDOW_UPDATE frames", limits_.updates_per_s);
 }
 
 bool Http2Inspector::Spend(TokenBucket& bucket, int64_t now_ns, const char* what, double per_s) {

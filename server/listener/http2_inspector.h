@@ -15,7 +15,11 @@ struct Http2Limits {
   size_t header_bytes = size_t{64} << 10;  ///< of one header block: HEADERS and its CONTINUATION frames
   int continuations = 8;                   ///< CONTINUATION frames of one header block
   double reset_burst = 200, resets_per_s = 100;
-  double control_burst = 1000, controls_per_s = 200;  ///< SETTINGS, PING, PRIORITY, empty frames
+  double control_burst = 1000, controls_per_s = 200;     ///< SETTINGS, PING, PRIORITY, empty frames
+  double update_burst = 20'000, updates_per_s = 10'000;  ///< WINDOW_UPDATE
+  // Until somebody who may has called:
+  double call_burst = 200, calls_per_s = 50;
+  double frame_burst = 5000, frames_per_s = 1000;  ///< of any kind
 };
 
 /// Follows the frames that a client sends (RFC 9113, section 4.1) and finds those that cost the server more
@@ -27,8 +31,9 @@ class Http2Inspector {
   explicit Http2Inspector(const Http2Limits& limits = {});
 
   /// The next bytes that the client has sent, from the connection preface on. False: the connection must end,
-  /// violation() says why; so it stays. Bytes that are not HTTP/2 at all pass: gRPC refuses them.
-  bool Feed(std::span<const std::byte> bytes, int64_t now_ns);
+  /// violation() says why; so it stays. Bytes that are not HTTP/2 at all pass: gRPC refuses them. `proven`:
+  /// somebody who may has called over the connection.
+  bool Feed(std::span<const std::byte> bytes, int64_t now_ns, bool proven = false);
   /// For people; empty: none.
   const std::string& violation() const { return violation_; }
 
@@ -47,14 +52,15 @@ class Http2Inspector {
   };
   static constexpr size_t kHeaderBytes = 9, kPrefaceBytes = 24, kIncrementBytes = 4;
 
-  bool OnFrame(int64_t now_ns);
+  bool OnFrame(int64_t now_ns, bool proven);
+  bool OnHeaders(size_t length, bool ends, int64_t now_ns, bool proven);
   bool OnHeaderBlock(size_t length, bool ends);
   bool OnWindowUpdate(int64_t now_ns);
   bool Spend(TokenBucket& bucket, int64_t now_ns, const char* what, double per_s);
   bool Refuse(std::string why);
 
   const Http2Limits limits_;
-  TokenBucket resets_, controls_;
+  TokenBucket resets_, controls_, updates_, calls_, frames_;
   size_t preface_left_ = kPrefaceBytes;
   std::array<uint8_t, kHeaderBytes + kIncrementBytes>
       header_{};            // of the frame; with a WINDOW_UPDATE's payload

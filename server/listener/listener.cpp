@@ -82,6 +82,7 @@ struct Listener::Running : std::enable_shared_from_this<Running> {
   void HandOverPending();
   int TimeoutMs();
   void HandOne(Id id, int fd);
+  void Unguard(Id id, int fd);
   void Punish();
   void Violated(Id id);
   void Wake() const;
@@ -100,7 +101,8 @@ struct Listener::Running : std::enable_shared_from_this<Running> {
   std::mutex mutex;
   // Guarded by mutex.
   ConnectionTable table;
-  std::vector<Id> violators;  // to be punished
+  std::vector<Id> violators;                                 // to be punished
+  std::map<Id, std::shared_ptr<GuardedConnection>> guarded;  // that were handed over
 
   // Used by the thread. A connection's watch is a second descriptor of its socket: it stays valid whatever
   // gRPC does, and tells that both directions are closed.
@@ -108,7 +110,6 @@ struct Listener::Running : std::enable_shared_from_this<Running> {
     int watch = -1;
     int fd = -1;  // gRPC's number, for ReadGuard; or pending
     std::string peer;
-    std::shared_ptr<GuardedConnection> guarded;
   };
   std::map<Id, Connection> connections;
   std::deque<Id> pending;   // not handed over yet
@@ -127,8 +128,7 @@ void Listener::Running::Join() {
 Listener::Running::~Running() {
   for (const Id id : pending) ::close(connections[id].fd);
   for (const auto& [id, connection] : connections) {
-    if (connection.guarded && !options.has_tls)
-      ReadGuard::Instance().Forget(connection.fd, connection.guarded.get());
+    Unguard(id, connection.fd);
     ::close(connection.watch);
   }
   for (const int file : {poll, wake, spare})
@@ -250,7 +250,7 @@ void Listener::Running::Take(int fd, const sockaddr_storage& from) {
     BoundUnsent(fd);
     SetOption(fd, TCP_USER_TIMEOUT, static_cast<unsigned>(options.user_timeout.count()));
   }
-  connections[id] = {.watch = watch, .fd = fd, .peer = peer, .guarded = {}};
+  connections[id] = {.watch = watch, .fd = fd, .peer = peer};
   pending.push_back(id);
   ++counts.connections;
 }
@@ -281,19 +281,34 @@ int Listener::Running::TimeoutMs() {
 }
 
 void Listener::Running::HandOne(Id id, int fd) {
-  Connection& connection = connections[id];
-  connection.guarded = std::make_shared<GuardedConnection>(
-      options.http2, [weak = weak_from_this(), id, peer = connection.peer](const std::string& why) {
+  const auto connection = std::make_shared<GuardedConnection>(
+      options.http2, [weak = weak_from_this(), id, peer = connections[id].peer](const std::string& why) {
         SPDLOG_WARN("grpc {}: the connection is closed: it sent {}", peer, why);
         if (const auto self = weak.lock()) self->Violated(id);
       });
+  {
+    const std::lock_guard lock(mutex);
+    guarded[id] = connection;
+  }
   if (options.has_tls) {
-    const ReadGuard::TlsScope scope(connection.guarded);
+    const ReadGuard::TlsScope scope(connection);
     hand_over(fd);
   } else {
-    ReadGuard::Instance().GuardPlain(fd, connection.guarded);
+    ReadGuard::Instance().GuardPlain(fd, connection);
     hand_over(fd);
   }
+}
+
+void Listener::Running::Unguard(Id id, int fd) {
+  std::shared_ptr<GuardedConnection> connection;
+  {
+    const std::lock_guard lock(mutex);
+    const auto at = guarded.find(id);
+    if (at == guarded.end()) return;
+    connection = std::move(at->second);
+    guarded.erase(at);
+  }
+  if (!options.has_tls) ReadGuard::Instance().Forget(fd, connection.get());
 }
 
 // On the thread that reads the connection.
@@ -327,8 +342,7 @@ void Listener::Running::Remove(Id id) {
     pending.erase(waits);
     ::close(at->second.fd);
   }
-  if (at->second.guarded && !options.has_tls)
-    ReadGuard::Instance().Forget(at->second.fd, at->second.guarded.get());
+  Unguard(id, at->second.fd);
   ::close(at->second.watch);
   connections.erase(at);
   --counts.connections;
@@ -376,7 +390,10 @@ const ListenerCounts& Listener::counts() const {
 
 void Listener::Prove(const std::string& peer) {
   const std::lock_guard lock(running_->mutex);
-  running_->table.Prove(peer);
+  const auto id = running_->table.Prove(peer);
+  if (!id) return;
+  const auto at = running_->guarded.find(*id);
+  if (at != running_->guarded.end()) at->second->Prove();
 }
 
 }  // namespace taclink::server

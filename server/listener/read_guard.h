@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -22,8 +23,11 @@ class GuardedConnection {
 
   /// False: the connection must end.
   bool Feed(std::span<const std::byte> bytes);
+  /// Somebody who may has called over it: it may do more. Any thread.
+  void Prove() { proven_ = true; }
 
  private:
+  std::atomic<bool> proven_ = false;
   Http2Inspector inspector_;
   std::function<void(const std::string& why)> on_violation_;  // empty: was called
 };

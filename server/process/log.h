@@ -3,6 +3,7 @@
 #include <spdlog/sinks/sink.h>
 
 #include <array>
+#include <chrono>
 #include <initializer_list>
 #include <memory>
 #include <string>
@@ -16,8 +17,13 @@
 namespace taclink::server {
 
 /// Sends what spdlog's macros (SPDLOG_INFO and so on, which tell where they stand) are told where `options`
-/// say. May be called again; a file is reopened, as log rotation wants it. Errors: kUnavailable (file).
+/// say. May be called again; a file is reopened, as log rotation wants it. No caller of the macros waits for
+/// the output: a LogWriter writes. Errors: kInvalidArgument, kUnavailable (file).
 Result<void> SetUpLog(const LogOptions& options);
+
+/// For the end of the process: tells what the rate limit has suppressed so far, lifts the limit, and waits
+/// until all lines are written, but no longer than `limit`. Does nothing before SetUpLog.
+void EndLog(std::chrono::milliseconds limit = std::chrono::seconds(1));
 
 /// A line for each message, whatever is in it: what a terminal or a reader of lines could take for more than
 /// text is escaped, and a message of more than 4 KiB cut. TextLines: time, level, message. JsonLines: an

@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "sensing/core/thread_start.h"
+#include "server/process/log.h"
+#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 
@@ -39,7 +41,7 @@ void Signals::AwaitStop() {
     const char* const name = number == SIGTERM ? "SIGTERM" : "SIGINT";
     if (stopping_) {
       SPDLOG_WARN("{} again: ending at once", name);
-      spdlog::default_logger()->flush();
+      EndLog();
       std::_Exit(1);
     }
     stopping_ = true;

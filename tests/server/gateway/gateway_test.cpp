@@ -27,12 +27,16 @@ TEST(Gateway, ServesTheBuiltInPage) {
   EXPECT_EQ(page.headers.at("cache-control"), "no-cache");
   EXPECT_EQ(page.headers.at("x-content-type-options"), "nosniff");
   EXPECT_THAT(page.body, HasSubstr("<title>TacLINK</title>"));
+  EXPECT_THAT(page.body, Not(HasSubstr("=\"/"))) << "a proxy may serve it below a path of its own";
   EXPECT_FALSE(page.headers.contains("access-control-allow-origin"));
   EXPECT_EQ(Get(gateway.address(), "/index.html").body, page.body);
   const RawResponse again = Get(gateway.address(), "/", "If-None-Match: " + page.headers.at("etag") + "\r\n");
   EXPECT_EQ(again.status, 304);
   EXPECT_TRUE(again.body.empty());
   EXPECT_EQ(Get(gateway.address(), "/no-such.js").status, 404);
+  const bool is_dashboard = page.body.find("index.js") != std::string::npos;
+  EXPECT_EQ(Get(gateway.address(), "/licenses.txt").status, is_dashboard ? 200 : 404)
+      << "the licenses of what the page contains";
 }
 
 class WebRoot {
@@ -123,7 +127,15 @@ TEST(Gateway, BadRequestsGetAnAnswerAndTheEnd) {
 TEST(Gateway, PagesOfOthersMayNotCall) {
   TestGateway gateway;
   EXPECT_EQ(Get(gateway.address(), "/healthz", "Origin: http://localhost\r\n").status, 200);
-  EXPECT_EQ(Get(gateway.address(), "/healthz", "Origin: http://evil.example\r\n").status, 403);
+  const std::string post =
+      "POST /taclink.v1.TactileService/GetArm HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n"
+      "Content-Type: application/grpc-web\r\n";
+  const std::string body = "\r\n" + std::string(5, '\0');
+  EXPECT_EQ(Ask(gateway.address(), post + "Origin: http://localhost\r\n" + body).status, 200);
+  const RawResponse foreign = Ask(gateway.address(), post + "Origin: http://evil.example\r\n" + body);
+  EXPECT_EQ(foreign.status, 421);
+  EXPECT_THAT(foreign.headers.at("grpc-message"), HasSubstr("http://evil.example")) << "for the page to show";
+  EXPECT_FALSE(foreign.headers.contains("access-control-allow-origin"));
   EXPECT_EQ(Ask(gateway.address(), "GET /healthz HTTP/1.1\r\nHost: evil.example:8080\r\n\r\n").status, 421)
       << "a foreign name that was made to point here";
 }

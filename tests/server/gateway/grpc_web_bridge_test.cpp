@@ -114,6 +114,25 @@ TEST(GrpcWebBridge, ADeadlineEndsAStream) {
   EXPECT_THAT(WebBody(response.body).trailers, HasSubstr("grpc-status: 4"));
 }
 
+// As nginx asks unless it is told otherwise: the stream ends with the connection.
+TEST(GrpcWebBridge, Http10GetsPlainBodies) {
+  TestGateway gateway;
+  RawHttp proxy(gateway.address());
+  const std::string request = EncodeMessage(WebFormat::kBinary, "");
+  proxy.Send(std::string("POST ") + kService + "GetArm HTTP/1.0\r\nHost: 127.0.0.1:8080\r\n" +
+             "Connection: close\r\nContent-Type: application/grpc-web\r\nContent-Length: " +
+             std::to_string(request.size()) + "\r\n\r\n" + request);
+  const RawResponse head = proxy.ReadHead();
+  EXPECT_EQ(head.status, 200);
+  EXPECT_FALSE(head.headers.contains("transfer-encoding"));
+  EXPECT_FALSE(head.headers.contains("content-length"));
+  EXPECT_EQ(head.headers.at("connection"), "close");
+  EXPECT_EQ(head.headers.at("x-accel-buffering"), "no");
+  const WebBody body(proxy.ReadToEnd());
+  EXPECT_EQ(body.messages.size(), 1u);
+  EXPECT_EQ(body.trailers, "grpc-status: 0\r\n");
+}
+
 TEST(GrpcWebBridge, FramesStreamUntilTheServerEnds) {
   TestGateway gateway;
   RawHttp browser(gateway.address());

@@ -133,11 +133,29 @@ TEST(HttpMessage, SpoiltRequestsEndSomehow) {
 TEST(HttpMessage, Responses) {
   EXPECT_EQ(ResponseHead(200, {{"A", "b"}}, 3, true),
             "HTTP/1.1 200 OK\r\nA: b\r\nContent-Length: 3\r\nConnection: keep-alive\r\n\r\n");
-  EXPECT_THAT(ResponseHead(404, {}, {}, false),
-              ::testing::AllOf(HasSubstr("404 Not Found\r\n"), HasSubstr("Transfer-Encoding: chunked"),
-                               HasSubstr("Connection: close")));
-  EXPECT_EQ(Chunk(std::string(26, 'x')), "1a\r\n" + std::string(26, 'x') + "\r\n");
-  EXPECT_EQ(Chunk({}), "0\r\n\r\n");
+  EXPECT_EQ(ResponseHead(404, {}, 0, false),
+            "HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+}
+
+TEST(HttpMessage, StreamsComeInChunks) {
+  const StreamedResponse response(HttpRequest{.keep_alive = true});
+  EXPECT_TRUE(response.keeps_alive());
+  EXPECT_EQ(response.Head(200, {{"A", "b"}}),
+            "HTTP/1.1 200 OK\r\nA: b\r\nTransfer-Encoding: chunked\r\nConnection: keep-alive\r\n\r\n");
+  EXPECT_EQ(response.Piece(std::string(26, 'x')), "1a\r\n" + std::string(26, 'x') + "\r\n");
+  EXPECT_EQ(response.End(), "0\r\n\r\n");
+  EXPECT_THAT(StreamedResponse(HttpRequest{.keep_alive = false}).Head(200, {}),
+              HasSubstr("Transfer-Encoding: chunked\r\nConnection: close\r\n"));
+}
+
+// A proxy that speaks HTTP/1.0, as nginx does unless it is told otherwise.
+TEST(HttpMessage, StreamsToHttp10EndWithTheConnection) {
+  for (const bool keep_alive : {false, true}) {
+    const StreamedResponse response(HttpRequest{.http_1_0 = true, .keep_alive = keep_alive});
+    EXPECT_FALSE(response.keeps_alive());
+    EXPECT_EQ(response.Head(200, {}), "HTTP/1.1 200 OK\r\nConnection: close\r\n\r\n");
+    EXPECT_EQ(response.Piece("frame") + response.End(), "frame");
+  }
 }
 
 }  // namespace

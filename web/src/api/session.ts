@@ -29,7 +29,7 @@ export class Session {
       if (this.token) request.header.set("authorization", `Bearer ${this.token}`);
       return next(request);
     };
-    const transport = createGrpcWebTransport({ baseUrl: location.origin, interceptors: [withToken] });
+    const transport = createGrpcWebTransport({ baseUrl: callBase(location.href), interceptors: [withToken] });
     this.tactile = createClient(TactileService, transport);
     this.recording = createClient(RecordingService, transport);
     this.operations = createClient(OperationsService, transport);
@@ -70,6 +70,11 @@ export class Session {
     this.caller.value = undefined;
     this.generation.value++;
   }
+}
+
+/** Calls go to where the page came from, which a proxy may have put below a path of its own. */
+export function callBase(page: string): string {
+  return new URL(".", page).href;
 }
 
 /** An error in words for people. */
