@@ -29,6 +29,7 @@ from taclink.errors import (
     Unauthenticated,
     Unavailable,
     Unsupported,
+    WrongProcess,
 )
 from taclink.messages.arm import Arm, Camera, Joint, Link, LinkModel, LinkStatistics, Pose, Source
 from taclink.messages.baseline import Baseline, CalibrationResult, LinkTare
@@ -220,5 +221,6 @@ __all__ = [
     "Unauthenticated",
     "Unavailable",
     "Unsupported",
+    "WrongProcess",
     "__version__",
 ]

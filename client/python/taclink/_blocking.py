@@ -12,6 +12,7 @@ import grpc
 from taclink import errors
 from taclink._calls import Call
 from taclink._channel import Settings, stubs
+from taclink._process import Owned, closed, opened
 from taclink._reconnect import RETRIED, Attempts
 from taclink._streams import StreamState
 
@@ -31,6 +32,7 @@ class Channel:
         else:
             self._channel = grpc.secure_channel(settings.address, settings.credentials, settings.options)
         self._stubs = stubs(self._channel)
+        opened(self)
 
     def start(self, service: str, method: str, request: Any, timeout_s: float | None = None) -> Any:
         """The running call, of which messages are read."""
@@ -42,6 +44,7 @@ class Channel:
 
     def close(self) -> None:
         self._channel.close()
+        closed(self)
 
     def _start(self, start: Any, request: Any, timeout_s: float | None) -> Any:
         try:
@@ -50,7 +53,7 @@ class Channel:
             raise errors.lost(str(error), self._address) from error
 
 
-class Connection:
+class Connection(Owned):
     def __init__(self, settings: Settings, timeout_s: float) -> None:
         self.address = settings.address
         self.timeout_s = timeout_s
@@ -60,6 +63,7 @@ class Connection:
         self._channel: Channel | None = None
 
     def channel(self) -> Channel:
+        self.own()  # before the lock, which another thread of the parent may have held
         with self._lock:
             if self.closed:
                 raise errors.closed()
@@ -97,6 +101,9 @@ class Connection:
         return errors.closed() if self.closed else errors.lost(details, self.address)
 
     def close(self) -> None:
+        if self.is_inherited():
+            self.closed = True
+            return
         with self._lock:
             self.closed = True
             channel, self._channel = self._channel, None
@@ -126,6 +133,7 @@ class Stream(StreamState[T], Iterator[T]):
         self._open()
 
     def __next__(self) -> T:
+        self._connection.own()
         while not self._closed.is_set():
             item = self._waiting.popleft() if self._waiting else self._read()
             if item is not None:
@@ -137,8 +145,7 @@ class Stream(StreamState[T], Iterator[T]):
     def close(self) -> None:
         """From any thread; an iteration that waits ends."""
         self._closed.set()
-        if self._call is not None:
-            self._call.cancel()
+        self._cancel()
 
     def __enter__(self: S) -> S:
         return self
@@ -147,7 +154,10 @@ class Stream(StreamState[T], Iterator[T]):
         self.close()
 
     def __del__(self) -> None:
-        if getattr(self, "_call", None) is not None:
+        self._cancel()
+
+    def _cancel(self) -> None:
+        if getattr(self, "_call", None) is not None and not self._connection.is_inherited():
             self._call.cancel()
 
     def _open(self) -> None:
@@ -275,6 +285,7 @@ class Writer(Generic[T]):
 
     def finish(self) -> T:
         """Waits until the server has taken all. Errors: as of write."""
+        self._connection.own()
         if self._summary is None:
             self._feed.close()
             try:
@@ -290,6 +301,8 @@ class Writer(Generic[T]):
 
     def cancel(self) -> None:
         """Drops the call; what the server has taken stays."""
+        if self._connection.is_inherited():
+            return
         self._call.cancel()
         self._feed.close()
 
@@ -307,6 +320,7 @@ class Writer(Generic[T]):
             self.cancel()
 
     def _write(self, request: Any) -> None:
+        self._connection.own()
         self._feed.put(request)
         if self._call.done():
             self.finish()

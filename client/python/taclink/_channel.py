@@ -11,6 +11,7 @@ from typing import Any, Union
 import grpc
 
 from taclink._patience import patience_s
+from taclink._process import check
 from taclink.errors import InvalidArgument, NotFound
 from taclink.v1 import operations_pb2_grpc, recording_pb2_grpc, simulation_pb2_grpc, tactile_pb2_grpc
 
@@ -98,6 +99,7 @@ def settings(
         raise InvalidArgument(f"the token would go to {address} in the clear; use TLS (ca_file)")
     credentials = None
     if ca_file is not None:
+        check()  # gRPC makes something of them
         credentials = grpc.ssl_channel_credentials(_read(ca_file), _read(key_file), _read(certificate_file))
     metadata = (("authorization", f"Bearer {token}"),) if token else ()
     return Settings(address, credentials, metadata, options())

@@ -67,6 +67,10 @@ class Cancelled(TaclinkError):
     """The call was ended from this side."""
 
 
+class WrongProcess(TaclinkError):
+    """A process that was forked uses what its parent has, or gRPC, which its parent has used."""
+
+
 class Internal(TaclinkError):
     """Anything else; most likely a defect."""
 
@@ -136,6 +140,14 @@ def lost(details: str, address: str) -> Unavailable:
 
 def ended_by_server(reason: str, address: str) -> Unavailable:
     return Unavailable(f"the server at {address} ended the stream: {reason}", details=reason, address=address)
+
+
+def forked(what: str) -> WrongProcess:
+    return WrongProcess(
+        f"{what}; start processes with multiprocessing.set_start_method('spawn') (PyTorch: "
+        "DataLoader(multiprocessing_context='spawn')), or fork before the first client is used, and make a client in "
+        "each process"
+    )
 
 
 def closed() -> Cancelled:

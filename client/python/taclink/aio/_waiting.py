@@ -13,6 +13,7 @@ import grpc
 from taclink import errors
 from taclink._calls import Call
 from taclink._channel import Settings, stubs
+from taclink._process import Owned, closed, opened
 from taclink._reconnect import RETRIED, Attempts
 from taclink._streams import StreamState
 
@@ -31,6 +32,7 @@ class Channel:
         else:
             self._channel = grpc.aio.secure_channel(settings.address, settings.credentials, settings.options)
         self._stubs = stubs(self._channel)
+        opened(self)
 
     def start(self, service: str, method: str, request: Any, timeout_s: float | None = None) -> Any:
         """The running call."""
@@ -41,9 +43,10 @@ class Channel:
 
     async def close(self) -> None:
         await self._channel.close()
+        closed(self)
 
 
-class Connection:
+class Connection(Owned):
     """Of one event loop: that in which it is first used."""
 
     def __init__(self, settings: Settings, timeout_s: float) -> None:
@@ -55,6 +58,7 @@ class Connection:
         self._streams: weakref.WeakSet[Stream[Any]] = weakref.WeakSet()
 
     def channel(self) -> Channel:
+        self.own()
         if self.closed:
             raise errors.closed()
         if self._channel is None:
@@ -83,6 +87,8 @@ class Connection:
 
     async def close(self) -> None:
         self.closed = True
+        if self.is_inherited():
+            return
         for stream in tuple(self._streams):
             await stream.close()
         if self._channel is not None:
@@ -124,6 +130,7 @@ class Stream(StreamState[T], AsyncIterator[T]):
         connection.hold(self)
 
     async def __anext__(self) -> T:
+        self._connection.own()
         if self._call is None and not self._closed.is_set():
             await self._open_or_end()
         while not self._closed.is_set():
@@ -137,8 +144,7 @@ class Stream(StreamState[T], AsyncIterator[T]):
     async def close(self) -> None:
         """From any task of the loop; an iteration that waits ends."""
         self._closed.set()
-        if self._call is not None:
-            self._call.cancel()
+        self._cancel()
 
     async def __aenter__(self: S) -> S:
         if self._call is None:
@@ -149,7 +155,10 @@ class Stream(StreamState[T], AsyncIterator[T]):
         await self.close()
 
     def __del__(self) -> None:
-        if getattr(self, "_call", None) is not None:
+        self._cancel()
+
+    def _cancel(self) -> None:
+        if getattr(self, "_call", None) is not None and not self._connection.is_inherited():
             self._call.cancel()
 
     async def _open_or_end(self) -> None:
@@ -280,7 +289,7 @@ class Writer(Generic[T]):
 
     def cancel(self) -> None:
         """Drops the call; what the server has taken stays."""
-        if self._call is not None:
+        if self._call is not None and not self._connection.is_inherited():
             self._call.cancel()
 
     async def __aenter__(self: W) -> W:
@@ -293,6 +302,7 @@ class Writer(Generic[T]):
             self.cancel()
 
     def _started(self) -> Any:
+        self._connection.own()
         if self._call is None:
             self._channel = self._connection.channel()
             self._call = self._channel.start_writing("tactile", self._method)
