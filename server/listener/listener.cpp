@@ -253,6 +253,7 @@ void Listener::Running::Take(int fd, const sockaddr_storage& from) {
   connections[id] = {.watch = watch, .fd = fd, .peer = peer};
   pending.push_back(id);
   ++counts.connections;
+  HandOverPending();  // those that came before first
 }
 
 void Listener::Running::HandOverPending() {
