@@ -70,7 +70,9 @@ void PumpedStream::Pump() {
     case Step::kNothing:
       break;
     case Step::kWrite:
-      StartWrite(&message_);
+      // Done once the system has taken its bytes, and not once gRPC has: else another message would wait
+      // there, and grow old, on a slow link.
+      StartWrite(&message_, grpc::WriteOptions().set_write_through());
       break;
     case Step::kWriteLast:
       StartWriteAndFinish(&message_, grpc::WriteOptions(), status);
