@@ -11,10 +11,9 @@
 #include <filesystem>
 #include <mutex>
 #include <system_error>
-#include <thread>
 #include <utility>
 
-#include "server/process/thread_setup.h"
+#include "sensing/core/thread_start.h"
 
 namespace taclink::server {
 
@@ -79,7 +78,7 @@ LogWriter::LogWriter(Write write, CountLine count_line)
 
 LogWriter::LogWriter(Write write, CountLine count_line, const Limits& limits, Now now)
     : state_(std::make_shared<State>(std::move(write), std::move(count_line), limits, std::move(now))) {
-  std::thread([state = state_] { state->Run(); }).detach();
+  MustStartThread("log", [state = state_] { state->Run(); }).detach();
 }
 
 LogWriter::~LogWriter() {
@@ -113,7 +112,6 @@ bool LogWriter::Flush(std::chrono::milliseconds limit) {
 }
 
 void LogWriter::State::Run() {
-  SetUpThread("log", {});
   std::unique_lock lock(mutex);
   while (true) {
     changed.wait(lock, [this] { return !lines.empty() || left_out > 0 || is_ending; });

@@ -38,7 +38,7 @@ class LogWriter {
     size_t bytes = size_t{4} << 20;
   };
 
-  /// Throws std::system_error where no thread can be had.
+  /// Throws std::runtime_error where no thread can be had.
   LogWriter(Write write, CountLine count_line);
   LogWriter(Write write, CountLine count_line, const Limits& limits, Now now);
   ~LogWriter();

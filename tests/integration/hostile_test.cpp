@@ -11,6 +11,7 @@
 #include "taclink/v1/tactile.grpc.pb.h"
 #include "tests/integration/raw_socket.h"
 #include "tests/integration/support.h"
+#include "tests/support/http2_frames.h"
 #include "tests/support/memory.h"
 #include "tests/support/paths.h"
 #include "tests/support/process.h"
@@ -130,6 +131,37 @@ TEST_F(Hostile, GarbageOnThePort) {
     for (size_t i = random() % 5000; i > 0; --i) bytes += static_cast<char>(random());
     socket.Send(bytes);
     if (random() % 4 == 0) socket.Send("GET / HTTP/1.1\r\nHost: robot\r\n\r\n");
+  });
+}
+
+// Whole frames, so that any of them may come after any other.
+std::vector<std::string> Http2Floods() {
+  using namespace taclink::testing;
+  const std::string call =
+      Frame(Http2Frame::kHeaders, kEndHeaders, 1, CallFields("/taclink.v1.TactileService/GetArm"));
+  const std::string zeros(4, '\0');
+  return {Frame(Http2Frame::kHeaders, 0, 1, CallFields("/x")) +
+              Frame(Http2Frame::kContinuation, 0, 1, Field("a", std::string(100, 'b'))),
+          Frame(Http2Frame::kContinuation, 0, 1, Field("a", std::string(100, 'b'))),
+          call + Frame(Http2Frame::kReset, 0, 1, zeros),
+          call + Frame(Http2Frame::kWindowUpdate, 0, 1, zeros),
+          Frame(Http2Frame::kSettings, 0, 0),
+          Frame(Http2Frame::kPing, 0, 0, "12345678"),
+          Frame(Http2Frame::kPriority, 0, 1, "12345"),
+          Frame(Http2Frame::kWindowUpdate, 0, 0, std::string("\0\0\0\1", 4)),
+          Frame(Http2Frame::kData, 0, 1)};
+}
+
+TEST_F(Hostile, FloodsOfFramesEndTheirConnection) {
+  ExpectFlatMemory(2, [&] {
+    for (const std::string& flood : Http2Floods()) {
+      const RawSocket socket(server_.server().address());
+      std::string many;
+      while (many.size() < 20'000) many += flood;
+      socket.Send(taclink::testing::Preface());
+      // What comes after a header block that does not end is none of the other kinds.
+      EXPECT_TRUE(socket.Flood(many, size_t{64} << 20)) << flood;
+    }
   });
 }
 

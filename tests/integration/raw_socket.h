@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <string>
 #include <utility>
@@ -33,6 +34,17 @@ class RawSocket {
   /// As much as the other side takes at once.
   void Send(const std::string& bytes) const {
     [[maybe_unused]] const ssize_t sent = send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  }
+  /// Sends `bytes` again and again. True: the other side has closed, before it got `most` bytes.
+  bool Flood(const std::string& bytes, size_t most) const {
+    for (size_t sent = 0; sent < most;) {
+      pollfd room{.fd = fd_, .events = POLLOUT, .revents = 0};
+      if (poll(&room, 1, -1) < 0) return false;
+      const ssize_t some = send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+      if (some < 0 && errno != EAGAIN) return true;
+      sent += some > 0 ? static_cast<size_t>(some) : 0;
+    }
+    return false;
   }
   /// Reads and forgets until the other side closes. False: it did not by `timeout`.
   bool WaitForEnd(std::chrono::milliseconds timeout) const {

@@ -51,6 +51,30 @@ TEST(Stream, FramesOfTwoLinksReachTwoClientsInOrder) {
   }
 }
 
+// A client that does not read, as one behind a network that carries nothing.
+TEST(Stream, HowLateFramesAreIsTold) {
+  TestServer server;
+  auto client = server.Connect();
+  v1::StreamFramesRequest request = OfLinks({"upper"});
+  request.set_detail(v1::DETAIL_FULL);
+  const auto reader = Stream(client, request);
+  const auto publish = [&](uint64_t sequence) { server.Publish(0, sequence, server.clock().MonotonicNs()); };
+  uint64_t sequence = 0;
+  while (sequence < 200) publish(++sequence);
+  server.clock().Advance(std::chrono::seconds(5));
+  publish(++sequence);
+  v1::LinkFrame frame;
+  while (frame.sequence() < sequence) frame = NextOf(*reader);
+  // The status follows within a second of the last one, with another frame.
+  const auto give_up = std::chrono::steady_clock::now() + kForever;
+  while (reader->status().lateness_s() == 0 && std::chrono::steady_clock::now() < give_up) {
+    publish(++sequence);
+    NextOf(*reader);
+  }
+  EXPECT_GE(reader->status().lateness_s(), 5);
+  EXPECT_GT(reader->status().links(0).frames_dropped(), 0u);
+}
+
 TEST(Stream, AClientLeavesOldFramesOut) {
   TestServer server;
   auto client = server.Connect();

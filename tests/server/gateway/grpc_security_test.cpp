@@ -3,8 +3,10 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/unknown_field_set.h>
 #include <grpcpp/create_channel.h>
+#include <openssl/ssl.h>
 
 #include <algorithm>
+#include <csignal>
 #include <future>
 #include <utility>
 #include <vector>
@@ -16,6 +18,7 @@
 #include "tests/integration/support.h"
 #include "tests/server/gateway/security_support.h"
 #include "tests/server/gateway/support.h"
+#include "tests/support/http2_frames.h"
 
 namespace taclink::server {
 namespace {
@@ -120,6 +123,45 @@ std::vector<std::string> ServiceNames(const std::string& answer) {
 bool InTable(const std::string& path) {
   const auto table = AccessTable();
   return std::any_of(table.begin(), table.end(), [&](const AccessRule& rule) { return rule.path == path; });
+}
+
+/// Sends `begin` and then `flood` over and over, encrypted. Whether the server ended that before it got
+/// `most` bytes.
+bool FloodTls(const std::string& address, const std::string& begin, const std::string& flood, size_t most) {
+  SSL_CTX* const context = SSL_CTX_new(TLS_client_method());
+  const unsigned char protocols[] = "\x02h2";
+  SSL_CTX_set_alpn_protos(context, protocols, sizeof protocols - 1);
+  BIO* const bio = BIO_new_ssl_connect(context);
+  BIO_set_conn_hostname(bio, address.c_str());
+  const bool shaken = BIO_do_connect(bio) == 1 && BIO_do_handshake(bio) == 1;
+  EXPECT_TRUE(shaken);
+  bool ended = false;
+  if (shaken) BIO_write(bio, begin.data(), static_cast<int>(begin.size()));
+  for (size_t sent = 0; shaken && !ended && sent < most; sent += flood.size())
+    ended = BIO_write(bio, flood.data(), static_cast<int>(flood.size())) <= 0;
+  BIO_free_all(bio);
+  SSL_CTX_free(context);
+  return ended;
+}
+
+TEST_F(GrpcSecurity, AFloodOfFramesEndsItsEncryptedConnection) {
+  using namespace taclink::testing;
+  std::signal(SIGPIPE, SIG_IGN);  // BIO_write raises it
+  SecurityConfig config = Tls();
+  config.tokens = Path("tokens");
+  Serve(config);
+  std::string continuations, resets;
+  for (int i = 0; i < 100; ++i) {
+    continuations += Frame(Http2Frame::kContinuation, 0, 1, Field("a", std::string(100, 'b')));
+    resets += Frame(Http2Frame::kHeaders, kEndHeaders, 1, CallFields("/x")) +
+              Frame(Http2Frame::kReset, 0, 1, std::string(4, '\0'));
+  }
+  constexpr size_t kMost = size_t{32} << 20;
+  EXPECT_TRUE(FloodTls(server_->address(), Preface() + Frame(Http2Frame::kHeaders, 0, 1, CallFields("/x")),
+                       continuations, kMost));
+  EXPECT_TRUE(FloodTls(server_->address(), Preface(), resets, kMost));
+  EXPECT_GE(server_->connections().violations, 1u);
+  EXPECT_EQ(GetArm({.ca_file = Path("ca.pem"), .token = kOperator}), kGood) << "others go on";
 }
 
 TEST_F(GrpcSecurity, EveryMethodOfEveryServiceIsInTheTable) {
