@@ -154,7 +154,7 @@ Result<void> Listener::Running::Prepare() {
 
 void Listener::Running::Wake() const {
   const uint64_t one = 1;
-  static_cast<void>(::write(wake, &one, sizeof one));
+  [[maybe_unused]] const ssize_t written = ::write(wake, &one, sizeof one);
 }
 
 void Listener::Running::Run(const std::stop_token& stop) {
@@ -165,7 +165,7 @@ void Listener::Running::Run(const std::stop_token& stop) {
       const uint64_t id = events[static_cast<size_t>(i)].data.u64;
       if (id == kWake) {
         uint64_t woken = 0;
-        static_cast<void>(::read(wake, &woken, sizeof woken));
+        [[maybe_unused]] const ssize_t size = ::read(wake, &woken, sizeof woken);
       } else if ((id & kListening) != 0) {
         Accept(static_cast<int>(id & ~kListening));
       } else {

@@ -160,7 +160,7 @@ TEST_F(CrashTest, WhatWasSyncedIsNotLost) {
     const auto unfinished = folder_.Unfinished();
     ASSERT_EQ(unfinished.size(), 1u);
     EXPECT_EQ(unfinished[0].name, killed.log);
-    const std::string told = folder_.Recover(killed.log);
+    const std::string told = folder_.Recover(killed.log).value_or("it is locked");
     ASSERT_TRUE(folder_.Unfinished().empty()) << told;
     ExpectComplete(folder_.FinalPath(killed.log), killed);
     ASSERT_TRUE(folder_.Delete(killed.log).ok());
