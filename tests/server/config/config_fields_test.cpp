@@ -21,7 +21,7 @@ using Values = std::map<std::string, std::set<std::string>>;  // of every key, a
 // Every key, with another value than its default, at least in one link.
 constexpr const char* kEverything = R"(taclink_config: 1
 server: {listen: "127.0.0.1:1"}
-limits: {max_links: 33, max_streams: 3, max_streams_per_peer: 2, max_calls_per_connection: 4, max_message_kb: 65, memory_mb: 257,
+limits: {max_links: 33, max_connections: 255, max_connections_per_peer: 63, max_streams: 3, max_streams_per_peer: 2, max_calls_per_connection: 4, max_message_kb: 65, memory_mb: 257,
   queue_messages: 5, queue_mb: 33, queue_mb_per_peer: 65, keepalive_s: 7, keepalive_timeout_s: 8, handshake_timeout_s: 9,
   idle_timeout_s: 10, max_frame_age_s: 0.25}
 http: {listen: "", web_root: /web, max_connections: 7, max_connections_per_peer: 5, header_timeout_s: 1.5, idle_timeout_s: 2.5,

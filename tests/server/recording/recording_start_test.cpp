@@ -35,10 +35,7 @@ class RecordingStartTest : public ::testing::Test {
     request.set_pictures(true);
     return request;
   }
-  size_t FilesInFolder() const {
-    const std::filesystem::directory_iterator files(folder_.path());
-    return static_cast<size_t>(std::distance(begin(files), end(files)));
-  }
+  size_t Logs() const { return recorder_->folder().List().size(); }
 
   const TemporaryFolder folder_;
   ManualClock clock_;
@@ -55,22 +52,21 @@ TEST_F(RecordingStartTest, WithoutAThreadTheCallIsRefusedAndNothingIsLeft) {
     EXPECT_THAT(refused.error().message, HasSubstr("no thread can be started for recording"));
     EXPECT_EQ(shortage.refused(), 1);
   }
-  EXPECT_EQ(FilesInFolder(), 0u) << "no log that would be unfinished";
+  EXPECT_EQ(Logs(), 0u) << "no log that would be unfinished";
   EXPECT_FALSE(arm_->hub().WantsPictures(0)) << "no subscription";
   EXPECT_EQ(recorder_->Status().state(), v1::RECORDER_STATE_IDLE);
 
   ASSERT_TRUE(recorder_->Start(WithPictures(), "test").ok());
   EXPECT_TRUE(arm_->hub().WantsPictures(0));
   ASSERT_TRUE(recorder_->Stop("test").ok());
-  EXPECT_EQ(FilesInFolder(), 1u);
+  EXPECT_EQ(Logs(), 1u);
 }
 
 TEST_F(RecordingStartTest, WithoutAThreadUnfinishedLogsStayAndTheServerGoesOn) {
   const std::string part = folder_.path() + "/test-20261122T120137Z-001.mcap.part";
   ASSERT_TRUE(recorder_->Start({}, "test").ok());
   ASSERT_TRUE(recorder_->Stop("test").ok());
-  const auto log = *std::filesystem::directory_iterator(folder_.path());
-  std::filesystem::rename(log.path(), part);
+  std::filesystem::rename(recorder_->folder().PathOf(recorder_->folder().List().front()), part);
   const ThreadShortage shortage("log-mender");
   recorder_->Open();
   EXPECT_EQ(shortage.refused(), 1);
