@@ -130,10 +130,9 @@ Result<Config> ConfigureReplay(const ReplayedLog& log, Config server) {
 Result<ReplayedArm> BuildReplayedArm(const ReplayedLog& log, const Config& config, const std::string& version,
                                      Clock& clock) {
   const auto& statistics = log.reader->statistics();
-  const auto schedule =
-      std::make_shared<ReplaySchedule>(static_cast<int64_t>(statistics.message_start_ns),
-                                       static_cast<int64_t>(statistics.message_end_ns), clock,
-                                       LogGaps(*log.reader));
+  const auto schedule = std::make_shared<ReplaySchedule>(static_cast<int64_t>(statistics.message_start_ns),
+                                                         static_cast<int64_t>(statistics.message_end_ns),
+                                                         clock, LogGaps(*log.reader));
   auto poses = BuildPoses(log, config);
   if (!poses) return poses.error();
   std::vector<LinkParts> links;

@@ -16,7 +16,6 @@ Http2Inspector::Http2Inspector(const Http2Limits& limits)
     : limits_(limits),
       resets_(limits.reset_burst, limits.resets_per_s),
       controls_(limits.control_burst, limits.controls_per_s),
-      updates_(limits.update_burst, limits.updates_per_s),
       calls_(limits.call_burst, limits.calls_per_s),
       frames_(limits.frame_burst, limits.frames_per_s) {}
 
@@ -101,9 +100,9 @@ bool Http2Inspector::OnWindowUpdate(int64_t now_ns) {
   payload_left_ -= std::min(payload_left_, kIncrementBytes);
   const bool is_zero =
       std::all_of(header_.begin() + kHeaderBytes, header_.end(), [](uint8_t byte) { return byte == 0; });
-  if (is_zero)
-    return Spend(resets_, now_ns, "streams that an empty WINDOW_UPDATE resets", limits_.resets_per_s);
-  return Spend(updates_, now_ns, "WINDOW_UPDATE frames", limits_.updates_per_s);
+  // Others are not bounded once the connection is proven: who reads fast sends two for each message.
+  return !is_zero ||
+         Spend(resets_, now_ns, "streams that an empty WINDOW_UPDATE resets", limits_.resets_per_s);
 }
 
 bool Http2Inspector::Spend(TokenBucket& bucket, int64_t now_ns, const char* what, double per_s) {

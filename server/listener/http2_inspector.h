@@ -15,8 +15,7 @@ struct Http2Limits {
   size_t header_bytes = size_t{64} << 10;  ///< of one header block: HEADERS and its CONTINUATION frames
   int continuations = 8;                   ///< CONTINUATION frames of one header block
   double reset_burst = 200, resets_per_s = 100;
-  double control_burst = 1000, controls_per_s = 200;     ///< SETTINGS, PING, PRIORITY, empty frames
-  double update_burst = 20'000, updates_per_s = 10'000;  ///< WINDOW_UPDATE
+  double control_burst = 1000, controls_per_s = 200;  ///< SETTINGS, PING, PRIORITY, empty frames
   // Until somebody who may has called:
   double call_burst = 200, calls_per_s = 50;
   double frame_burst = 5000, frames_per_s = 1000;  ///< of any kind
@@ -60,7 +59,7 @@ class Http2Inspector {
   bool Refuse(std::string why);
 
   const Http2Limits limits_;
-  TokenBucket resets_, controls_, updates_, calls_, frames_;
+  TokenBucket resets_, controls_, calls_, frames_;
   size_t preface_left_ = kPrefaceBytes;
   std::array<uint8_t, kHeaderBytes + kIncrementBytes>
       header_{};            // of the frame; with a WINDOW_UPDATE's payload

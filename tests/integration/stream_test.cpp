@@ -55,9 +55,7 @@ TEST(Stream, FramesOfTwoLinksReachTwoClientsInOrder) {
 TEST(Stream, HowLateFramesAreIsTold) {
   TestServer server;
   auto client = server.Connect();
-  v1::StreamFramesRequest request = OfLinks({"upper"});
-  request.set_detail(v1::DETAIL_FULL);
-  const auto reader = Stream(client, request);
+  const auto reader = Stream(client, Every(v1::DETAIL_FULL));
   const auto publish = [&](uint64_t sequence) { server.Publish(0, sequence, server.clock().MonotonicNs()); };
   uint64_t sequence = 0;
   while (sequence < 200) publish(++sequence);
