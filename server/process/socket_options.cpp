@@ -7,7 +7,7 @@
 namespace taclink::server {
 
 void BoundUnsent(int socket) {
-  const int bytes = 4 << 10;  // the kernel takes up to twice as much
+  const int bytes = 1;  // nothing; 0 would be no limit
   static_cast<void>(::setsockopt(socket, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &bytes, sizeof bytes));
 }
 
