@@ -19,6 +19,7 @@
 #include "server/assembly/source_factory.h"
 #include "server/hub/encoder.h"
 #include "server/process/background_thread.h"
+#include "server/process/system_limits.h"
 
 namespace taclink::server {
 namespace {
@@ -140,7 +141,7 @@ Result<LinkParts> Guarded(Build build) {
   try {
     return build();
   } catch (const std::exception& e) {
-    return Error{ErrorCode::kInternal, e.what()};
+    return Error{ErrorCode::kInternal, DescribeLimit(e)};
   }
 }
 

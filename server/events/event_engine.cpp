@@ -14,7 +14,6 @@
 #include "sensing/core/printable.h"
 #include "sensing/core/thread_start.h"
 #include "server/process/system_limits.h"
-#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 namespace {

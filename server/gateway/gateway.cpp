@@ -27,7 +27,6 @@
 #include "server/gateway/session.h"
 #include "server/process/socket_options.h"
 #include "server/process/system_limits.h"
-#include "server/process/thread_setup.h"
 #include "server/security/party.h"
 #include "server/security/shares.h"
 #include "server/security/tls_policy.h"

@@ -7,7 +7,6 @@
 
 #include "sensing/core/thread_start.h"
 #include "server/process/system_limits.h"
-#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 

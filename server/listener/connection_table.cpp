@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
 #include "server/security/shares.h"
@@ -12,14 +13,24 @@ namespace {
 
 constexpr double kLocalBurst = 4096, kLocalPerS = 4096;  // no limit for programs and scripts on this machine
 constexpr double kRemoteBurst = 128, kRemotePerS = 40;
-constexpr double kPunishedBurst = 1, kPunishedPerS = 20;
+constexpr double kPunishedBurst = 1, kPunishedPerS = 100;
 constexpr int64_t kPunishmentNs = 10'000'000'000;
+constexpr int64_t kSweepIntervalNs = 1'000'000'000;
 constexpr size_t kMostPaces = 1024;
-constexpr size_t kMostWaiting = 32;  // of one address
+constexpr size_t kUnprovenShare = 8,
+                 kLeastUnproven = 4;  // of all connections, for one address; twice for all
+constexpr size_t kMostWaiting = 64;   // of one address
 
-// gRPC writes the brackets of IPv6 in its own way.
-std::string KeyOf(const std::string& peer, const Place& place) {
-  return place.address + peer.substr(std::min(peer.rfind(':'), peer.size()));
+// One text for one connection, whether gRPC tells its peer (IPv6 in brackets as %5B and %5D, with the scope)
+// or the listener.
+std::string KeyOf(const std::string& peer) {
+  const size_t port = std::min(peer.rfind(':'), peer.size());
+  std::string host = peer.substr(0, port);
+  for (const std::string_view bracket : {"[", "%5B", "%5b"}) {
+    if (const size_t at = host.find(bracket); at != std::string::npos) host.erase(at, bracket.size());
+  }
+  host.erase(std::min(host.find_first_of("]%"), host.size()));
+  return host + peer.substr(port);
 }
 
 // All addresses of this machine are one place.
@@ -56,9 +67,18 @@ Result<ConnectionTable::Admission> ConnectionTable::Admit(const std::string& pee
   if (Count([&](const Connection& other) { return other.waiting && same(other); }) >= kMostWaiting)
     return Error{ErrorCode::kResourceExhausted,
                  fmt::format("connections of {} come faster than they are taken", NameOf(place))};
+  const auto unproven = [](const Connection& other) { return !other.proven; };
   Admission admission;
   std::string taken;
-  if (Count(same) >= most_here) {
+  // The memory that connections without an authorized call can take is bounded by their number.
+  const size_t most_unproven = std::max(limits_.all / kUnprovenShare, kLeastUnproven);
+  if (Count([&](const Connection& other) { return unproven(other) && same(other); }) >= most_unproven) {
+    taken = fmt::format("{} connections of {} without an authorized call", most_unproven, NameOf(place));
+    admission.gives_way = OldestUnproven(same);
+  } else if (Count(unproven) >= 2 * most_unproven) {
+    taken = fmt::format("{} connections without an authorized call", 2 * most_unproven);
+    admission.gives_way = OldestUnproven(any);
+  } else if (Count(same) >= most_here) {
     taken = fmt::format("all {} connections of {}", most_here, NameOf(place));
     admission.gives_way = OldestUnproven(same);
   } else if (!place.local && Count(remote) >= limits_.all - kept) {
@@ -74,8 +94,11 @@ Result<ConnectionTable::Admission> ConnectionTable::Admit(const std::string& pee
                      " are in use; close one or raise limits.max_connections or "
                      "limits.max_connections_per_peer"};
   admission.id = ++last_;
-  connections_[admission.id] = {.place = place, .key = KeyOf(peer, place)};
-  id_of_peer_[connections_[admission.id].key] = admission.id;
+  // gRPC tells the same of all connections of a unix socket, whose permissions say who may connect.
+  const bool is_unix = peer.starts_with("unix");
+  const auto at =
+      connections_.emplace(admission.id, Connection{.place = place, .key = KeyOf(peer), .proven = is_unix});
+  if (!is_unix) id_of_peer_[at.first->second.key] = admission.id;
   return admission;
 }
 
@@ -92,7 +115,7 @@ std::optional<ConnectionTable::Id> ConnectionTable::GiveWay() {
 }
 
 std::optional<ConnectionTable::Id> ConnectionTable::Prove(const std::string& peer) {
-  const auto named = id_of_peer_.find(KeyOf(peer, PlaceOf(peer)));
+  const auto named = id_of_peer_.find(KeyOf(peer));
   if (named == id_of_peer_.end()) return std::nullopt;
   const Id id = named->second;
   id_of_peer_.erase(named);
@@ -101,14 +124,19 @@ std::optional<ConnectionTable::Id> ConnectionTable::Prove(const std::string& pee
 }
 
 ConnectionTable::Pace& ConnectionTable::PaceOf(const Place& place, int64_t now_ns) {
-  // Addresses that have long been silent are as new ones.
-  if (paces_.size() >= kMostPaces)
+  // Addresses that have long been silent are as new ones; where there are too many all the same, they share
+  // one pace.
+  if (paces_.size() >= kMostPaces && now_ns >= next_sweep_ns_) {
+    next_sweep_ns_ = now_ns + kSweepIntervalNs;
     std::erase_if(paces_, [&](const auto& pace) {
       return pace.second.punished_until_ns <= now_ns && pace.second.bucket.IsFull(now_ns);
     });
+  }
+  std::string name = NameOf(place);
+  if (paces_.size() >= kMostPaces && !paces_.contains(name)) name = "others";
   const TokenBucket fresh =
       place.local ? TokenBucket(kLocalBurst, kLocalPerS) : TokenBucket(kRemoteBurst, kRemotePerS);
-  Pace& pace = paces_.try_emplace(NameOf(place), Pace{.bucket = fresh}).first->second;
+  Pace& pace = paces_.try_emplace(name, Pace{.bucket = fresh}).first->second;
   if (pace.punished_until_ns != 0 && pace.punished_until_ns <= now_ns) pace = {.bucket = fresh};
   return pace;
 }

@@ -39,7 +39,8 @@ class ConnectionTable {
   /// The oldest unproven connection, which does not count from now on: descriptors have run out. None: there
   /// is none.
   std::optional<Id> GiveWay();
-  /// Somebody who may has called over the connection from `peer`. None: it is not here, or was proven before.
+  /// An authorized call came over the connection from `peer`. None: it is not here, or was proven before.
+  /// Connections of a unix socket are proven from the start.
   std::optional<Id> Prove(const std::string& peer);
 
   /// How long the next connection of this address must wait before gRPC gets it; 0: not, and it is counted.
@@ -73,6 +74,7 @@ class ConnectionTable {
   std::map<Id, Connection> connections_;            // the oldest first
   std::unordered_map<std::string, Id> id_of_peer_;  // by key; of those that are not proven
   std::map<std::string, Pace> paces_;               // by address
+  int64_t next_sweep_ns_ = 0;                       // of paces_
   Id last_ = 0;
 };
 

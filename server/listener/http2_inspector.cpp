@@ -52,7 +52,8 @@ bool Http2Inspector::OnFrame(int64_t now_ns, bool proven) {
   const size_t length = size_t{header_[0]} << 16 | size_t{header_[1]} << 8 | header_[2];
   const uint8_t flags = header_[4];
   payload_left_ = length;
-  if (!proven && !Spend(frames_, now_ns, "frames without a good call", limits_.frames_per_s)) return false;
+  if (!proven && !Spend(frames_, now_ns, "frames without an authorized call", limits_.frames_per_s))
+    return false;
   switch (static_cast<FrameType>(header_[3])) {
     case FrameType::kHeaders:
       return OnHeaders(length, (flags & kEndHeaders) != 0, now_ns, proven);
@@ -69,20 +70,20 @@ bool Http2Inspector::OnFrame(int64_t now_ns, bool proven) {
       if (length > 0 || (flags & kEndStream) != 0) return true;
       break;
     case FrameType::kSettings:
-    case FrameType::kPing:
       if ((flags & kAck) != 0) return true;  // costs nothing, and the server has asked for it
       break;
+    case FrameType::kPing:
+      return true;  // gRPC ends the connection where they are too many; grpc-go sends one for each DATA frame
     default:
       break;
   }
-  return Spend(controls_, now_ns, "SETTINGS, PING, PRIORITY or empty frames", limits_.controls_per_s);
+  return Spend(controls_, now_ns, "SETTINGS, PRIORITY or empty frames", limits_.controls_per_s);
 }
 
 bool Http2Inspector::OnHeaders(size_t length, bool ends, int64_t now_ns, bool proven) {
   block_bytes_ = 0;
   continuations_ = 0;
-  if (!proven && !Spend(calls_, now_ns, "calls none of which is a good one", limits_.calls_per_s))
-    return false;
+  if (!proven && !Spend(calls_, now_ns, "calls without an authorized one", limits_.calls_per_s)) return false;
   return OnHeaderBlock(length, ends);
 }
 

@@ -14,10 +14,10 @@ namespace taclink::server {
 struct Http2Limits {
   size_t header_bytes = size_t{64} << 10;  ///< of one header block: HEADERS and its CONTINUATION frames
   int continuations = 8;                   ///< CONTINUATION frames of one header block
-  double reset_burst = 200, resets_per_s = 100;
-  double control_burst = 1000, controls_per_s = 200;  ///< SETTINGS, PING, PRIORITY, empty frames
-  // Until somebody who may has called:
-  double call_burst = 200, calls_per_s = 50;
+  double reset_burst = 4000, resets_per_s = 2000;
+  double control_burst = 1000, controls_per_s = 200;  ///< SETTINGS, PRIORITY, empty frames; gRPC bounds PING
+  // Until an authorized call was received:
+  double call_burst = 200, calls_per_s = 40;
   double frame_burst = 5000, frames_per_s = 1000;  ///< of any kind
 };
 
@@ -31,7 +31,7 @@ class Http2Inspector {
 
   /// The next bytes that the client has sent, from the connection preface on. False: the connection must end,
   /// violation() says why; so it stays. Bytes that are not HTTP/2 at all pass: gRPC refuses them. `proven`:
-  /// somebody who may has called over the connection.
+  /// an authorized call was received over the connection.
   bool Feed(std::span<const std::byte> bytes, int64_t now_ns, bool proven = false);
   /// For people; empty: none.
   const std::string& violation() const { return violation_; }

@@ -37,6 +37,7 @@ constexpr uint64_t kWake = 0, kListening = uint64_t{1} << 63;  // of epoll; else
 // Kept for logs, token files, cameras and the HTTP gateway.
 constexpr size_t kReservedDescriptors = 384, kLeastConnections = 16;
 constexpr int kAcceptsAtOnce = 64;
+constexpr std::chrono::milliseconds kAcceptPause{50};  // where nothing can be refused either
 constexpr int64_t kNsPerMs = 1'000'000;
 
 template <typename T>
@@ -94,7 +95,7 @@ struct Listener::Running : std::enable_shared_from_this<Running> {
   ListeningSockets sockets;  // used by the thread, once it runs
   const std::string address;
   int poll = -1, wake = -1;
-  std::atomic<bool> closing = false;
+  std::atomic<bool> closing = false, closed = false;
 
   ListenerCounts counts;
 
@@ -161,18 +162,18 @@ void Listener::Running::Run(const std::stop_token& stop) {
   std::array<epoll_event, 64> events{};
   while (!stop.stop_requested()) {
     const int count = ::epoll_wait(poll, events.data(), static_cast<int>(events.size()), TimeoutMs());
+    if (closing && !closed) StopListening();
     for (int i = 0; i < count; ++i) {
       const uint64_t id = events[static_cast<size_t>(i)].data.u64;
       if (id == kWake) {
         uint64_t woken = 0;
         [[maybe_unused]] const ssize_t size = ::read(wake, &woken, sizeof woken);
       } else if ((id & kListening) != 0) {
-        Accept(static_cast<int>(id & ~kListening));
+        if (!closed) Accept(static_cast<int>(id & ~kListening));
       } else {
         Remove(id);
       }
     }
-    if (closing) StopListening();
     Punish();
     HandOverPending();
   }
@@ -184,6 +185,8 @@ void Listener::Running::StopListening() {
     ::close(connections[id].fd);
     End(id);
   }
+  closed = true;
+  closed.notify_all();
 }
 
 void Listener::Running::Accept(int listening) {
@@ -200,6 +203,7 @@ void Listener::Running::Accept(int listening) {
       ::close(std::exchange(spare, -1));
       ::close(::accept4(listening, nullptr, nullptr, SOCK_CLOEXEC));
       spare = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+      if (spare < 0) std::this_thread::sleep_for(kAcceptPause);  // the connection still waits
       return;
     } else if (errno != ECONNABORTED && errno != EINTR) {
       return;
@@ -287,6 +291,7 @@ void Listener::Running::HandOne(Id id, int fd) {
         SPDLOG_WARN("grpc {}: the connection is closed: it sent {}", peer, why);
         if (const auto self = weak.lock()) self->Violated(id);
       });
+  if (sockets.is_unix()) connection->Prove();
   {
     const std::lock_guard lock(mutex);
     guarded[id] = connection;
@@ -344,6 +349,9 @@ void Listener::Running::Remove(Id id) {
     ::close(at->second.fd);
   }
   Unguard(id, at->second.fd);
+  // The system keeps the registration, and reports the end over and over, until gRPC has closed its
+  // descriptor, which waits for calls that are under way.
+  ::epoll_ctl(poll, EPOLL_CTL_DEL, at->second.watch, nullptr);
   ::close(at->second.watch);
   connections.erase(at);
   --counts.connections;
@@ -377,8 +385,10 @@ Result<void> Listener::Begin(HandOver hand_over) {
 }
 
 void Listener::Close() {
+  if (!running_->thread.joinable()) return;  // nothing was handed over
   running_->closing = true;
   running_->Wake();
+  running_->closed.wait(false);
 }
 
 const std::string& Listener::address() const {

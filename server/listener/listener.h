@@ -43,7 +43,8 @@ class Listener {
 
   /// Hands connections over from now on. Once. Errors: kResourceExhausted (no thread can be started).
   Result<void> Begin(HandOver hand_over);
-  /// Takes no more connections; those that were handed over stay, and are inspected. May be called twice.
+  /// Takes no more connections: none is handed over once it returns. Those that were stay, and are inspected.
+  /// May be called twice.
   void Close();
 
   /// Where it listens, with the real port.

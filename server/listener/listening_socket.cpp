@@ -159,6 +159,10 @@ std::string PeerText(const sockaddr_storage& address) {
     }
     case AF_INET6: {
       const auto& from = reinterpret_cast<const sockaddr_in6&>(address);
+      if (IN6_IS_ADDR_V4MAPPED(&from.sin6_addr)) {
+        ::inet_ntop(AF_INET, &from.sin6_addr.s6_addr[12], text.data(), text.size());
+        return fmt::format("ipv4:{}:{}", text.data(), ntohs(from.sin6_port));
+      }
       ::inet_ntop(AF_INET6, &from.sin6_addr, text.data(), text.size());
       return fmt::format("ipv6:[{}]:{}", text.data(), ntohs(from.sin6_port));
     }

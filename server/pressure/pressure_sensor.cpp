@@ -10,7 +10,6 @@
 #include "sensing/core/thread_start.h"
 #include "sensing/core/units.h"
 #include "server/process/system_limits.h"
-#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 namespace {

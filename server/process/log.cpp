@@ -176,8 +176,8 @@ Result<std::shared_ptr<LogWriter>> WriterFor(const LogOptions& options) {
     auto file = ToFile(options.file);
     if (!file) return file.error();
     return std::make_shared<LogWriter>(std::move(*file), CountOfLeftOut);
-  } catch (const std::system_error& e) {
-    return Error{ErrorCode::kUnavailable, "no thread to write the log: " + std::string(e.what())};
+  } catch (const std::exception& e) {  // no thread
+    return Error{ErrorCode::kUnavailable, "the log cannot be written: " + std::string(e.what())};
   }
 }
 

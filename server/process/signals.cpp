@@ -10,7 +10,6 @@
 
 #include "sensing/core/thread_start.h"
 #include "server/process/log.h"
-#include "server/process/thread_setup.h"
 
 namespace taclink::server {
 

@@ -8,7 +8,6 @@
 #include "sensing/core/thread_start.h"
 #include "server/messages/event_message.h"
 #include "server/process/system_limits.h"
-#include "server/process/thread_setup.h"
 #include "wire/frame_codec.h"
 
 namespace taclink::server {

@@ -10,11 +10,6 @@ Result<std::unique_ptr<LogFile>> LogFile::Create(const LogFolder& folder, const 
                                                  int64_t utc_ns) {
   auto sink = mcap::FileSink::Create(folder.PartPath(name), folder.calls());
   if (!sink) return sink.error();
-  if (const auto ranked = folder.Begin(name); !ranked) {
-    std::error_code ignored;  // nothing is in it
-    std::filesystem::remove(folder.PartPath(name), ignored);
-    return ranked.error();
-  }
   std::unique_ptr<LogFile> file(new LogFile(folder, name, std::move(*sink), utc_ns));
   if (const auto begun = file->Begin(preamble, std::move(options)); !begun) {
     file->Discard();

@@ -172,9 +172,11 @@ std::vector<std::string> LogFolder::EnforceQuota(uint64_t quota_bytes) const {
     deleted.push_back(log.name);
   }
   if (deleted.empty()) return deleted;
-  std::set<std::string> existing;
-  for (const LogFileEntry& log : List()) existing.insert(log.name);
-  LogOrder(path_, calls_).Compact(existing);
+  LogOrder(path_, calls_).Compact([this] {
+    std::set<std::string> existing;
+    for (const LogFileEntry& log : List()) existing.insert(log.name);
+    return existing;
+  });
   return deleted;
 }
 

@@ -17,6 +17,7 @@ namespace taclink::server {
 namespace {
 
 constexpr size_t kMostForgotten = 1000;  // names of deleted logs, before they are removed
+constexpr off_t kMostBytes = off_t{16} << 20;
 constexpr int kLockTries = 20;
 constexpr std::chrono::milliseconds kLockPause{10};
 
@@ -34,6 +35,12 @@ void WaitForLock(const std::string& folder, mcap::FileCalls& calls, const auto& 
     std::this_thread::sleep_for(kLockPause);
   }
   then();
+}
+
+// Other programs may put anything there, such as a FIFO or a link to a device without an end.
+bool IsUsable(mcap::FileCalls& calls, int file) {
+  struct stat status{};
+  return calls.Status(file, status) == 0 && S_ISREG(status.st_mode) && status.st_size <= kMostBytes;
 }
 
 int WriteWhole(mcap::FileCalls& calls, int file, std::string& text) {
@@ -56,9 +63,15 @@ Result<void> LogOrder::Append(const std::string& log) const {
   std::string line = "\n" + log + "\n";
   Result<void> appended;
   WaitForLock(folder_, calls_, [&] {
-    const int file = calls_.Open(path_, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0640);
+    const int file = calls_.Open(
+        path_, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY, 0640);
     if (file < 0) {
       appended = OrderError(path_, "cannot be opened");
+      return;
+    }
+    if (!IsUsable(calls_, file)) {
+      appended = Error{ErrorCode::kUnavailable, path_ + " is no regular file of at most 16 MiB; remove it"};
+      calls_.Close(file);
       return;
     }
     if (WriteWhole(calls_, file, line) != 0) {
@@ -73,6 +86,9 @@ Result<void> LogOrder::Append(const std::string& log) const {
 
 std::map<std::string, uint64_t> LogOrder::Ranks() const {
   std::map<std::string, uint64_t> ranks;
+  struct stat status{};
+  if (calls_.Status(path_, status) != 0 || !S_ISREG(status.st_mode) || status.st_size > kMostBytes)
+    return ranks;
   std::ifstream file(path_);
   uint64_t rank = 0;
   for (std::string line; std::getline(file, line);) {
@@ -81,13 +97,14 @@ std::map<std::string, uint64_t> LogOrder::Ranks() const {
   return ranks;
 }
 
-void LogOrder::Compact(const std::set<std::string>& existing) const {
+void LogOrder::Compact(const std::function<std::set<std::string>()>& existing) const {
   const auto lock = FileLock::TryTake(folder_, calls_);
   if (!lock) return;
   std::vector<std::pair<uint64_t, std::string>> kept;
   const auto ranks = Ranks();
+  const auto kept_names = existing();
   for (const auto& [name, rank] : ranks) {
-    if (existing.contains(name)) kept.emplace_back(rank, name);
+    if (kept_names.contains(name)) kept.emplace_back(rank, name);
   }
   if (ranks.size() - kept.size() < kMostForgotten) return;
   std::sort(kept.begin(), kept.end());

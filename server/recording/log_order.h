@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <set>
 #include <string>
@@ -25,8 +26,9 @@ class LogOrder {
   Result<void> Append(const std::string& log) const;
   /// The rank of each log that was appended, rising. Logs that came here in another way have none.
   std::map<std::string, uint64_t> Ranks() const;
-  /// Removes the names of logs that are not in `existing`, if they are many.
-  void Compact(const std::set<std::string>& existing) const;
+  /// Removes the names of logs that are not among `existing`, if they are many. It is called while no other
+  /// server can append.
+  void Compact(const std::function<std::set<std::string>()>& existing) const;
 
  private:
   const std::string folder_, path_;

@@ -11,7 +11,6 @@
 
 #include "sensing/core/thread_start.h"
 #include "server/process/system_limits.h"
-#include "server/process/thread_setup.h"
 #include "taclink/v1/frame.pb.h"
 #include "wire/log/picture.h"
 
@@ -27,6 +26,7 @@ constexpr int64_t kNsPerS = 1'000'000'000;
 constexpr int64_t kLookPeriodNs = kNsPerS / 2, kQuietNs = 10 * kNsPerS;
 constexpr int64_t kQuotaPeriodNs = 10 * kNsPerS;
 constexpr int kFailuresBeforeNewFile = 5;
+constexpr int kNameTries = 100;
 constexpr uint64_t kPictureChunkBytes = uint64_t{4} << 20;
 
 constexpr const char* kBehind =
@@ -72,7 +72,7 @@ Result<std::unique_ptr<Recording>> Recording::Start(Arm& arm, const RecordingCon
   auto file = out->NewFile();
   if (!file) return file.error();
   out->file_ = std::move(*file);
-  out->synced_ns_ = out->looked_ns_ = out->quota_ns_ = arm.clock().MonotonicNs();
+  out->synced_ns_ = out->looked_ns_ = arm.clock().MonotonicNs();
   out->status_.set_started_utc_ns(out->file_->started_utc_ns());
   out->status_.set_pictures(order.pictures);
   out->others_ = std::make_unique<ArmRecorder>(
@@ -113,10 +113,22 @@ Result<std::unique_ptr<LogFile>> Recording::NewFile() {
   preamble.metadata[wire::log::kMetadataName]["part"] = std::to_string(part_ + 1);
   // Another recording may have begun within the same second.
   int number = part_ + 1;
-  while (folder_.Find(LogName(order_.name, utc_ns, number))) ++number;
-  auto file =
-      LogFile::Create(folder_, LogName(order_.name, utc_ns, number), preamble, ToWriter(order_), utc_ns);
+  const auto name = [&] { return LogName(order_.name, utc_ns, number); };
+  while (folder_.Find(name())) ++number;
+  auto file = LogFile::Create(folder_, name(), preamble, ToWriter(order_), utc_ns);
+  // Another server may have taken the name meanwhile.
+  for (int tries = 0; !file && folder_.Find(name()) && tries < kNameTries; ++tries) {
+    ++number;
+    file = LogFile::Create(folder_, name(), preamble, ToWriter(order_), utc_ns);
+  }
   if (!file) return file.error();
+  if (const auto ranked = folder_.Begin((*file)->name()); !ranked) {
+    if (config_.quota_mb > 0) {
+      (*file)->Discard();
+      return ranked.error();
+    }
+    SPDLOG_WARN("recording: {}", ranked.error().message);
+  }
   ++part_;
   return file;
 }
@@ -128,7 +140,6 @@ void Recording::Run(const std::stop_token& stop) {
     std::unique_lock lock(mutex);
     if (subscription_->waiting() == 0) stopped.wait_for(lock, stop, kPoll, [] { return false; });
     Guarded([&] {
-      FollowClock();
       Drain(kRoundNs);
       LookIfDue();
       SyncIfDue();
@@ -141,6 +152,8 @@ void Recording::Run(const std::stop_token& stop) {
   Guarded([this] {
     for (size_t link = 0; link < losses_.links(); ++link) TellLosses(link, 0);
     CloseFile(*file_);
+    quota_ns_ = 0;  // short recordings count, too
+    EnforceQuotaIfDue();
   });
   UpdateStatus();
 }
@@ -240,6 +253,7 @@ void Recording::LookIfDue() {
   const int64_t now_ns = arm_.clock().MonotonicNs();
   if (now_ns - looked_ns_ < kLookPeriodNs) return;
   looked_ns_ = now_ns;
+  FollowClock();
   if (file_->WhereItIs() == mcap::FileSink::Place::kThere) {
     const auto writable = folder_.CheckWritable();
     if (writable) return place_trouble_.text.clear();
@@ -303,13 +317,16 @@ bool Recording::Sync() {
   return false;
 }
 
-// Times before and after a step are on two time lines, and a log has one.
+// Where no other log can begin, this one goes on with its own time line.
 void Recording::FollowClock() {
   const auto step_ns = log_clock_.Step();
   if (!step_ns) return;
-  SPDLOG_WARN("recording: the clock was set by {:+.3f} s; another log begins",
-              static_cast<double>(*step_ns) * 1e-9);
-  if (const auto next = NextFile(); !next) SetTrouble(split_trouble_, next.error().message);
+  const double step_s = static_cast<double>(*step_ns) * 1e-9;
+  if (const auto next = NextFile(); !next)
+    return SetTrouble(split_trouble_,
+                      fmt::format("the clock was set by {:+.3f} s, and no other log can begin: {}", step_s,
+                                  next.error().message));
+  SPDLOG_WARN("recording: the clock was set by {:+.3f} s; another log begins", step_s);
 }
 
 void Recording::SplitIfDue() {
@@ -322,7 +339,7 @@ void Recording::SplitIfDue() {
 
 void Recording::EnforceQuotaIfDue() {
   const int64_t now_ns = arm_.clock().MonotonicNs();
-  if (config_.quota_mb <= 0 || now_ns - quota_ns_ < kQuotaPeriodNs) return;
+  if (config_.quota_mb <= 0 || (quota_ns_ != 0 && now_ns - quota_ns_ < kQuotaPeriodNs)) return;
   quota_ns_ = now_ns;
   const auto deleted = folder_.EnforceQuota(Megabytes(config_.quota_mb));
   if (deleted.empty()) return;

@@ -9,7 +9,6 @@
 
 #include "sensing/core/thread_start.h"
 #include "server/process/system_limits.h"
-#include "server/process/thread_setup.h"
 #include "taclink/v1/log.pb.h"
 
 namespace taclink::server {

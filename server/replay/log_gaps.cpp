@@ -13,11 +13,11 @@ int64_t SignedNs(uint64_t time_ns) {
   return static_cast<int64_t>(std::min<uint64_t>(time_ns, std::numeric_limits<int64_t>::max()));
 }
 
-// A chunk that itself spans a gap: the clock was set while it was open.
-void AddMessages(const mcap::Reader& reader, const mcap::ChunkIndex& chunk,
+// A chunk that itself spans a gap: the clock was set while it was open. Reads no more than `most` messages.
+void AddMessages(const mcap::Reader& reader, const mcap::ChunkIndex& chunk, size_t& most,
                  std::vector<std::pair<int64_t, int64_t>>& spans) {
   mcap::MessageCursor cursor(reader, {.start_ns = chunk.message_start_ns, .end_ns = chunk.message_end_ns});
-  while (true) {
+  for (; most > 0; --most) {
     const auto message = cursor.Next();
     if (!message && message.error().code == ErrorCode::kEndOfData) return;
     if (message) spans.emplace_back(SignedNs(message->log_time_ns), SignedNs(message->log_time_ns));
@@ -27,16 +27,12 @@ void AddMessages(const mcap::Reader& reader, const mcap::ChunkIndex& chunk,
 }  // namespace
 
 LogGaps::LogGaps(const mcap::Reader& reader) {
-  constexpr int kMostChunksRead = 16;  // a log of few messages may have nothing but long chunks
-  int read = 0;
+  size_t most = 100'000;  // in all: a log of few messages may have nothing but long chunks
   std::vector<std::pair<int64_t, int64_t>> spans;
   for (const mcap::ChunkIndex& chunk : reader.chunk_indexes()) {
     const std::pair span(SignedNs(chunk.message_start_ns), SignedNs(chunk.message_end_ns));
-    if (span.second - span.first >= kLeastGapNs && read++ < kMostChunksRead) {
-      AddMessages(reader, chunk, spans);
-    } else {
-      spans.push_back(span);
-    }
+    if (span.second - span.first >= kLeastGapNs) AddMessages(reader, chunk, most, spans);
+    if (span.second - span.first < kLeastGapNs || most == 0) spans.push_back(span);
   }
   std::sort(spans.begin(), spans.end());
   for (size_t i = 0, newest = 0; i < spans.size(); ++i) {

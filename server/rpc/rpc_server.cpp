@@ -65,7 +65,7 @@ RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const
       service_(arm, limits, senders_, security),
       operations_(arm, security),
       simulations_(arm),
-      health_(ServiceNames(recorder != nullptr), service_.registry(), senders_, security) {
+      health_(ServiceNames(recorder != nullptr), senders_, security) {
   if (recorder != nullptr)
     recordings_ = std::make_unique<RecordingService>(*recorder, service_.registry(), senders_, security);
 }
@@ -120,7 +120,7 @@ RpcServer::~RpcServer() {
 void RpcServer::Shutdown(const std::string& reason, std::chrono::milliseconds patience) {
   if (!server_) return;
   listener_->Close();
-  health_.Stop();
+  health_.Stop(reason);
   service_.EndStreams(reason);
   // Calls from within the process lose their last words once gRPC shuts down, so they get their time before.
   const auto deadline = std::chrono::system_clock::now() + patience;

@@ -10,7 +10,6 @@
 #include "sensing/core/thread_start.h"
 #include "sensing/core/utc_time.h"
 #include "server/process/system_limits.h"
-#include "server/process/thread_setup.h"
 #include "server/security/secret_file.h"
 
 namespace taclink::server {

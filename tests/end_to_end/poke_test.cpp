@@ -13,6 +13,7 @@ using ::testing::HasSubstr;
 constexpr const char* kFreeScene =
     "taclink_scene: 1\nname: rest\nmodel: cylinder\nframe_rate_hz: 20\nduration_s: 3600\n";
 constexpr const char* kFreeArm = R"(taclink_config: 1
+limits: {max_frame_age_s: 3600}
 arm:
   name: test
   links:

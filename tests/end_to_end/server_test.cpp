@@ -34,7 +34,8 @@ class ServerTest : public ScratchFolder {
     ASSERT_NE(address_, "");
   }
 
-  void StartSteadyArm(const std::string& of_links = "", const std::string& sections = "") {
+  void StartSteadyArm(const std::string& of_links = "",
+                      const std::string& sections = "limits: {max_frame_age_s: 3600}\n") {
     Write("steady.yaml", kServedScene);
     const std::string settings = "model: cylinder, source: simulated, scene: steady.yaml" + of_links;
     StartServer("taclink_config: 1\n" + sections + "arm:\n  name: test\n  links:\n    - {name: a, " +
@@ -165,7 +166,7 @@ TEST_F(ServerTest, CalibrationIsSavedAndUsedFromTheNextStartOn) {
 TEST_F(ServerTest, MissingCameraIsAStatusAndNoOtherLinkMinds) {
   Write("steady.yaml", kServedScene);
   StartServer(
-      "taclink_config: 1\narm:\n  name: test\n  links:\n"
+      "taclink_config: 1\nlimits: {max_frame_age_s: 3600}\narm:\n  name: test\n  links:\n"
       "    - {name: blind, model: cylinder, source: v4l2, devices: [/dev/taclink-none-0, "
       "/dev/taclink-none-1]}\n"
       "    - {name: well, model: cylinder, source: simulated, scene: steady.yaml}\n");
@@ -192,7 +193,8 @@ TEST_F(ServerTest, StoppedClientHarmsNobody) {
   // Without the nonlinear skin, which takes its memory when a dent first asks for it, and with a queue that
   // keeps 2 MB of frames: what waits for a client without a bound would be 35 MB and more at the end. The
   // stopped client is not given up, however long the frames take.
-  StartSteadyArm(", force_model: linear", "limits: {queue_messages: 32, keepalive_s: 3600}\n");
+  StartSteadyArm(", force_model: linear",
+                 "limits: {queue_messages: 32, keepalive_s: 3600, max_frame_age_s: 3600}\n");
   Process slow(Watch({"--detail", "full", "--every"}));
   ASSERT_TRUE(slow.ReadLine(seconds(60)).has_value());
   Process other(Watch({}));

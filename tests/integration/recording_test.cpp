@@ -322,6 +322,7 @@ TEST_F(RecordingTest, WhenTheClockIsSetAnotherLogBeginsAndEachKeepsItsTimeLine) 
   Publish(0, 1, 5);
   WaitFor([](const auto& status) { return status.frames() == 5; });
   server_.clock().StepUtc(-kDay);
+  server_.clock().Advance(std::chrono::seconds(1));
   WaitFor([](const auto& status) { return status.logs() == 2; });
   Publish(0, 6, 8);
   server_.clock().Advance(std::chrono::seconds(2));
@@ -349,6 +350,7 @@ TEST_F(QuotaTest, EachDeletionIsAnEventAndTheNewestStay) {
   Publish(0, 1, 5);
   WaitFor([](const auto& status) { return status.frames() == 5; });
   server_.clock().StepUtc(-std::chrono::hours(24));
+  server_.clock().Advance(std::chrono::seconds(1));
   WaitFor([](const auto& status) { return status.logs() == 2; });
   const std::string newest = recordings_.Status()->log();
   server_.clock().Advance(std::chrono::seconds(20));

@@ -18,6 +18,8 @@ namespace {
 using HealthRequest = google::protobuf::StringValue;   // HealthCheckRequest: string service = 1
 using HealthResponse = google::protobuf::UInt32Value;  // HealthCheckResponse: ServingStatus status = 1
 
+constexpr size_t kMostWatches = 64, kMostWatchesPerParty = 8;
+
 // HealthCheckResponse.ServingStatus
 enum class ServingStatus : uint32_t { kServing = 1, kNotServing = 2, kServiceUnknown = 3 };
 
@@ -52,13 +54,14 @@ class HealthStream final : public PumpedStream {
 
 }  // namespace
 
-HealthService::HealthService(std::set<std::string> services, StreamRegistry& registry,
+HealthService::HealthService(std::set<std::string> services,
                              std::shared_ptr<boost::asio::thread_pool> senders,
                              std::shared_ptr<const Security> security)
     : services_(std::move(services)),
-      registry_(registry),
       senders_(std::move(senders)),
-      security_(std::move(security)) {
+      security_(std::move(security)),
+      registry_({.streams = {.all = kMostWatches, .per_party = kMostWatchesPerParty}},
+                {.things = "watches of health", .all_setting = "", .party_setting = ""}) {
   using grpc::internal::RpcMethod;
   using grpc::internal::RpcServiceMethod;
   // As generated code does it.

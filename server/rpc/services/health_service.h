@@ -21,13 +21,17 @@ namespace taclink::server {
 /// a program which links the client library.
 class HealthService final : public grpc::Service {
  public:
-  /// `services`: full names of those that serve, beside the whole server, whose name is "". `registry`: of
-  /// all streams of the server.
-  HealthService(std::set<std::string> services, StreamRegistry& registry,
-                std::shared_ptr<boost::asio::thread_pool> senders, std::shared_ptr<const Security> security);
+  /// `services`: full names of those that serve, beside the whole server, whose name is "". Watches need no
+  /// token, and so have places of their own: they take none from the streams of those who have one.
+  HealthService(std::set<std::string> services, std::shared_ptr<boost::asio::thread_pool> senders,
+                std::shared_ptr<const Security> security);
 
-  /// From now on nothing serves. Watches hear it when the registry ends them.
-  void Stop() { serving_ = false; }
+  /// From now on nothing serves; watches are told and end.
+  void Stop(const std::string& reason) {
+    serving_ = false;
+    registry_.Close(reason);
+  }
+  size_t watches() const { return registry_.streams(); }
 
  private:
   grpc::ServerUnaryReactor* Check(grpc::CallbackServerContext* context, const grpc::ByteBuffer* request,
@@ -38,10 +42,10 @@ class HealthService final : public grpc::Service {
 
   // Constant after construction.
   const std::set<std::string> services_;
-  StreamRegistry& registry_;
   const std::shared_ptr<boost::asio::thread_pool> senders_;
   const std::shared_ptr<const Security> security_;
 
+  StreamRegistry registry_;
   std::atomic<bool> serving_ = true;
 };
 

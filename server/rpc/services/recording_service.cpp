@@ -136,7 +136,7 @@ grpc::ServerUnaryReactor* RecordingService::DeleteLog(grpc::CallbackServerContex
     SPDLOG_INFO("{}: {} deleted", who, request->log());
     return grpc::Status::OK;
   };
-  return Later(orders_, context, "DeleteLog", work);
+  return Later(reading_, context, "DeleteLog", work);
 }
 
 RecordingService::Stream* RecordingService::DownloadLog(grpc::CallbackServerContext* context,

@@ -4,11 +4,8 @@
 
 namespace taclink::server {
 
-StreamRegistry::StreamRegistry(const StreamLimits& limits)
-    : shares_(limits.streams, {.things = "streams",
-                               .all_setting = "limits.max_streams",
-                               .party_setting = "limits.max_streams_per_peer"}),
-      queue_bytes_per_party_(limits.queue_bytes_per_party) {}
+StreamRegistry::StreamRegistry(const StreamLimits& limits, const ShareWords& words)
+    : shares_(limits.streams, words), queue_bytes_per_party_(limits.queue_bytes_per_party) {}
 
 Result<void> StreamRegistry::Admit(std::shared_ptr<PumpedStream> stream, const Party& party) {
   const std::lock_guard lock(mutex_);

