@@ -26,7 +26,7 @@ class LogJudge : public ScratchFolder {
         Write("arm.yaml",
               "taclink_config: 1\nserver: {listen: '127.0.0.1:0'}\nrecording: {folder: " + Path("logs") +
                   ", compression: " + compression + ", picture_compression: " + compression +
-                  "}\narm:\n  name: test\n  links:\n"
+                  "}\nlimits: {max_frame_age_s: 3600}\narm:\n  name: test\n  links:\n"
                   "    - {name: a, model: cylinder, source: simulated, scene: touch.yaml}\n"
                   "    - {name: b, model: cylinder, source: simulated, scene: touch.yaml,\n"
                   "       pose: {position_mm: [0, 0, 200]}}\n");

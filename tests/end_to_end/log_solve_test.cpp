@@ -47,8 +47,9 @@ class LogSolveTest : public ScratchFolder {
   void StartServer(const std::string& recording, const std::string& links) {
     Write("push.yaml", kSolvedScene);
     Write("rest.yaml", kUntouched);
-    const std::string config = Write("arm.yaml", "taclink_config: 1\nrecording: {folder: logs" + recording +
-                                                     "}\narm:\n  name: test\n  links:\n" + links);
+    const std::string config =
+        Write("arm.yaml", "taclink_config: 1\nrecording: {folder: logs" + recording +
+                              "}\nlimits: {max_frame_age_s: 3600}\narm:\n  name: test\n  links:\n" + links);
     server_ = std::make_unique<Process>(
         std::vector<std::string>{kTaclinkd, "--config", config, "--listen", "127.0.0.1:0"});
     address_ = AddressOf(*server_);

@@ -19,7 +19,7 @@ class ReplayTest : public ScratchFolder {
     Write("rest.yaml", "taclink_scene: 1\nname: rest\nmodel: cylinder\nframe_rate_hz: 10\nduration_s: 600\n");
     return Write("arm.yaml",
                  "taclink_config: 1\nserver: {listen: '127.0.0.1:0'}\nrecording: {folder: " + Path("logs") +
-                     "}\narm:\n  name: test\n  links:\n"
+                     "}\nlimits: {max_frame_age_s: 3600}\narm:\n  name: test\n  links:\n"
                      "    - {name: a, model: cylinder, source: simulated, scene: rest.yaml}\n"
                      "    - {name: b, model: cylinder, source: simulated, scene: rest.yaml,\n"
                      "       pose: {position_mm: [0, 0, 200]}}\n");

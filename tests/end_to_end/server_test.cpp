@@ -133,7 +133,7 @@ TEST_F(ServerTest, PicturesOfAFolderAreServed) {
                                       Path("pictures"), "--frames", "80"});
   ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
   StartServer(
-      "taclink_config: 1\narm:\n  name: test\n  links:\n"
+      "taclink_config: 1\nlimits: {max_frame_age_s: 3600}\narm:\n  name: test\n  links:\n"
       // So slowly that a busy machine solves enough of the first two seconds' pictures for a rest shape.
       "    - {name: taped, model: cylinder, source: files, folder: pictures, frame_rate_hz: 5}\n");
   Process watch(Watch({}));
@@ -144,7 +144,7 @@ TEST_F(ServerTest, PicturesOfAFolderAreServed) {
 TEST_F(ServerTest, CalibrationIsSavedAndUsedFromTheNextStartOn) {
   Write("rest.yaml", "taclink_scene: 1\nname: rest\nmodel: cylinder\nframe_rate_hz: 20\nduration_s: 600\n");
   const std::string config =
-      "taclink_config: 1\narm:\n  name: test\n  links:\n"
+      "taclink_config: 1\nlimits: {max_frame_age_s: 3600}\narm:\n  name: test\n  links:\n"
       "    - {name: a, model: cylinder, source: simulated, scene: rest.yaml, calibration: a_cameras.yaml}\n";
   StartServer(config);  // the file does not exist yet
   const Finished saved =
