@@ -41,6 +41,7 @@ def lines_of(script: str, library: Path, server: servers.Server, **environment: 
     """What the script prints; it ends by itself and well."""
     done = subprocess.run(
         [sys.executable, "-c", PRELUDE + textwrap.dedent(script), server.address, str(servers.PATIENCE_S)],
+        cwd=library,  # which Python looks into first
         env=os.environ | {"PYTHONPATH": str(library)} | environment,
         capture_output=True,
         text=True,
