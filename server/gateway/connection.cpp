@@ -12,6 +12,8 @@
 #include <boost/asio/write.hpp>
 #include <utility>
 
+#include "server/process/send_delay.h"
+
 namespace taclink::server {
 namespace {
 
@@ -83,6 +85,7 @@ class PlainConnection final : public Connection {
   std::string ClientName() override { return {}; }
   asio::awaitable<size_t> Read(std::span<char> place) override { return ReadSome(socket_, place); }
   asio::awaitable<bool> Write(std::string_view bytes) override { return WriteAll(socket_, bytes); }
+  std::chrono::milliseconds SendDelay() override { return server::SendDelay(socket_.native_handle()); }
   void EndWriting() override { EndSocket(socket_); }
   void Close() override { CloseSocket(socket_); }
 
@@ -101,6 +104,9 @@ class TlsConnection final : public Connection {
   std::string ClientName() override { return NameOfPeer(stream_.native_handle()); }
   asio::awaitable<size_t> Read(std::span<char> place) override { return ReadSome(stream_, place); }
   asio::awaitable<bool> Write(std::string_view bytes) override { return WriteAll(stream_, bytes); }
+  std::chrono::milliseconds SendDelay() override {
+    return server::SendDelay(stream_.next_layer().native_handle());
+  }
   void EndWriting() override { EndSocket(stream_.next_layer()); }
   void Close() override { CloseSocket(stream_.next_layer()); }
 

@@ -3,6 +3,7 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl/context.hpp>
+#include <chrono>
 #include <memory>
 #include <span>
 #include <string>
@@ -23,6 +24,8 @@ class Connection {
   virtual boost::asio::awaitable<size_t> Read(std::span<char> place) = 0;
   /// All of it. False: the client has gone.
   virtual boost::asio::awaitable<bool> Write(std::string_view bytes) = 0;
+  /// Of the socket, as server/process/send_delay.h.
+  virtual std::chrono::milliseconds SendDelay() = 0;
   /// Tells the client that nothing follows.
   virtual void EndWriting() = 0;
   /// Ends what is under way.

@@ -39,35 +39,31 @@ class GrpcCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer,
     context_.AddMetadata(kForwardedRole, std::string(1, request_.role));
     stub_.PrepareBidiStreamingCall(&context_, request_.method, {}, this);
     AddHold();  // reads are started from outside gRPC's own callbacks
-    StartRead(&response_);
     WriteNext();
     StartCall();
   }
 
   std::optional<std::variant<std::string, WebStatus>> Take() {
-    std::string text;
     {
       const std::lock_guard lock(mutex_);
-      if (!waiting_) {
-        if (!status_) return std::nullopt;
-        return *status_;
-      }
-      waiting_ = false;
-      text = ToText(response_);
+      if (std::exchange(waiting_, false)) return ToText(response_);
+      if (status_) return *status_;
+      if (reading_ || read_all_) return std::nullopt;
+      reading_ = true;
     }
     StartRead(&response_);
-    return text;
+    return std::nullopt;
   }
 
   // No Take will follow.
   void Abandon() {
     context_.TryCancel();
-    const bool unheld = [this] {
+    const bool held = [this] {
       const std::lock_guard lock(mutex_);
       abandoned_ = true;
-      return std::exchange(waiting_, false);
+      return !reading_ && !read_all_;
     }();
-    if (unheld) RemoveHold();
+    if (held) RemoveHold();
   }
 
  private:
@@ -83,12 +79,14 @@ class GrpcCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer,
   }
 
   void OnReadDone(bool ok) override {
-    const bool taker = [&] {
+    const bool taken = [&] {
       const std::lock_guard lock(mutex_);
+      reading_ = false;
       waiting_ = ok && !abandoned_;
+      read_all_ = !waiting_;
       return waiting_;
     }();
-    if (taker) {
+    if (taken) {
       notify_();
     } else {
       RemoveHold();
@@ -119,7 +117,9 @@ class GrpcCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer,
   // Guarded by mutex_.
   std::shared_ptr<Reactor> self_;  // until gRPC is done
   grpc::ByteBuffer response_;      // gRPC's while it reads, else ours
-  bool waiting_ = false;           // response_ is to be taken; no read is under way
+  bool reading_ = false;
+  bool waiting_ = false;   // response_ is to be taken; no read is under way
+  bool read_all_ = false;  // no read follows, and gRPC is not held any more
   bool abandoned_ = false;
   std::optional<WebStatus> status_;
 };

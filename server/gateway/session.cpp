@@ -7,6 +7,7 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <utility>
 
@@ -307,9 +308,23 @@ Session::Outcome Session::AnswerCall(const HttpRequest& request, WebFormat forma
   co_return whole&& response.keeps_alive();
 }
 
+// Until the next answer can be sent soon, as far as it is one that grows old.
+asio::awaitable<void> Session::WaitToSend(const std::string& method) {
+  if (method.ends_with("/StreamEvents")) co_return;  // few and small, and urgent
+  const TimePoint before = std::exchange(deadline_, steady_clock::now() + shared_->options.write_timeout);
+  while (!ended_ && !closed_) {
+    const std::chrono::milliseconds delay = connection_->SendDelay();
+    if (delay.count() == 0) break;
+    asio::steady_timer timer(shared_->loop, delay);
+    co_await timer.async_wait(asio::as_tuple(asio::use_awaitable));
+  }
+  deadline_ = before;
+}
+
 // Each answer is written before the next one is read.
 Session::Outcome Session::Forward(GrpcCallRequest call_request, WebFormat format,
                                   const StreamedResponse& response) {
+  const std::string method = call_request.method;
   const auto call =
       shared_->calls.Start(std::move(call_request), [weak = weak_from_this(), shared = shared_] {
         asio::post(shared->loop, [weak] {
@@ -325,6 +340,7 @@ Session::Outcome Session::Forward(GrpcCallRequest call_request, WebFormat format
     if (const auto* status = std::get_if<WebStatus>(&*event))
       co_return co_await Write(response.Piece(EncodeTrailers(format, *status)) + response.End());
     if (!co_await Write(response.Piece(EncodeMessage(format, std::get<std::string>(*event))))) break;
+    co_await WaitToSend(method);
   }
   co_return false;
 }

@@ -78,6 +78,7 @@ class Session : public std::enable_shared_from_this<Session> {
   boost::asio::awaitable<std::optional<HttpRequest>> NextRequest();
   boost::asio::awaitable<void> Linger();
   boost::asio::awaitable<bool> Write(std::string_view bytes);
+  boost::asio::awaitable<void> WaitToSend(const std::string& method);
   void SetDeadline(std::chrono::milliseconds from_now);
 
   // What is given by reference outlives the answer.

@@ -17,12 +17,12 @@ constexpr double kPunishedBurst = 1, kPunishedPerS = 100;
 constexpr int64_t kPunishmentNs = 10'000'000'000;
 constexpr int64_t kSweepIntervalNs = 1'000'000'000;
 constexpr size_t kMostPaces = 1024;
-constexpr size_t kUnprovenShare = 8,
-                 kLeastUnproven = 4;  // of all connections, for one address; twice for all
-constexpr size_t kMostWaiting = 64;   // of one address
+constexpr size_t kUnauthorizedShare = 10,
+                 kLeastUnauthorized = 4;  // of all connections, for one address; twice for all
+constexpr size_t kMostWaiting = 64;       // of one address
 
-// One text for one connection, whether gRPC tells its peer (IPv6 in brackets as %5B and %5D, with the scope)
-// or the listener.
+// One text for one connection, whether gRPC writes its peer (IPv6 in brackets as %5B and %5D, with the scope)
+// or the listener does.
 std::string KeyOf(const std::string& peer) {
   const size_t port = std::min(peer.rfind(':'), peer.size());
   std::string host = peer.substr(0, port);
@@ -48,9 +48,9 @@ size_t ConnectionTable::Count(const F& among) const {
 }
 
 template <typename F>
-std::optional<ConnectionTable::Id> ConnectionTable::OldestUnproven(const F& among) {
+std::optional<ConnectionTable::Id> ConnectionTable::OldestUnauthorized(const F& among) {
   for (auto& [id, connection] : connections_) {
-    if (connection.proven || connection.leaving || !among(connection)) continue;
+    if (connection.authorized || connection.leaving || !among(connection)) continue;
     connection.leaving = true;
     return id;
   }
@@ -64,29 +64,23 @@ Result<ConnectionTable::Admission> ConnectionTable::Admit(const std::string& pee
   const auto same = [name = NameOf(place)](const Connection& other) { return NameOf(other.place) == name; };
   const auto remote = [](const Connection& other) { return !other.place.local; };
   const auto any = [](const Connection&) { return true; };
+  const auto oldest = [this](const auto& among) {
+    return OldestUnauthorized([&](const Connection& other) { return !other.waiting && among(other); });
+  };
   if (Count([&](const Connection& other) { return other.waiting && same(other); }) >= kMostWaiting)
     return Error{ErrorCode::kResourceExhausted,
                  fmt::format("connections of {} come faster than they are taken", NameOf(place))};
-  const auto unproven = [](const Connection& other) { return !other.proven; };
   Admission admission;
   std::string taken;
-  // The memory that connections without an authorized call can take is bounded by their number.
-  const size_t most_unproven = std::max(limits_.all / kUnprovenShare, kLeastUnproven);
-  if (Count([&](const Connection& other) { return unproven(other) && same(other); }) >= most_unproven) {
-    taken = fmt::format("{} connections of {} without an authorized call", most_unproven, NameOf(place));
-    admission.gives_way = OldestUnproven(same);
-  } else if (Count(unproven) >= 2 * most_unproven) {
-    taken = fmt::format("{} connections without an authorized call", 2 * most_unproven);
-    admission.gives_way = OldestUnproven(any);
-  } else if (Count(same) >= most_here) {
+  if (Count(same) >= most_here) {
     taken = fmt::format("all {} connections of {}", most_here, NameOf(place));
-    admission.gives_way = OldestUnproven(same);
+    admission.gives_way = oldest(same);
   } else if (!place.local && Count(remote) >= limits_.all - kept) {
     taken = fmt::format("all {} connections but those kept for this machine", limits_.all - kept);
-    admission.gives_way = OldestUnproven(remote);
+    admission.gives_way = oldest(remote);
   } else if (Count(any) >= limits_.all) {
     taken = fmt::format("all {} connections", limits_.all);
-    admission.gives_way = OldestUnproven(any);
+    admission.gives_way = oldest(any);
   }
   if (!taken.empty() && !admission.gives_way)
     return Error{ErrorCode::kResourceExhausted,
@@ -94,10 +88,11 @@ Result<ConnectionTable::Admission> ConnectionTable::Admit(const std::string& pee
                      " are in use; close one or raise limits.max_connections or "
                      "limits.max_connections_per_peer"};
   admission.id = ++last_;
-  // gRPC tells the same of all connections of a unix socket, whose permissions say who may connect.
+  // gRPC gives all connections of a unix socket the same peer; the permissions of its file say who may
+  // connect.
   const bool is_unix = peer.starts_with("unix");
-  const auto at =
-      connections_.emplace(admission.id, Connection{.place = place, .key = KeyOf(peer), .proven = is_unix});
+  const auto at = connections_.emplace(admission.id,
+                                       Connection{.place = place, .key = KeyOf(peer), .authorized = is_unix});
   if (!is_unix) id_of_peer_[at.first->second.key] = admission.id;
   return admission;
 }
@@ -111,15 +106,17 @@ void ConnectionTable::Remove(Id id) {
 }
 
 std::optional<ConnectionTable::Id> ConnectionTable::GiveWay() {
-  return OldestUnproven([](const Connection&) { return true; });
+  return OldestUnauthorized([](const Connection&) { return true; });
 }
 
-std::optional<ConnectionTable::Id> ConnectionTable::Prove(const std::string& peer) {
+std::optional<ConnectionTable::Id> ConnectionTable::Find(const std::string& peer) const {
   const auto named = id_of_peer_.find(KeyOf(peer));
-  if (named == id_of_peer_.end()) return std::nullopt;
-  const Id id = named->second;
-  id_of_peer_.erase(named);
-  connections_.at(id).proven = true;
+  return named == id_of_peer_.end() ? std::nullopt : std::optional(named->second);
+}
+
+std::optional<ConnectionTable::Id> ConnectionTable::MarkAuthorized(const std::string& peer) {
+  const auto id = Find(peer);
+  if (!id || std::exchange(connections_.at(*id).authorized, true)) return std::nullopt;
   return id;
 }
 
@@ -141,12 +138,25 @@ ConnectionTable::Pace& ConnectionTable::PaceOf(const Place& place, int64_t now_n
   return pace;
 }
 
-int64_t ConnectionTable::WaitNs(Id id, int64_t now_ns) {
+ConnectionTable::Turn ConnectionTable::TakeTurn(Id id, int64_t now_ns) {
   const auto at = connections_.find(id);
-  if (at == connections_.end()) return 0;
+  if (at == connections_.end()) return {};
   Pace& pace = PaceOf(at->second.place, now_ns);
-  at->second.waiting = !pace.bucket.Take(now_ns);
-  return at->second.waiting ? pace.bucket.WaitNs(now_ns) : 0;
+  if (!pace.bucket.Take(now_ns)) return {.wait_ns = pace.bucket.WaitNs(now_ns), .gives_way = {}};
+  // The memory that connections without an authorized call can take is bounded by their number.
+  const size_t most = std::max(limits_.all / kUnauthorizedShare, kLeastUnauthorized);
+  const auto any = [](const Connection& other) { return !other.waiting && !other.authorized; };
+  const auto same = [&, name = NameOf(at->second.place)](const Connection& other) {
+    return any(other) && NameOf(other.place) == name;
+  };
+  Turn turn;
+  if (Count(same) >= most) {
+    turn.gives_way = OldestUnauthorized(same);
+  } else if (Count(any) >= 2 * most) {
+    turn.gives_way = OldestUnauthorized(any);
+  }
+  at->second.waiting = false;
+  return turn;
 }
 
 void ConnectionTable::Punish(Id id, int64_t now_ns) {

@@ -19,8 +19,8 @@ struct ConnectionLimits {
 };
 
 /// The connections of a listener: how many each address may have, which one gives way to a new one, and how
-/// fast new ones are taken. Tokens come later, with the calls: until then a connection is *unproven*, and the
-/// oldest of these gives way, so that who opens connections and says nothing keeps nobody out. Times are
+/// fast new ones are taken. Tokens come later, with the calls: until then a connection is *unauthorized*, and
+/// the oldest of these gives way, so that who opens connections and says nothing keeps nobody out. Times are
 /// monotonic. Guarded by its owner.
 class ConnectionTable {
  public:
@@ -32,19 +32,27 @@ class ConnectionTable {
     Id id = 0;
     std::optional<Id> gives_way;  ///< to be ended; does not count any more
   };
-  /// A new connection from `peer` ("ipv4:192.168.1.5:40000"). Errors: kResourceExhausted (all are proven, or
-  /// too many of the address wait).
+  /// A new connection from `peer` ("ipv4:192.168.1.5:40000"). Errors: kResourceExhausted (all are authorized,
+  /// or too many of the address wait).
   Result<Admission> Admit(const std::string& peer);
   void Remove(Id id);
-  /// The oldest unproven connection, which does not count from now on: descriptors have run out. None: there
-  /// is none.
+  /// The oldest unauthorized connection, which does not count from now on: descriptors have run out. None:
+  /// there is none.
   std::optional<Id> GiveWay();
-  /// An authorized call came over the connection from `peer`. None: it is not here, or was proven before.
-  /// Connections of a unix socket are proven from the start.
-  std::optional<Id> Prove(const std::string& peer);
+  /// The connection from `peer`. None: there is none, or it is one of a unix socket, which all have the same
+  /// peer.
+  std::optional<Id> Find(const std::string& peer) const;
+  /// An authorized call came over the connection from `peer`. None: as of Find, or it was authorized before.
+  /// Connections of a unix socket are authorized from the start.
+  std::optional<Id> MarkAuthorized(const std::string& peer);
 
-  /// How long the next connection of this address must wait before gRPC gets it; 0: not, and it is counted.
-  int64_t WaitNs(Id id, int64_t now_ns);
+  struct Turn {
+    int64_t wait_ns = 0;          ///< > 0: the connection waits; ask again then
+    std::optional<Id> gives_way;  ///< as of an admission
+  };
+  /// Whether gRPC may have the connection now, by the pace of its address. While it waits it costs gRPC
+  /// nothing, and no other one makes it give way.
+  Turn TakeTurn(Id id, int64_t now_ns);
   /// The connection did what it must not: its address has to wait for some time.
   void Punish(Id id, int64_t now_ns);
 
@@ -56,7 +64,7 @@ class ConnectionTable {
     Place place;
     std::string key;      // of the peer
     bool waiting = true;  // not handed over yet
-    bool proven = false;
+    bool authorized = false;
     bool leaving = false;  // does not count
   };
   /// New connections of one address.
@@ -67,12 +75,12 @@ class ConnectionTable {
   template <typename F>
   size_t Count(const F& among) const;
   template <typename F>
-  std::optional<Id> OldestUnproven(const F& among);
+  std::optional<Id> OldestUnauthorized(const F& among);
   Pace& PaceOf(const Place& place, int64_t now_ns);
 
   const ConnectionLimits limits_;
   std::map<Id, Connection> connections_;            // the oldest first
-  std::unordered_map<std::string, Id> id_of_peer_;  // by key; of those that are not proven
+  std::unordered_map<std::string, Id> id_of_peer_;  // by key; not those of unix sockets
   std::map<std::string, Pace> paces_;               // by address
   int64_t next_sweep_ns_ = 0;                       // of paces_
   Id last_ = 0;

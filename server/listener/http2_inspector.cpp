@@ -24,7 +24,7 @@ bool Http2Inspector::Refuse(std::string why) {
   return false;
 }
 
-bool Http2Inspector::Feed(std::span<const std::byte> bytes, int64_t now_ns, bool proven) {
+bool Http2Inspector::Feed(std::span<const std::byte> bytes, int64_t now_ns, bool authorized) {
   if (!violation_.empty()) return false;
   const auto skip = [&bytes](size_t& left) {
     const size_t taken = std::min(left, bytes.size());
@@ -42,21 +42,21 @@ bool Http2Inspector::Feed(std::span<const std::byte> bytes, int64_t now_ns, bool
     const bool has_increment =
         header_size_ >= kHeaderBytes && header_[3] == static_cast<uint8_t>(FrameType::kWindowUpdate);
     if (header_size_ < (has_increment ? header_.size() : kHeaderBytes)) continue;
-    if (!OnFrame(now_ns, proven)) return false;
+    if (!OnFrame(now_ns, authorized)) return false;
     header_size_ = 0;
   }
   return true;
 }
 
-bool Http2Inspector::OnFrame(int64_t now_ns, bool proven) {
+bool Http2Inspector::OnFrame(int64_t now_ns, bool authorized) {
   const size_t length = size_t{header_[0]} << 16 | size_t{header_[1]} << 8 | header_[2];
   const uint8_t flags = header_[4];
   payload_left_ = length;
-  if (!proven && !Spend(frames_, now_ns, "frames without an authorized call", limits_.frames_per_s))
+  if (!authorized && !Spend(frames_, now_ns, "frames without an authorized call", limits_.frames_per_s))
     return false;
   switch (static_cast<FrameType>(header_[3])) {
     case FrameType::kHeaders:
-      return OnHeaders(length, (flags & kEndHeaders) != 0, now_ns, proven);
+      return OnHeaders(length, (flags & kEndHeaders) != 0, now_ns, authorized);
     case FrameType::kContinuation:
       if (++continuations_ > limits_.continuations)
         return Refuse(
@@ -80,10 +80,11 @@ bool Http2Inspector::OnFrame(int64_t now_ns, bool proven) {
   return Spend(controls_, now_ns, "SETTINGS, PRIORITY or empty frames", limits_.controls_per_s);
 }
 
-bool Http2Inspector::OnHeaders(size_t length, bool ends, int64_t now_ns, bool proven) {
+bool Http2Inspector::OnHeaders(size_t length, bool ends, int64_t now_ns, bool authorized) {
   block_bytes_ = 0;
   continuations_ = 0;
-  if (!proven && !Spend(calls_, now_ns, "calls without an authorized one", limits_.calls_per_s)) return false;
+  if (!authorized && !Spend(calls_, now_ns, "calls without an authorized one", limits_.calls_per_s))
+    return false;
   return OnHeaderBlock(length, ends);
 }
 
@@ -101,7 +102,7 @@ bool Http2Inspector::OnWindowUpdate(int64_t now_ns) {
   payload_left_ -= std::min(payload_left_, kIncrementBytes);
   const bool is_zero =
       std::all_of(header_.begin() + kHeaderBytes, header_.end(), [](uint8_t byte) { return byte == 0; });
-  // Others are not bounded once the connection is proven: who reads fast sends two for each message.
+  // Others are not bounded once the connection is authorized: who reads fast sends two for each message.
   return !is_zero ||
          Spend(resets_, now_ns, "streams that an empty WINDOW_UPDATE resets", limits_.resets_per_s);
 }

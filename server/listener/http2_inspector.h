@@ -30,9 +30,9 @@ class Http2Inspector {
   explicit Http2Inspector(const Http2Limits& limits = {});
 
   /// The next bytes that the client has sent, from the connection preface on. False: the connection must end,
-  /// violation() says why; so it stays. Bytes that are not HTTP/2 at all pass: gRPC refuses them. `proven`:
-  /// an authorized call was received over the connection.
-  bool Feed(std::span<const std::byte> bytes, int64_t now_ns, bool proven = false);
+  /// violation() says why; so it stays. Bytes that are not HTTP/2 at all pass: gRPC refuses them.
+  /// `authorized`: an authorized call was received over the connection.
+  bool Feed(std::span<const std::byte> bytes, int64_t now_ns, bool authorized = false);
   /// For people; empty: none.
   const std::string& violation() const { return violation_; }
 
@@ -51,8 +51,8 @@ class Http2Inspector {
   };
   static constexpr size_t kHeaderBytes = 9, kPrefaceBytes = 24, kIncrementBytes = 4;
 
-  bool OnFrame(int64_t now_ns, bool proven);
-  bool OnHeaders(size_t length, bool ends, int64_t now_ns, bool proven);
+  bool OnFrame(int64_t now_ns, bool authorized);
+  bool OnHeaders(size_t length, bool ends, int64_t now_ns, bool authorized);
   bool OnHeaderBlock(size_t length, bool ends);
   bool OnWindowUpdate(int64_t now_ns);
   bool Spend(TokenBucket& bucket, int64_t now_ns, const char* what, double per_s);

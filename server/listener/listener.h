@@ -10,8 +10,11 @@
 #include "sensing/core/result.h"
 #include "server/listener/connection_table.h"
 #include "server/listener/http2_inspector.h"
+#include "server/listener/shared_socket.h"
 
 namespace taclink::server {
+
+class AcceptLoop;
 
 struct ListenerOptions {
   std::string address;  ///< host:port, [ip6]:port (port 0: any free one) or unix:path
@@ -50,15 +53,16 @@ class Listener {
   /// Where it listens, with the real port.
   const std::string& address() const;
   const ListenerCounts& counts() const;
-  /// Somebody who may has called from `peer`, as gRPC tells it: this connection does not give way to others.
+  /// An authorized call came from `peer` (gRPC's text of it): its connection does not give way to others.
   /// Any thread.
-  void Prove(const std::string& peer);
+  void MarkAuthorized(const std::string& peer);
+  /// The socket of the connection from `peer`. Null: it has ended, or it is one of a unix socket. Any thread.
+  std::shared_ptr<const SharedSocket> SocketOf(const std::string& peer) const;
 
  private:
-  struct Running;
-  explicit Listener(std::shared_ptr<Running> running);
+  explicit Listener(std::shared_ptr<AcceptLoop> loop);
 
-  const std::shared_ptr<Running> running_;  // also held for moments by connections that are ended
+  const std::shared_ptr<AcceptLoop> loop_;
 };
 
 }  // namespace taclink::server

@@ -44,7 +44,7 @@ int ConnectionIndex() {
 }  // namespace
 
 bool GuardedConnection::Feed(std::span<const std::byte> bytes) {
-  if (inspector_.Feed(bytes, SystemClock().MonotonicNs(), proven_)) return true;
+  if (inspector_.Feed(bytes, SystemClock().MonotonicNs(), authorized_)) return true;
   if (const auto tell = std::exchange(on_violation_, nullptr)) tell(inspector_.violation());
   return false;
 }

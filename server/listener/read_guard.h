@@ -23,11 +23,11 @@ class GuardedConnection {
 
   /// False: the connection must end.
   bool Feed(std::span<const std::byte> bytes);
-  /// Somebody who may has called over it: it may do more. Any thread.
-  void Prove() { proven_ = true; }
+  /// An authorized call came over it: fewer limits apply. Any thread.
+  void MarkAuthorized() { authorized_ = true; }
 
  private:
-  std::atomic<bool> proven_ = false;
+  std::atomic<bool> authorized_ = false;
   Http2Inspector inspector_;
   std::function<void(const std::string& why)> on_violation_;  // empty: was called
 };

@@ -38,7 +38,7 @@ class CallObserver final : public grpc::experimental::ServerInterceptorFactoryIn
       : needs_token_(needs_token), on_call_(std::move(on_call)) {}
 
   grpc::experimental::Interceptor* CreateServerInterceptor(grpc::experimental::ServerRpcInfo* call) override {
-    // Whoever may call without a token proves nothing where others need one.
+    // A call that needs no token authorizes no connection where others need one.
     if (!needs_token_ || NeededRole(call->method()) != Role::kNobody)
       on_call_(call->server_context()->peer());
     return nullptr;
@@ -86,12 +86,14 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
                                   .user_timeout = limits.keepalive_timeout,
                                   .connections = limits.connections});
   if (!listener) return listener.error();
+  out->service_.registry().SetSockets(
+      [listener = listener->get()](const std::string& peer) { return listener->SocketOf(peer); });
   grpc::ServerBuilder builder;
   Apply(limits, builder);
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> observers;
   observers.push_back(std::make_unique<CallObserver>(
       security->needs_token(),
-      [listener = listener->get()](const std::string& peer) { listener->Prove(peer); }));
+      [listener = listener->get()](const std::string& peer) { listener->MarkAuthorized(peer); }));
   builder.experimental().SetInterceptorCreators(std::move(observers));
   using Connections = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
   out->acceptor_ = builder.experimental().AddExternalConnectionAcceptor(Connections::FROM_FD,

@@ -100,7 +100,8 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* HealthService::Watch(grpc::CallbackS
   if (!request) return RefuseStream(*context, kCall, request.error());
   const auto status = Knows(request->value()) ? ServingStatus::kServing : ServingStatus::kServiceUnknown;
   auto stream = std::make_shared<HealthStream>(status, registry_, senders_);
-  if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_)); !admitted)
+  if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_), context->peer());
+      !admitted)
     return RefuseStream(*context, kCall, admitted.error());
   stream->Open();
   return stream.get();  // the registry holds it until gRPC is done

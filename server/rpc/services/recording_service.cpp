@@ -155,7 +155,8 @@ RecordingService::Stream* RecordingService::DownloadLog(grpc::CallbackServerCont
                                     request->log() + ", " + std::to_string((*source)->size())});
   auto stream = std::make_shared<DownloadStream>(std::move(*source), request->offset(), registry_, senders_,
                                                  reading_.thread());
-  if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_)); !admitted)
+  if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_), context->peer());
+      !admitted)
     return RefuseStream(*context, kCall, admitted.error());
   stream->Begin();
   return stream.get();  // the registry holds it until gRPC is done
@@ -168,7 +169,8 @@ RecordingService::Stream* RecordingService::Replay(grpc::CallbackServerContext* 
   if (!order) return RefuseStream(*context, kCall, order.error());
   const std::string log = order->log, peer = PeerOf(*context);
   auto stream = std::make_shared<ReplayStream>(std::move(*order), peer, desk_, registry_, senders_, players_);
-  if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_)); !admitted)
+  if (const auto admitted = registry_.Admit(stream, PartyOf(*context, *security_), context->peer());
+      !admitted)
     return RefuseStream(*context, kCall, admitted.error());
   stream->Begin(*reading_.thread(), [this, log] { return OpenLog(recorder_, log); });
   return stream.get();  // the registry holds it until gRPC is done

@@ -124,7 +124,7 @@ StreamReactor* TactileService::StreamEvents(grpc::CallbackServerContext* context
 
 StreamReactor* TactileService::AddOrRefuse(const grpc::CallbackServerContext& context, const char* method,
                                            std::shared_ptr<PumpedStream> stream) {
-  const auto admitted = registry_.Admit(std::move(stream), PartyOf(context, *security_));
+  const auto admitted = registry_.Admit(std::move(stream), PartyOf(context, *security_), context.peer());
   return admitted ? nullptr : RefuseStream(context, method, admitted.error());
 }
 

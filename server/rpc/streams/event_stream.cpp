@@ -32,7 +32,9 @@ Result<EventStart> FindStart(const EventHistory& history, std::optional<uint64_t
 
 EventStream::EventStream(std::vector<std::string> link_names, Clock& clock, StreamRegistry& registry,
                          std::shared_ptr<boost::asio::thread_pool> senders)
-    : PumpedStream(registry, std::move(senders)), link_names_(std::move(link_names)), clock_(clock) {}
+    : PumpedStream(registry, std::move(senders), Urgency::kUrgent),
+      link_names_(std::move(link_names)),
+      clock_(clock) {}
 
 void EventStream::Begin(EventHistory& history, const EventStart& start, EventFilter filter) {
   history_ = &history;

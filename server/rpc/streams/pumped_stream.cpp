@@ -3,12 +3,14 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
+#include "server/listener/shared_socket.h"
 #include "server/rpc/streams/stream_registry.h"
 
 namespace taclink::server {
 
-PumpedStream::PumpedStream(StreamRegistry& registry, std::shared_ptr<boost::asio::thread_pool> senders)
-    : registry_(registry), senders_(std::move(senders)) {}
+PumpedStream::PumpedStream(StreamRegistry& registry, std::shared_ptr<boost::asio::thread_pool> senders,
+                           Urgency urgency)
+    : registry_(registry), senders_(std::move(senders)), urgency_(urgency), retry_(*senders_) {}
 
 void PumpedStream::Open() {
   {
@@ -90,12 +92,31 @@ PumpedStream::Step PumpedStream::Decide() {
     return Step::kFinish;
   }
   finished_ = !end_reason_.empty();
+  if (!finished_ && !MaySend()) return Step::kNothing;
   auto message = finished_ ? Last(end_reason_) : Next();
   if (!message && end_) finished_ = true;
   if (!message) return finished_ ? Step::kFinish : Step::kNothing;
   message_ = std::move(*message);
   writing_ = !finished_;
   return finished_ ? Step::kWriteLast : Step::kWrite;
+}
+
+bool PumpedStream::MaySend() {
+  if (urgency_ == Urgency::kUrgent || !socket_) return true;
+  const std::chrono::milliseconds delay = socket_->SendDelay();
+  if (delay.count() == 0) return true;
+  if (std::exchange(delayed_, true)) return false;
+  retry_.expires_after(delay);
+  retry_.async_wait([weak = weak_from_this()](const boost::system::error_code&) {
+    const auto stream = weak.lock();
+    if (!stream) return;
+    {
+      const std::lock_guard lock(stream->mutex_);
+      stream->delayed_ = false;
+    }
+    stream->Pump();
+  });
+  return false;
 }
 
 }  // namespace taclink::server

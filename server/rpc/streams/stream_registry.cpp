@@ -7,15 +7,19 @@ namespace taclink::server {
 StreamRegistry::StreamRegistry(const StreamLimits& limits, const ShareWords& words)
     : shares_(limits.streams, words), queue_bytes_per_party_(limits.queue_bytes_per_party) {}
 
-Result<void> StreamRegistry::Admit(std::shared_ptr<PumpedStream> stream, const Party& party) {
+Result<void> StreamRegistry::Admit(std::shared_ptr<PumpedStream> stream, const Party& party,
+                                   const std::string& peer) {
+  auto socket = socket_of_ ? socket_of_(peer) : nullptr;
   const std::lock_guard lock(mutex_);
   if (closed_) return Error{ErrorCode::kUnavailable, "server is shutting down"};
   if (const auto taken = shares_.Take(party); !taken) return taken;
+  std::shared_ptr<ByteBudget> bytes;
   if (!party.who.empty()) {
-    auto& bytes = queue_bytes_[party.who];
-    if (!bytes) bytes = std::make_shared<ByteBudget>(queue_bytes_per_party_);
-    stream->SetPartyBytes(bytes);
+    auto& of_party = queue_bytes_[party.who];
+    if (!of_party) of_party = std::make_shared<ByteBudget>(queue_bytes_per_party_);
+    bytes = of_party;
   }
+  stream->SetResources(std::move(bytes), std::move(socket));
   streams_.emplace(std::move(stream), party);
   return {};
 }

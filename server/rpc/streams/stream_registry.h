@@ -3,6 +3,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -30,12 +31,17 @@ class StreamRegistry {
 
   explicit StreamRegistry(const StreamLimits& limits, const ShareWords& words = kStreams);
 
-  /// Errors: kResourceExhausted (which limit, and what to do), kUnavailable (closed).
-  Result<void> Admit(std::shared_ptr<PumpedStream> stream, const Party& party);
+  /// `peer`: gRPC's text of where the call comes from. Errors: kResourceExhausted (which limit, and what to
+  /// do), kUnavailable (closed).
+  Result<void> Admit(std::shared_ptr<PumpedStream> stream, const Party& party, const std::string& peer);
   void Remove(const std::shared_ptr<PumpedStream>& stream);
   /// Ends all and takes no more.
   void Close(const std::string& reason);
 
+  /// Finds the socket of a peer's connection; may give null. Before the first stream.
+  void SetSockets(std::function<std::shared_ptr<const SharedSocket>(const std::string& peer)> socket_of) {
+    socket_of_ = std::move(socket_of);
+  }
   /// Streams that are open stay so.
   void SetLimits(const StreamLimits& limits);
 
@@ -44,6 +50,8 @@ class StreamRegistry {
   void WaitUntilEmpty(std::chrono::milliseconds patience) const;
 
  private:
+  std::function<std::shared_ptr<const SharedSocket>(const std::string& peer)> socket_of_;  // or empty
+
   mutable std::mutex mutex_;
   mutable std::condition_variable empty_;
   // Guarded by mutex_.

@@ -16,8 +16,8 @@ using ::testing::HasSubstr;
 constexpr int64_t kStartNs = 1'000'000'000, kSecondNs = 1'000'000'000;
 
 bool Feed(Http2Inspector& inspector, const std::string& bytes, int64_t now_ns = kStartNs,
-          bool proven = false) {
-  return inspector.Feed(std::as_bytes(std::span(bytes)), now_ns, proven);
+          bool authorized = false) {
+  return inspector.Feed(std::as_bytes(std::span(bytes)), now_ns, authorized);
 }
 
 std::string Times(int count, const std::string& bytes) {
