@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <set>
 
 #include "mcap/checker.h"
 
@@ -163,9 +164,17 @@ void Checker::CheckChunkIndexes() {
     }
   }
   CheckIndexes(told, found, "chunk");
+  std::set<uint16_t> named;  // by the chunk indexes: only these must be there
+  for (const ChunkIndex& index : told_.chunk_indexes) {
+    for (const auto& [id, offset] : index.message_index_offsets) named.insert(id);
+  }
   for (const auto& [id, count] : found_.statistics->channel_message_counts) {
-    if (!told.empty() && !told_.channels.contains(id)) {
-      Wrong(summary_start_, "the summary lacks channel " + std::to_string(id) + ", which is in a chunk");
+    if (told.empty() || told_.channels.contains(id)) continue;
+    const std::string what = "the summary lacks channel " + std::to_string(id);
+    if (named.contains(id)) {
+      Wrong(summary_start_, what + ", which a chunk index names");
+    } else {
+      Doubt(summary_start_, what + ", which is in a chunk");
     }
   }
   for (const auto& [id, channel] : told_.channels) {

@@ -48,6 +48,21 @@ class StoppableSource final : public mcap::ByteSource {
   const std::stop_token stop_;
 };
 
+// "arm-1.mcap" -> "arm-1.damaged.mcap".
+std::string WithMark(const std::string& name, const std::string& mark) {
+  return name.substr(0, name.size() - kSuffix.size()) + mark + std::string(kSuffix);
+}
+
+// A killed server or a power cut leaves a torn end, of which nothing more can be had. Of other damage a later
+// attempt may save more.
+bool MayHoldMore(const mcap::ScanReport& scan, uint64_t bytes) {
+  const bool beside_the_end = std::any_of(scan.lost.begin(), scan.lost.end(), [bytes](const auto& range) {
+    return range.offset + range.length < bytes;
+  });
+  return beside_the_end || scan.start_missing || 2 * scan.lost_bytes > bytes ||
+         scan.dropped + scan.orphans + scan.damaged_attachments > 0;
+}
+
 Result<void> SyncFolder(mcap::FileCalls& calls, const std::string& path) {
   const int folder = calls.Open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC, 0);
   const bool synced = folder >= 0 && calls.SyncFolder(folder) == 0;
@@ -98,6 +113,15 @@ bool LogFolder::Exists() const {
 }
 
 std::vector<LogFileEntry> LogFolder::List() const {
+  std::vector<LogFileEntry> logs = Files();
+  // A log that is closed at this very moment may show twice, or an open one beside its recovered twin.
+  logs.erase(
+      std::unique(logs.begin(), logs.end(), [](const auto& a, const auto& b) { return a.name == b.name; }),
+      logs.end());
+  return logs;
+}
+
+std::vector<LogFileEntry> LogFolder::Files() const {
   std::vector<LogFileEntry> logs;
   std::error_code error;
   for (fs::directory_iterator at(path_, error), end; !error && at != end; at.increment(error)) {
@@ -118,10 +142,6 @@ std::vector<LogFileEntry> LogFolder::List() const {
   std::sort(logs.begin(), logs.end(), [&rank](const auto& a, const auto& b) {
     return std::tuple(rank(a), a.name, a.open) < std::tuple(rank(b), b.name, b.open);
   });
-  // A log that is closed at this very moment may show twice, or an open one beside its recovered twin.
-  logs.erase(
-      std::unique(logs.begin(), logs.end(), [](const auto& a, const auto& b) { return a.name == b.name; }),
-      logs.end());
   return logs;
 }
 
@@ -152,7 +172,7 @@ Result<void> LogFolder::Finish(const std::string& name) const {
 Result<void> LogFolder::Delete(const std::string& name) const {
   const auto log = Find(name);
   if (!log) return log.error();
-  if (log->open)
+  if (log->open && !FileLock::TryTake(PartPath(name), calls_))
     return Error{ErrorCode::kFailedPrecondition, name + " is being written; stop the recording first"};
   std::error_code error;
   fs::remove(PathOf(*log), error);
@@ -167,7 +187,7 @@ std::vector<std::string> LogFolder::EnforceQuota(uint64_t quota_bytes) const {
   std::vector<std::string> deleted;
   for (const LogFileEntry& log : logs) {
     if (bytes <= quota_bytes) break;
-    if (log.open || !Delete(log.name)) continue;
+    if (log.open || !Delete(log.name)) continue;  // of open ones a later attempt may save something
     bytes -= log.bytes;
     deleted.push_back(log.name);
   }
@@ -192,7 +212,7 @@ uint64_t LogFolder::FreeBytes() const {
 }
 
 std::vector<LogFileEntry> LogFolder::Unfinished() const {
-  std::vector<LogFileEntry> logs = List();
+  std::vector<LogFileEntry> logs = Files();
   std::erase_if(logs, [](const LogFileEntry& log) { return !log.open; });
   return logs;
 }
@@ -205,8 +225,7 @@ std::optional<std::string> LogFolder::Recover(const std::string& name, const std
   if (!lock)
     return lock.error().message +
            ". It may be one that another server is writing, and stays as it is: if it is not, use 'taclink "
-           "log "
-           "recover'";
+           "log recover'";
   fs::remove(fresh, ignored);  // of a recovery that was cut off
   const auto failed = [&](const Error& error) {
     fs::remove(fresh, ignored);
@@ -226,11 +245,27 @@ std::optional<std::string> LogFolder::Recover(const std::string& name, const std
   if (nothing && (*source)->size() > 0)
     return failed({ErrorCode::kInvalidArgument, "nothing in it is intact"});
   if (const auto synced = (*sink)->Sync(); !synced) return failed(synced.error());
-  if (calls_.Rename(fresh, FinalPath(name)) != 0)
+  // Another log may have the name already.
+  const std::string whole = fs::exists(FinalPath(name), ignored) ? WithMark(name, ".recovered") : name;
+  if (calls_.Rename(fresh, FinalPath(whole)) != 0)
     return failed(FromSystem(fresh, {errno, std::generic_category()}));
   if (const auto synced = SyncFolder(calls_, path_); !synced) return failed(synced.error());
-  fs::remove(part, ignored);
-  return name + " was not closed; made whole: " + report->scan.Text();
+  std::string outcome = name + " was not closed; made whole";
+  if (whole != name) outcome += fmt::format(" as {} (a log has its name)", whole);
+  return outcome + ": " + report->scan.Text() + PutAside(name, MayHoldMore(report->scan, (*source)->size()));
+}
+
+std::string LogFolder::PutAside(const std::string& name, bool may_hold_more) const {
+  const std::string part = PartPath(name), damaged = WithMark(name, ".damaged");
+  std::error_code ignored;
+  if (!may_hold_more) {
+    fs::remove(part, ignored);
+    return "";
+  }
+  if (calls_.Rename(part, FinalPath(damaged)) != 0) return "; the damaged log stays as " + part;
+  static_cast<void>(Begin(damaged));  // else it is the first that gives way to the quota
+  return fmt::format("; the damaged log is kept as {} ('taclink log recover --unverified' may save more)",
+                     damaged);
 }
 
 }  // namespace taclink::server

@@ -47,7 +47,7 @@ class LogFolder {
   /// From ".part" to the final name, safe from a power cut. Errors: the system's; a log that has the final
   /// name already is not replaced.
   Result<void> Finish(const std::string& name) const;
-  /// Errors: kNotFound, kFailedPrecondition (open), or the system's.
+  /// Errors: kNotFound, kFailedPrecondition (it is being written, or may be), or the system's.
   Result<void> Delete(const std::string& name) const;
   /// A log of this name is about to be begun: it is the newest. Errors: kUnavailable.
   Result<void> Begin(const std::string& name) const { return LogOrder(path_, calls_).Append(name); }
@@ -59,12 +59,18 @@ class LogFolder {
   /// Logs that are open: those that are being written, by this server or another, and those that a killed
   /// server has left so.
   std::vector<LogFileEntry> Unfinished() const;
-  /// Makes a log whole that nobody writes any more: what is intact goes to a log under its final name.
-  /// Returns what came of it, for people; none: it is being written (its file is locked), or another server
-  /// has made it whole meanwhile. It stays untouched where the file system has no locks.
+  /// Makes a log whole that nobody writes any more: what is intact goes to a log under its final name, or
+  /// NAME.recovered.mcap, if that is taken. Unless only a torn end is lost, the damaged log is kept as
+  /// NAME.damaged.mcap. Returns what came of it, for people; none: it is being written (its file is locked),
+  /// or another server has made it whole meanwhile. It stays untouched where the file system has no locks.
   std::optional<std::string> Recover(const std::string& name, const std::stop_token& stop = {}) const;
 
  private:
+  /// All, in the order of List.
+  std::vector<LogFileEntry> Files() const;
+  /// The unfinished log was made whole. Returns where it is now, for people.
+  std::string PutAside(const std::string& name, bool may_hold_more) const;
+
   const std::string path_;
   mcap::FileCalls& calls_;
 };

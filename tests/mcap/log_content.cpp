@@ -215,11 +215,17 @@ Buffer AsOthersWrite(Bytes log, ForeignForm form) {
   if (!no_summary) {
     Statistics statistics = reader->statistics();
     statistics.chunk_count = static_cast<uint32_t>(kept);
-    summary.Add(Opcode::kSchema, reader->schemas() | std::views::values);
-    summary.Add(Opcode::kChannel, reader->channels() | std::views::values);
+    std::vector<ChunkIndex> indexes(reader->chunk_indexes().begin(),
+                                    reader->chunk_indexes().begin() + static_cast<ptrdiff_t>(kept));
+    if (form == ForeignForm::kNoChannelsInSummary) {
+      statistics.channel_message_counts.clear();
+      for (ChunkIndex& index : indexes) index.message_index_offsets.clear();
+    } else {
+      summary.Add(Opcode::kSchema, reader->schemas() | std::views::values);
+      summary.Add(Opcode::kChannel, reader->channels() | std::views::values);
+    }
     if (form != ForeignForm::kNoStatistics) summary.Add(Opcode::kStatistics, std::span(&statistics, 1));
-    if (form != ForeignForm::kNoChunkIndexes)
-      summary.Add(Opcode::kChunkIndex, std::span(reader->chunk_indexes()).first(kept));
+    if (form != ForeignForm::kNoChunkIndexes) summary.Add(Opcode::kChunkIndex, std::span(indexes));
   }
   summary.Finish();
   return out;

@@ -64,11 +64,13 @@ enum class ForeignForm {
   kNoChunkIndexes,
   kNoChunks,  ///< their messages stand in the data section; with statistics
   kNoChunksNoSummary,
-  kLastChunkInPieces,  ///< only the last chunk's messages stand in the data section
+  kLastChunkInPieces,    ///< only the last chunk's messages stand in the data section
+  kNoChannelsInSummary,  ///< nor schemas: no record of the summary names one
 };
 inline constexpr ForeignForm kForeignForms[] = {
-    ForeignForm::kNoSummary, ForeignForm::kNoStatistics,      ForeignForm::kNoChunkIndexes,
-    ForeignForm::kNoChunks,  ForeignForm::kNoChunksNoSummary, ForeignForm::kLastChunkInPieces};
+    ForeignForm::kNoSummary,          ForeignForm::kNoStatistics,      ForeignForm::kNoChunkIndexes,
+    ForeignForm::kNoChunks,           ForeignForm::kNoChunksNoSummary, ForeignForm::kLastChunkInPieces,
+    ForeignForm::kNoChannelsInSummary};
 /// The content of a log that is whole in that form.
 Buffer AsOthersWrite(Bytes log, ForeignForm form);
 

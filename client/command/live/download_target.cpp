@@ -25,7 +25,7 @@ Error NoTarget(const std::string& name, const std::string& what) {
 
 /// Without blocking when it is written to. Of a pipe without a reader the system says ENXIO.
 int OpenTarget(const std::string& path, bool is_pipe) {
-  constexpr int kFlags = O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NOCTTY;
+  constexpr int kFlags = O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOCTTY;
   constexpr mode_t kMode = 0666;  // less the umask
   if (!is_pipe) return ::open(path.c_str(), kFlags, kMode);
   const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK);
@@ -54,6 +54,7 @@ Result<DownloadTarget> DownloadTarget::Open(const std::string& path) {
   if (::fstat(target.file_, &status) != 0) return target.Failed("can't be written", errno);
   target.can_resume_ = !target.is_stdout() && S_ISREG(status.st_mode);
   if (target.can_resume_) target.there_ = static_cast<uint64_t>(status.st_size);
+  target.next_ = target.start();
   return target;
 }
 
@@ -63,7 +64,8 @@ DownloadTarget::DownloadTarget(DownloadTarget&& other) noexcept
       is_new_(other.is_new_),
       can_resume_(other.can_resume_),
       there_(other.there_),
-      written_(other.written_) {}
+      written_(other.written_),
+      next_(other.next_) {}
 
 DownloadTarget::~DownloadTarget() {
   if (file_ >= 0 && !is_stdout()) ::close(file_);
@@ -89,6 +91,40 @@ Error DownloadTarget::Failed(const std::string& doing, int number) const {
   }
 }
 
+Error DownloadTarget::HoldsSomethingElse() const {
+  return {ErrorCode::kFailedPrecondition,
+          name() +
+              " holds something else than the log, and was not changed; name another file with -o, or "
+              "remove this one"};
+}
+
+Result<void> DownloadTarget::Receive(std::string_view data, uint64_t offset) {
+  if (offset != next_)
+    return Error{ErrorCode::kInternal,
+                 fmt::format("the server sent byte {} of the log where byte {} comes next", offset, next_)};
+  next_ += data.size();
+  if (offset < there_) {
+    const size_t known = std::min<uint64_t>(data.size(), there_ - offset);
+    if (const auto same = Compare(data.substr(0, known), offset); !same) return same;
+    data.remove_prefix(known);
+  }
+  return Write(data);
+}
+
+Result<void> DownloadTarget::Compare(std::string_view data, uint64_t offset) const {
+  std::string mine(data.size(), '\0');
+  for (size_t done = 0; done < mine.size();) {
+    const ssize_t count =
+        ::pread(file_, mine.data() + done, mine.size() - done, static_cast<off_t>(offset + done));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return Failed("can't be read", errno);
+    if (count == 0) return HoldsSomethingElse();  // another program has shortened it
+    done += static_cast<size_t>(count);
+  }
+  if (mine != data) return HoldsSomethingElse();
+  return {};
+}
+
 Result<void> DownloadTarget::Write(std::string_view data) {
   while (!data.empty()) {
     const ssize_t count = ::write(file_, data.data(), data.size());
@@ -106,6 +142,7 @@ Result<void> DownloadTarget::Write(std::string_view data) {
 }
 
 Result<void> DownloadTarget::Close() {
+  if (next_ < there_) return HoldsSomethingElse();  // more than the log
   const int file = std::exchange(file_, -1);
   if (file < 0 || is_stdout() || ::close(file) == 0) return {};
   return Failed("can't be closed", errno);

@@ -174,35 +174,29 @@ Error FetchError(Error error, const DownloadTarget& target) {
   return error;
 }
 
-// What a file has already stays, and the rest is fetched.
+// What a file has of the log stays, and the rest is fetched.
 Result<void> Download(const RecordOptions& options) {
   auto recordings = Connect(options);
   if (!recordings) return recordings.error();
   auto target = DownloadTarget::Open(FetchPath(options));
   if (!target) return target.error();
-  const uint64_t there = target->there();
+  const uint64_t there = target->there(), start = target->start();
   Result<void> written;
   const auto done = [&] {
     Progress progress(options.log);
     return recordings->Download(
-        options.log, there, [&](std::string_view data, uint64_t offset, uint64_t size) {
-          progress.Show(static_cast<double>(target->size() - there) / static_cast<double>(size - there));
-          if (offset != target->size()) {
-            written = Error{ErrorCode::kInternal,
-                            fmt::format("the server sent byte {} of {} where byte {} comes next", offset,
-                                        options.log, target->size())};
-          } else {
-            written = target->Write(data);
-          }
+        options.log, start, [&](std::string_view data, uint64_t offset, uint64_t size) {
+          progress.Show(static_cast<double>(offset - start) / static_cast<double>(size - start));
+          written = target->Receive(data, offset);
           return written.ok();
         });
   }();
   if (!written) return written;
-  if (const auto closed = target->Close(); !closed) return closed;
   if (!done) {
     target->RemoveIfNew();
     return FetchError(done.error(), *target);
   }
+  if (const auto closed = target->Close(); !closed) return closed;
   fmt::print(target->is_stdout() ? stderr : stdout, "{}: {}{}\n", target->name(), SizeText(target->size()),
              there > 0 ? ", of which " + SizeText(there) + " were there" : "");
   return {};

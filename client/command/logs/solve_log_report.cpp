@@ -9,12 +9,18 @@
 namespace taclink::command {
 namespace {
 
-bool IsSame(const std::string& recorded_bytes, const v1::LinkFrame& recorded, v1::LinkFrame& solved) {
-  const v1::StageTimes now = solved.stage_times();
+// Times, and that the frame was late, are of the server that recorded: they are no part of the solution.
+bool IsSame(const std::string& recorded_bytes, const v1::LinkFrame& recorded, v1::LinkFrame solved) {
   *solved.mutable_stage_times() = recorded.stage_times();
-  const bool same = solved.SerializeAsString() == recorded_bytes;
-  *solved.mutable_stage_times() = now;
-  return same;
+  for (const v1::StatusReason& reason : recorded.status_reasons()) {
+    if (reason.reason() != v1::REASON_LATE_FRAME) continue;
+    // As Degrade of sensing/core/link_state.h.
+    if (solved.status() != v1::LINK_STATUS_OK && solved.status() != v1::LINK_STATUS_DEGRADED) break;
+    solved.set_status(v1::LINK_STATUS_DEGRADED);
+    if (solved.status_reason().empty()) solved.set_status_reason(reason.text());
+    *solved.add_status_reasons() = reason;
+  }
+  return solved.SerializeAsString() == recorded_bytes;
 }
 
 void AddMarkers(const v1::LinkFrame& a, const v1::LinkFrame& b, Spread& shift_mm) {
@@ -42,7 +48,7 @@ void NoteBreak(const Baseline& recorded, const Baseline& solved, uint64_t sequen
 }  // namespace
 
 void Compare(const v1::LinkFrame& recorded, const std::string& recorded_bytes, double after_s,
-             v1::LinkFrame& solved, LinkReport& report) {
+             const v1::LinkFrame& solved, LinkReport& report) {
   ++report.solved;
   if (IsSame(recorded_bytes, recorded, solved)) ++report.identical;
   const bool then = recorded.positions_m_size() > 0, now = solved.positions_m_size() > 0;

@@ -59,10 +59,10 @@ struct LinkReport {
   double recorded_s = 0;  ///< from the first exposure to the last
 };
 
-/// Counts a solved frame. `recorded_bytes`: of `recorded`. `solved` has the recorded times and stays as it
-/// is. Bit for bit the same are frames that differ at most in how long the stages took: all else follows from
-/// the pictures, their times and the settings.
+/// Counts a solved frame. `recorded_bytes`: of `recorded`. `solved` has the recorded times. Identical are
+/// frames that differ at most in how long the stages took and in the reason `late_frame`: all else follows
+/// from the pictures, their times and the settings.
 void Compare(const v1::LinkFrame& recorded, const std::string& recorded_bytes, double after_s,
-             v1::LinkFrame& solved, LinkReport& report);
+             const v1::LinkFrame& solved, LinkReport& report);
 
 }  // namespace taclink::command

@@ -10,21 +10,21 @@ from pathlib import Path
 
 import server as servers
 
-# `in_child` runs `what` in a forked process and prints what became of it. A child that hangs is killed, and told.
+# `in_child` runs `what` in a forked process and prints what became of it. A child that hangs is killed and reported.
 PRELUDE = """
 import multiprocessing, os, sys, threading
 import taclink
 
 ADDRESS, LIMIT_S = sys.argv[1], float(sys.argv[2])
 
-def told(what):
+def report(what):
     try:
         print("child:", what(), flush=True)
     except taclink.TaclinkError as error:
         print(type(error).__name__, error, flush=True)
 
 def in_child(what):
-    child = multiprocessing.get_context("fork").Process(target=told, args=(what,))
+    child = multiprocessing.get_context("fork").Process(target=report, args=(what,))
     child.start()
     child.join(LIMIT_S)
     print("hangs" if child.is_alive() else f"exit {child.exitcode}", flush=True)

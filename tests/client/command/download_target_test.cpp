@@ -41,16 +41,53 @@ class DownloadTargetTest : public ::testing::Test {
 };
 
 TEST_F(DownloadTargetTest, AFileIsMadeAndGoesOnWhereItEnds) {
-  for (const auto& [there, piece] : {std::pair(0u, "first"), std::pair(5u, ", second")}) {
+  const std::string log = "first, second";
+  for (const auto& [there, end] : {std::pair(0u, 5u), std::pair(5u, 13u)}) {
     auto target = DownloadTarget::Open(Path("log"));
     ASSERT_TRUE(target.ok()) << target.error().message;
     EXPECT_TRUE(target->can_resume());
     EXPECT_EQ(target->there(), there);
-    ASSERT_TRUE(target->Write(piece).ok());
-    EXPECT_EQ(target->size(), there + std::string(piece).size());
+    EXPECT_EQ(target->start(), 0u);
+    ASSERT_TRUE(target->Receive(log.substr(0, end), 0).ok());
+    EXPECT_EQ(target->size(), end);
     ASSERT_TRUE(target->Close().ok());
   }
-  EXPECT_EQ(Content("log"), "first, second");
+  EXPECT_EQ(Content("log"), log);
+}
+
+TEST_F(DownloadTargetTest, OfALongFileOnlyTheEndIsFetchedAgain) {
+  const std::string log(200'000, 'x');
+  std::ofstream(Path("log")) << log.substr(0, 150'000);
+  auto target = DownloadTarget::Open(Path("log"));
+  ASSERT_TRUE(target.ok()) << target.error().message;
+  EXPECT_EQ(target->start(), 150'000u - 65'536u);
+  for (uint64_t at = target->start(); at < log.size(); at += 50'000)
+    ASSERT_TRUE(target->Receive(std::string_view(log).substr(at, 50'000), at).ok());
+  ASSERT_TRUE(target->Close().ok());
+  EXPECT_EQ(Content("log"), log);
+}
+
+TEST_F(DownloadTargetTest, OnlyTheSameLogGoesOn) {
+  for (const std::string there : {"another log", "firsT", "first log, and more"}) {
+    std::ofstream(Path("log")) << there;
+    auto target = DownloadTarget::Open(Path("log"));
+    ASSERT_TRUE(target.ok()) << target.error().message;
+    auto done = target->Receive("first log", 0);
+    if (done) done = target->Close();
+    ASSERT_FALSE(done.ok()) << there;
+    EXPECT_EQ(done.error().code, ErrorCode::kFailedPrecondition);
+    EXPECT_THAT(done.error().message, AllOf(HasSubstr(Path("log")), HasSubstr("something else")));
+    target->RemoveIfNew();
+    EXPECT_EQ(Content("log"), there) << "it is not changed";
+  }
+}
+
+TEST_F(DownloadTargetTest, APieceThatDoesNotFollowIsRefused) {
+  auto target = DownloadTarget::Open(Path("log"));
+  ASSERT_TRUE(target.ok()) << target.error().message;
+  ASSERT_TRUE(target->Receive("some", 0).ok());
+  EXPECT_EQ(target->Receive("bytes", 5).error().code, ErrorCode::kInternal);
+  EXPECT_EQ(Content("log"), "some");
 }
 
 TEST_F(DownloadTargetTest, OnlyAFileThatIsNewAndEmptyIsRemoved) {
@@ -72,15 +109,15 @@ TEST_F(DownloadTargetTest, APipeTakesAllInSequence) {
   ASSERT_TRUE(target.ok()) << target.error().message;
   EXPECT_FALSE(target->can_resume());
   EXPECT_EQ(target->there(), 0u);
-  ASSERT_TRUE(target->Write("some").ok());
-  ASSERT_TRUE(target->Write(" bytes").ok());
+  ASSERT_TRUE(target->Receive("some", 0).ok());
+  ASSERT_TRUE(target->Receive(" bytes", 4).ok());
   target->RemoveIfNew();
   EXPECT_TRUE(fs::exists(pipe));
   std::array<char, 100> bytes{};
   const ssize_t got = ::read(reader, bytes.data(), bytes.size());
   EXPECT_EQ(std::string(bytes.data(), static_cast<size_t>(std::max<ssize_t>(got, 0))), "some bytes");
   ::close(reader);
-  const auto written = target->Write("more");
+  const auto written = target->Receive("more", 10);
   ASSERT_FALSE(written.ok()) << "nobody reads any more";
   EXPECT_THAT(written.error().message,
               AllOf(HasSubstr(pipe), HasSubstr("10 bytes"), HasSubstr("Broken pipe")));
@@ -90,7 +127,7 @@ TEST_F(DownloadTargetTest, ADeviceThatIsFullSaysSo) {
   auto target = DownloadTarget::Open("/dev/full");
   ASSERT_TRUE(target.ok()) << target.error().message;
   EXPECT_EQ(target->there(), 0u);
-  const auto written = target->Write("some");
+  const auto written = target->Receive("some", 0);
   ASSERT_FALSE(written.ok());
   EXPECT_EQ(written.error().code, ErrorCode::kResourceExhausted);
   EXPECT_THAT(written.error().message, AllOf(HasSubstr("/dev/full"), HasSubstr("No space left on device")));
@@ -124,7 +161,7 @@ TEST_F(DownloadTargetTest, StandardOutputIsNoFileOfThatName) {
     ASSERT_TRUE(target.ok()) << target.error().message;
     EXPECT_TRUE(target->is_stdout());
     EXPECT_FALSE(target->can_resume());
-    EXPECT_TRUE(target->Write("a log").ok());
+    EXPECT_TRUE(target->Receive("a log", 0).ok());
     EXPECT_TRUE(target->Close().ok());
   }
   ASSERT_EQ(::dup2(before, STDOUT_FILENO), STDOUT_FILENO) << "it is not closed";

@@ -7,8 +7,10 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <span>
 
 #include "mcap/reader.h"
+#include "server/recording/file_lock.h"
 #include "server/recording/log_file.h"
 
 namespace taclink::server {
@@ -49,8 +51,12 @@ TEST_F(LogFolderTest, ListsItsLogsAndNothingElse) {
     EXPECT_EQ(folder_.Find(evil).error().code, ErrorCode::kInvalidArgument) << evil;
 }
 
-TEST_F(LogFolderTest, OpenLogsAreNotDeleted) {
+TEST_F(LogFolderTest, LogsThatAreBeingWrittenAreNotDeleted) {
   Write("a.mcap.part", 1);
+  Write("left.mcap.part", 1);
+  EXPECT_TRUE(folder_.Delete("left.mcap").ok()) << "nobody writes it";
+  const auto writer = FileLock::TryTake(folder_.PartPath("a.mcap"), folder_.calls());
+  ASSERT_TRUE(writer.ok());
   EXPECT_EQ(folder_.Delete("a.mcap").error().code, ErrorCode::kFailedPrecondition);
   Write("b.mcap", 1);
   EXPECT_TRUE(folder_.Delete("b.mcap").ok());
@@ -152,6 +158,73 @@ TEST_F(LogFolderTest, AnUnfinishedLogIsMadeWhole) {
   ASSERT_TRUE(reader.ok());
   EXPECT_EQ((*reader)->summary_problem(), "");
   EXPECT_EQ((*reader)->attachments().size(), 1u);
+}
+
+// What a server that is killed has written, with these messages and chunks.
+class UnfinishedLog {
+ public:
+  explicit UnfinishedLog(const LogFolder& folder) : folder_(folder) {
+    mcap::WriterOptions options;
+    options.chunk_bytes = 1000;
+    auto file = LogFile::Create(folder_, "a.mcap", {}, options, 5);
+    EXPECT_TRUE(file.ok()) << file.error().message;
+    const auto channel = (*file)->writer().mcap().AddChannel({.topic = "t", .message_encoding = "json"});
+    EXPECT_TRUE(channel.ok());
+    const std::string data(300, 'm');
+    for (uint32_t i = 1; i <= 40; ++i)
+      EXPECT_TRUE((*file)
+                      ->writer()
+                      .mcap()
+                      .Write({.channel_id = *channel,
+                              .sequence = i,
+                              .log_time_ns = i,
+                              .publish_time_ns = i,
+                              .data = std::as_bytes(std::span(data))})
+                      .ok());
+    EXPECT_TRUE((*file)->Sync().ok());
+  }
+  size_t bytes() const { return fs::file_size(folder_.PartPath("a.mcap")); }
+  void Damage(size_t at) const {
+    std::fstream file(folder_.PartPath("a.mcap"), std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(at));
+    file << "damaged";
+  }
+  void CutTo(size_t bytes) const { fs::resize_file(folder_.PartPath("a.mcap"), bytes); }
+
+ private:
+  const LogFolder& folder_;
+};
+
+TEST_F(LogFolderTest, OfATornEndNothingIsKept) {
+  const UnfinishedLog log(folder_);
+  log.CutTo(log.bytes() - 200);
+  EXPECT_THAT(folder_.Recover("a.mcap").value_or(""), HasSubstr("made whole"));
+  EXPECT_THAT(Names(), ::testing::ElementsAre("a.mcap"));
+}
+
+TEST_F(LogFolderTest, ALogThatIsDamagedElsewhereIsKept) {
+  const UnfinishedLog log(folder_);
+  log.Damage(log.bytes() / 2);
+  const size_t bytes = log.bytes();
+  EXPECT_THAT(folder_.Recover("a.mcap").value_or(""), HasSubstr("kept as a.damaged.mcap"));
+  EXPECT_THAT(Names(), ::testing::ElementsAre("a.mcap", "a.damaged.mcap"));
+  EXPECT_EQ(fs::file_size(folder_.FinalPath("a.damaged.mcap")), bytes);
+}
+
+TEST_F(LogFolderTest, ALogOfWhichLittleIsSavedIsKept) {
+  const UnfinishedLog log(folder_);
+  log.CutTo(1000);  // the first chunk is torn
+  EXPECT_THAT(folder_.Recover("a.mcap").value_or(""), HasSubstr("kept as a.damaged.mcap"));
+  EXPECT_EQ(fs::file_size(folder_.FinalPath("a.damaged.mcap")), 1000u);
+}
+
+TEST_F(LogFolderTest, AnUnfinishedLogWhoseNameIsTakenGetsAnother) {
+  const UnfinishedLog log(folder_);
+  Write("a.mcap", 7);
+  ASSERT_EQ(folder_.Unfinished().size(), 1u);
+  EXPECT_THAT(folder_.Recover("a.mcap").value_or(""), HasSubstr("as a.recovered.mcap"));
+  EXPECT_THAT(Names(), ::testing::UnorderedElementsAre("a.mcap", "a.recovered.mcap"));
+  EXPECT_EQ(fs::file_size(folder_.FinalPath("a.mcap")), 7u);
 }
 
 TEST(LogFolder, AFolderThatCannotBeIsRefused) {
