@@ -80,7 +80,7 @@ folder(server/recording sensing/core mcap wire wire/log server/config server/pro
 folder(server/replay sensing/core sensing/capture mcap wire wire/log server/process server/link server/arm)
 folder(server/listener sensing/core server/process server/security)
 folder(server/rpc/requests sensing/core server/config server/listener server/security)
-folder(server/rpc/streams sensing/core sensing/capture mcap wire wire/log server/hub server/link server/events server/security
+folder(server/rpc/streams sensing/core sensing/capture mcap wire wire/log server/process server/hub server/link server/events server/security
        server/arm server/messages server/replay server/rpc/requests)
 folder(server/rpc/services server/process sensing/core sensing/simulation wire server/link server/events server/simulation server/security
        server/arm server/messages server/recording server/replay server/rpc/requests server/rpc/streams)

@@ -18,7 +18,7 @@
 #include "server/listener/listener.h"
 #include "server/listener/listening_socket.h"
 #include "server/listener/read_guard.h"
-#include "server/listener/shared_socket.h"
+#include "server/process/shared_socket.h"
 
 namespace taclink::server {
 

@@ -10,7 +10,7 @@
 #include "sensing/core/result.h"
 #include "server/listener/connection_table.h"
 #include "server/listener/http2_inspector.h"
-#include "server/listener/shared_socket.h"
+#include "server/process/shared_socket.h"
 
 namespace taclink::server {
 

@@ -3,7 +3,7 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
-#include "server/listener/shared_socket.h"
+#include "server/process/shared_socket.h"
 #include "server/rpc/streams/stream_registry.h"
 
 namespace taclink::server {
