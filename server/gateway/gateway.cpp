@@ -43,13 +43,6 @@ constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 constexpr size_t kProbePlaces = 8;         // of connections to /healthz and /readyz
 constexpr milliseconds kAcceptPause{100};  // after a failure, such as too many open files
 
-// As gRPC tells a peer.
-std::string PeerText(const tcp::endpoint& remote) {
-  boost::system::error_code ignored;
-  const std::string address = remote.address().to_string(ignored), port = std::to_string(remote.port());
-  return remote.address().is_v6() ? "ipv6:[" + address + "]:" + port : "ipv4:" + address + ":" + port;
-}
-
 // TLS 1.2 or 1.3, and of the former only what tls_policy.h has. False: OpenSSL knows no such ciphers.
 bool LimitProtocol(SSL_CTX* context) {
   constexpr int kBits112 = 2;  // OpenSSL's security level: refuses short keys and SHA-1, of clients too
@@ -229,7 +222,7 @@ asio::awaitable<void> Gateway::Running::Accept() {
       continue;
     }
     boost::system::error_code ignored;
-    const std::string peer = PeerText(socket.remote_endpoint(ignored));
+    const std::string peer = PeerText(*socket.remote_endpoint(ignored).data());
     const Place place = PlaceOf(peer);
     const auto room = MakeRoom(place);
     if (!room) {

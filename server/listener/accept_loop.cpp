@@ -20,6 +20,7 @@
 #include "sensing/core/clock.h"
 #include "sensing/core/thread_start.h"
 #include "server/process/socket_options.h"
+#include "server/security/party.h"
 
 namespace taclink::server {
 namespace {
@@ -182,7 +183,7 @@ void AcceptLoop::OnFull() {
 }
 
 void AcceptLoop::Take(int fd, const sockaddr_storage& from) {
-  const std::string peer = PeerText(from);
+  const std::string peer = PeerText(reinterpret_cast<const sockaddr&>(from));
   const auto admission = [&] {
     const std::lock_guard lock(mutex_);
     return table_.Admit(peer);

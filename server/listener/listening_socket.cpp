@@ -1,6 +1,5 @@
 #include "server/listener/listening_socket.h"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <netdb.h>
 #include <netinet/in.h>
@@ -8,14 +7,12 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
-#include <charconv>
-#include <cstring>
 #include <memory>
 #include <system_error>
 #include <utility>
 
+#include "sensing/core/address.h"
 #include "server/process/unix_socket.h"
 
 namespace taclink::server {
@@ -103,17 +100,17 @@ Result<void> ListeningSockets::OpenUnix(const std::string& path) {
   return {};
 }
 
-Result<void> ListeningSockets::OpenTcp(const std::string& host, const std::string& port) {
-  const std::string address = host + ":" + port;
+Result<void> ListeningSockets::OpenTcp(const HostPort& where) {
+  const std::string host = where.host.find(':') == std::string::npos ? where.host : "[" + where.host + "]",
+                    port = std::to_string(where.port), address = host + ":" + port;
   addrinfo hints{};
   hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
-  const std::string node = host.starts_with('[') ? host.substr(1, host.size() - 2) : host;
-  if (const int error = ::getaddrinfo(node.c_str(), port.c_str(), &hints, &found); error != 0)
+  if (const int error = ::getaddrinfo(where.host.c_str(), port.c_str(), &hints, &found); error != 0)
     return ListenError(address, gai_strerror(error));
   const Addresses addresses(found, freeaddrinfo);
-  const bool any_port = port == "0";
+  const bool any_port = where.port == 0;
   for (int i = 0; i < kPortTries; ++i) {
     uint16_t chosen = 0;
     int failed = 0;
@@ -141,34 +138,14 @@ Result<void> ListeningSockets::OpenTcp(const std::string& host, const std::strin
 
 Result<ListeningSockets> ListeningSockets::Open(const std::string& address) {
   ListeningSockets out;
-  const auto colon = address.rfind(':');
-  const auto opened = address.starts_with(kUnixScheme)
-                          ? out.OpenUnix(address.substr(kUnixScheme.size()))
-                          : out.OpenTcp(address.substr(0, colon), address.substr(colon + 1));
-  if (!opened) return opened.error();
-  return out;
-}
-
-std::string PeerText(const sockaddr_storage& address) {
-  std::array<char, INET6_ADDRSTRLEN> text{};
-  switch (address.ss_family) {
-    case AF_INET: {
-      const auto& from = reinterpret_cast<const sockaddr_in&>(address);
-      ::inet_ntop(AF_INET, &from.sin_addr, text.data(), text.size());
-      return fmt::format("ipv4:{}:{}", text.data(), ntohs(from.sin_port));
-    }
-    case AF_INET6: {
-      const auto& from = reinterpret_cast<const sockaddr_in6&>(address);
-      if (IN6_IS_ADDR_V4MAPPED(&from.sin6_addr)) {
-        ::inet_ntop(AF_INET, &from.sin6_addr.s6_addr[12], text.data(), text.size());
-        return fmt::format("ipv4:{}:{}", text.data(), ntohs(from.sin6_port));
-      }
-      ::inet_ntop(AF_INET6, &from.sin6_addr, text.data(), text.size());
-      return fmt::format("ipv6:[{}]:{}", text.data(), ntohs(from.sin6_port));
-    }
-    default:
-      return "unix:";
+  if (address.starts_with(kUnixScheme)) {
+    const auto opened = out.OpenUnix(address.substr(kUnixScheme.size()));
+    return opened ? Result<ListeningSockets>(std::move(out)) : opened.error();
   }
+  const auto parsed = ParseHostPort(address);
+  if (!parsed) return ListenError(address, parsed.error().message);
+  const auto opened = out.OpenTcp(*parsed);
+  return opened ? Result<ListeningSockets>(std::move(out)) : opened.error();
 }
 
 }  // namespace taclink::server

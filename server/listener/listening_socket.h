@@ -1,10 +1,11 @@
 #pragma once
 
-#include <sys/socket.h>
+#include <sys/types.h>
 
 #include <string>
 #include <vector>
 
+#include "sensing/core/address.h"
 #include "sensing/core/result.h"
 
 namespace taclink::server {
@@ -29,14 +30,11 @@ class ListeningSockets {
  private:
   ListeningSockets() = default;
   Result<void> OpenUnix(const std::string& path);
-  Result<void> OpenTcp(const std::string& host, const std::string& port);
+  Result<void> OpenTcp(const HostPort& where);
 
   std::vector<int> sockets_;
   std::string address_, path_;
   ino_t inode_ = 0;  // of the file
 };
-
-/// As gRPC tells a peer: "ipv4:192.168.1.5:40000", "ipv6:[::1]:40000", "unix:".
-std::string PeerText(const sockaddr_storage& address);
 
 }  // namespace taclink::server

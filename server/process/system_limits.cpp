@@ -108,8 +108,12 @@ int SystemErrorOf(const std::exception& error) {
 
 std::string DescribeLimit(const std::exception& error) {
   const bool no_memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
-  const std::string limit = no_memory ? NoMemory() : LimitOf(SystemErrorOf(error));
-  return limit.empty() ? error.what() : limit + " (" + error.what() + ")";
+  try {
+    const std::string limit = no_memory ? NoMemory() : LimitOf(SystemErrorOf(error));
+    return limit.empty() ? error.what() : limit + " (" + error.what() + ")";
+  } catch (const std::bad_alloc&) {
+    return "out of memory";  // so short that it needs none
+  }
 }
 
 }  // namespace taclink::server

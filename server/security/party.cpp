@@ -45,7 +45,33 @@ Place Ipv6Place(std::string_view host) {
           .local = IN6_IS_ADDR_LOOPBACK(&address) != 0};
 }
 
+std::string Text(std::string_view scheme, const std::string& host, in_port_t port) {
+  return std::string(scheme) + host + ":" + std::to_string(ntohs(port));
+}
+
 }  // namespace
+
+std::string PeerText(const sockaddr& address) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  switch (address.sa_family) {
+    case AF_INET: {
+      const auto& from = reinterpret_cast<const sockaddr_in&>(address);
+      ::inet_ntop(AF_INET, &from.sin_addr, text.data(), text.size());
+      return Text(kIpv4, text.data(), from.sin_port);
+    }
+    case AF_INET6: {
+      const auto& from = reinterpret_cast<const sockaddr_in6&>(address);
+      if (IN6_IS_ADDR_V4MAPPED(&from.sin6_addr)) {
+        ::inet_ntop(AF_INET, &from.sin6_addr.s6_addr[12], text.data(), text.size());
+        return Text(kIpv4, text.data(), from.sin6_port);
+      }
+      ::inet_ntop(AF_INET6, &from.sin6_addr, text.data(), text.size());
+      return Text(kIpv6, "[" + std::string(text.data()) + "]", from.sin6_port);
+    }
+    default:
+      return "unix:";
+  }
+}
 
 Place PlaceOf(const std::string& peer) {
   if (peer.starts_with("unix:")) return {.address = std::string(kUnix), .local = true};
@@ -57,7 +83,8 @@ Place PlaceOf(const std::string& peer) {
 Party PartyOf(const std::string& peer, const std::string& name) {
   if (!name.empty()) return {.who = "caller " + name, .preferred = true};
   const Place place = PlaceOf(peer);
-  // gRPC tells the same of all connections of a unix socket, whose permissions say who may connect.
+  // gRPC gives all connections of a unix socket the same peer; the permissions of its file say who may
+  // connect.
   if (place.address.empty() || place.address == kUnix) return {.who = {}, .preferred = true};
   if (place.local) return {.who = "the connection " + peer, .preferred = true};
   return {.who = "clients at " + place.address};

@@ -1,8 +1,13 @@
 #pragma once
 
+#include <sys/socket.h>
+
 #include <string>
 
 namespace taclink::server {
+
+/// The text of an address, much as gRPC gives it: "ipv4:192.168.1.5:40000", "ipv6:[::1]:40000", "unix:".
+std::string PeerText(const sockaddr& address);
 
 /// Where a call comes from.
 struct Place {
