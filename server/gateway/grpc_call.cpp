@@ -39,31 +39,35 @@ class GrpcCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer,
     context_.AddMetadata(kForwardedRole, std::string(1, request_.role));
     stub_.PrepareBidiStreamingCall(&context_, request_.method, {}, this);
     AddHold();  // reads are started from outside gRPC's own callbacks
+    StartRead(&response_);
     WriteNext();
     StartCall();
   }
 
   std::optional<std::variant<std::string, WebStatus>> Take() {
+    std::string text;
     {
       const std::lock_guard lock(mutex_);
-      if (std::exchange(waiting_, false)) return ToText(response_);
-      if (status_) return *status_;
-      if (reading_ || read_all_) return std::nullopt;
-      reading_ = true;
+      if (!waiting_) {
+        if (!status_) return std::nullopt;
+        return *status_;
+      }
+      waiting_ = false;
+      text = ToText(response_);
     }
     StartRead(&response_);
-    return std::nullopt;
+    return text;
   }
 
   // No Take will follow.
   void Abandon() {
     context_.TryCancel();
-    const bool held = [this] {
+    const bool unheld = [this] {
       const std::lock_guard lock(mutex_);
       abandoned_ = true;
-      return !reading_ && !read_all_;
+      return std::exchange(waiting_, false);
     }();
-    if (held) RemoveHold();
+    if (unheld) RemoveHold();
   }
 
  private:
@@ -79,14 +83,12 @@ class GrpcCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer,
   }
 
   void OnReadDone(bool ok) override {
-    const bool taken = [&] {
+    const bool taker = [&] {
       const std::lock_guard lock(mutex_);
-      reading_ = false;
       waiting_ = ok && !abandoned_;
-      read_all_ = !waiting_;
       return waiting_;
     }();
-    if (taken) {
+    if (taker) {
       notify_();
     } else {
       RemoveHold();
@@ -117,9 +119,7 @@ class GrpcCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer,
   // Guarded by mutex_.
   std::shared_ptr<Reactor> self_;  // until gRPC is done
   grpc::ByteBuffer response_;      // gRPC's while it reads, else ours
-  bool reading_ = false;
-  bool waiting_ = false;   // response_ is to be taken; no read is under way
-  bool read_all_ = false;  // no read follows, and gRPC is not held any more
+  bool waiting_ = false;           // response_ is to be taken; no read is under way
   bool abandoned_ = false;
   std::optional<WebStatus> status_;
 };

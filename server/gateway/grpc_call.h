@@ -27,15 +27,16 @@ struct GrpcCallRequest {
   char role = 0;           ///< likewise
 };
 
-/// One gRPC call by the method's name, bytes through. An answer is read when Take asks for it, so that a slow
-/// taker slows the call and nothing else, and no answer grows old here. Cancels the call when destroyed.
+/// One gRPC call by the method's name, bytes through. At most one answer waits here: the next one is read
+/// when this one was taken, so that a slow taker slows the call and nothing else. Cancels the call when
+/// destroyed.
 class GrpcCall {
  public:
   ~GrpcCall();
   GrpcCall(const GrpcCall&) = delete;
   GrpcCall& operator=(const GrpcCall&) = delete;
 
-  /// The next answer, or, at last, how the call ended; none: neither yet, and `notify` follows.
+  /// The next answer, or, at last, how the call ended; none: neither yet.
   std::optional<std::variant<std::string, WebStatus>> Take();
 
  private:

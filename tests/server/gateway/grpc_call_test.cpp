@@ -28,10 +28,8 @@ TEST(GrpcCalls, OutliveWhatGrpcStillDoesForThem) {
                              in_last.set_value();
                              gone_on.wait();
                            });
-  ASSERT_FALSE(call->Take()) << "it is read from now on";
   answered.get_future().wait();
   ASSERT_TRUE(call->Take());
-  ASSERT_FALSE(call->Take());
   in_last.get_future().wait();
   ASSERT_TRUE(std::holds_alternative<WebStatus>(*call->Take()));
   call.reset();
