@@ -74,22 +74,24 @@ void CalibrateStream::OnDone() {
 
 void CalibrateStream::Pump() {
   std::optional<CalibrationProgress> next;
-  bool cancelled = false;
+  bool cancelled = false, succeeded = false;
   {
     const std::lock_guard lock(mutex_);
     if (writing_ || finished_) return;
     cancelled = cancelled_;
-    if (!cancelled && !waiting_) return;
+    succeeded = succeeded_;
+    if (!cancelled && !succeeded && !waiting_) return;
     next = std::exchange(waiting_, std::nullopt);
-    finished_ = cancelled || next->end;
+    succeeded_ = next && next->end && next->end->ok();
+    finished_ = cancelled || succeeded || (next->end && !next->end->ok());
     writing_ = !finished_;
   }
   // Outside the lock: writing_ or finished_ now keep every other thread from coming here.
   if (cancelled) return Finish(grpc::Status::CANCELLED);
+  if (succeeded) return Finish(grpc::Status::OK);  // not with the message: see PumpedStream::Pump
   if (next->end && !*next->end) return Finish(ToGrpc(next->end->error()));
   message_.Clear();
   Fill(*next, message_);
-  if (next->end) return StartWriteAndFinish(&message_, grpc::WriteOptions(), grpc::Status::OK);
   StartWrite(&message_);
 }
 

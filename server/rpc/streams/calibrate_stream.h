@@ -39,8 +39,9 @@ class CalibrateStream final : public grpc::ServerWriteReactor<v1::CalibrateRespo
   std::optional<CalibrationProgress> waiting_;
   bool writing_ = false;
   bool cancelled_ = false;
+  bool succeeded_ = false;  // the last message, which says so, is made
   bool finished_ = false;
-  v1::CalibrateResponse message_;  // under way while writing_ or finished_
+  v1::CalibrateResponse message_;  // under way while writing_
 };
 
 }  // namespace taclink::server

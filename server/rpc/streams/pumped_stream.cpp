@@ -76,10 +76,9 @@ void PumpedStream::Pump() {
       // there, and grow old, on a slow link.
       StartWrite(&message_, grpc::WriteOptions().set_write_through());
       break;
-    case Step::kWriteLast:
-      StartWriteAndFinish(&message_, grpc::WriteOptions(), status);
-      break;
     case Step::kFinish:
+      // Not together with the last message: a client within the process (gRPC 1.51) that is not reading at
+      // that moment would get the message and never the end.
       Finish(status);
       break;
   }
@@ -91,14 +90,18 @@ PumpedStream::Step PumpedStream::Decide() {
     finished_ = true;
     return Step::kFinish;
   }
-  finished_ = !end_reason_.empty();
-  if (!finished_ && !MaySend()) return Step::kNothing;
-  auto message = finished_ ? Last(end_reason_) : Next();
-  if (!message && end_) finished_ = true;
-  if (!message) return finished_ ? Step::kFinish : Step::kNothing;
+  const bool ends = !end_reason_.empty();
+  if (!ends && !MaySend()) return Step::kNothing;
+  std::optional<grpc::ByteBuffer> message;
+  if (!ends) message = Next();
+  if (ends && !std::exchange(last_made_, true)) message = Last(end_reason_);
+  if (!message) {
+    finished_ = ends || end_;
+    return finished_ ? Step::kFinish : Step::kNothing;
+  }
   message_ = std::move(*message);
-  writing_ = !finished_;
-  return finished_ ? Step::kWriteLast : Step::kWrite;
+  writing_ = true;
+  return Step::kWrite;
 }
 
 bool PumpedStream::MaySend() {

@@ -65,7 +65,7 @@ class PumpedStream : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   /// Starts the next write if none is under way and there is something to send.
   void Pump();
-  enum class Step { kNothing, kWrite, kWriteLast, kFinish };
+  enum class Step { kNothing, kWrite, kFinish };
   Step Decide();
   /// False: not now; Pump is called again.
   bool MaySend();
@@ -84,12 +84,13 @@ class PumpedStream : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   bool writing_ = false;
   bool cancelled_ = false;
   bool finished_ = false;
+  bool last_made_ = false;           // by Last
   bool delayed_ = false;             // retry_ is set
   std::string end_reason_;           // not empty: the server ends the stream
   std::optional<grpc::Status> end_;  // by Next
   boost::asio::steady_timer retry_;
 
-  grpc::ByteBuffer message_;  // under way while writing_ or finished_
+  grpc::ByteBuffer message_;  // under way while writing_
 };
 
 }  // namespace taclink::server

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <condition_variable>
 #include <future>
 #include <memory>
 #include <thread>
@@ -36,6 +37,43 @@ TEST(GrpcCalls, OutliveWhatGrpcStillDoesForThem) {
   server.reset();
   std::jthread waiter([&] { calls.reset(); });
   go_on.set_value();
+}
+
+// The browser is slow: an answer waits, and none is asked for, when the server ends the call.
+TEST(GrpcCalls, TheEndIsSeenAlsoWhereAnAnswerWaits) {
+  for (int round = 0; round < 20; ++round) {
+    TestServer server;
+    GrpcCalls calls(server.server().InProcessChannel());
+    std::mutex mutex;
+    std::condition_variable changed;
+    int notified = 0;
+    auto call = calls.Start({.method = "/taclink.v1.TactileService/StreamFrames",
+                             .messages = {""},
+                             .timeout = kForever,
+                             .peer = "test",
+                             .name = {}},
+                            [&] {
+                              const std::lock_guard lock(mutex);
+                              ++notified;
+                              changed.notify_all();
+                            });
+    const auto wait = [&](int count) {
+      std::unique_lock lock(mutex);
+      return changed.wait_for(lock, std::chrono::seconds(10), [&] { return notified >= count; });
+    };
+    ASSERT_TRUE(wait(1));  // the status waits here
+    std::jthread ender([&] { server.server().Shutdown("the test is over", kForever); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(5 * (round % 5)));
+    bool ended = false;
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    while (!ended && std::chrono::steady_clock::now() < give_up) {
+      const auto event = call->Take();
+      ended = event && std::holds_alternative<WebStatus>(*event);
+      if (!event) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EXPECT_TRUE(ended) << round;
+    call.reset();
+  }
 }
 
 }  // namespace
