@@ -6,8 +6,8 @@
 namespace taclink::mcap {
 namespace {
 
-std::string Numbers(const char* what, uint64_t told, uint64_t found) {
-  return std::string(what) + ": the statistics say " + std::to_string(told) + ", there are " +
+std::string Numbers(const char* what, uint64_t stated, uint64_t found) {
+  return std::string(what) + ": the statistics say " + std::to_string(stated) + ", there are " +
          std::to_string(found);
 }
 

@@ -20,7 +20,7 @@ struct ConnectionLimits {
 
 /// The connections of a listener: how many each address may have, which one gives way to a new one, and how
 /// fast new ones are taken. Tokens come later, with the calls: until then a connection is *unauthorized*, and
-/// the oldest of these gives way, so that who opens connections and says nothing keeps nobody out. Times are
+/// the oldest of these gives way, so that idle unauthorized connections cannot exhaust the limits. Times are
 /// monotonic. Guarded by its owner.
 class ConnectionTable {
  public:
