@@ -11,14 +11,12 @@ namespace {
 // Within this of a clamp, the normal of what presses is between the skin's and that at rest: the wall turns
 // there within less than a body's width.
 constexpr double kNearClampMm = 30, kOwnNormalShare = 0.35;
-constexpr int kNodeDofs = 5;
 
 }  // namespace
 
 Linearization::Linearization(const SkinMechanics& mechanics)
     : mechanics_(mechanics),
       hessian_(mechanics.shell().Pattern()),
-      factor_(hessian_.rows() / mechanics.site_rows(), mechanics.site_rows()),
       jacobian_(mechanics.markers().MakeJacobian(mechanics.shell())),
       place_(static_cast<size_t>(mechanics.site_count()), -1),
       frames_(static_cast<size_t>(mechanics.site_count())) {
@@ -95,7 +93,7 @@ Eigen::MatrixXf Linearization::CoupleColumns(const Eigen::VectorXd& shares) cons
 
 // (J K^-1 B)' = B' K^-1 J'.
 std::array<Eigen::VectorXd, 3> Linearization::PulledAtSites(const Eigen::VectorXd& at_markers) {
-  factor_.Solve(jacobian_.transpose() * at_markers, motion_);
+  Solve(jacobian_.transpose() * at_markers, motion_);
   std::array<Eigen::VectorXd, 3> pulled;
   for (auto& part : pulled) part.resize(mechanics_.site_count());
   for (int site = 0; site < mechanics_.site_count(); ++site) {
@@ -111,23 +109,44 @@ std::array<Eigen::VectorXd, 3> Linearization::PulledAtSites(const Eigen::VectorX
 }
 
 bool Linearization::At(const ShellState& state, const KnownLoads& loads) {
-  const NonlinearShell& shell = mechanics_.shell();
   is_made_ = false;
+  rings_.reset();
   state_ = tangent_state_ = state;
+  mechanics_.shell().Hessian(state_, AppliedLoads(mechanics_, loads).loads(), gradient_, hessian_);
+  if (!factor_) factor_.emplace(hessian_.rows() / mechanics_.site_rows(), mechanics_.site_rows());
+  return gradient_.allFinite() && factor_->Factorise(hessian_) && Finish(loads);
+}
+
+bool Linearization::At(const std::shared_ptr<const InflatedSkin>& skin, const KnownLoads& loads) {
+  is_made_ = false;
+  rings_ = {skin, &skin->stiffness};
+  state_ = tangent_state_ = skin->state;
+  mechanics_.shell().Gradient(state_, AppliedLoads(mechanics_, loads).loads(), gradient_);
+  return gradient_.allFinite() && Finish(loads);
+}
+
+void Linearization::Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const {
+  if (rings_)
+    rings_->Solve(rhs, x);
+  else
+    factor_->Solve(rhs, x);
+}
+
+// All that does not depend on how the stiffness was factored.
+bool Linearization::Finish(const KnownLoads& loads) {
   loads_ = loads;
   mechanics_.GradientByLoads(state_, gradient_by_loads_);
-  shell.Hessian(state_, AppliedLoads(mechanics_, loads).loads(), gradient_, hessian_);
-  if (!gradient_.allFinite() || !factor_.Factorise(hessian_)) return false;
   const MarkerMap& map = mechanics_.markers();
-  map.WriteJacobian(shell, state_, jacobian_);
+  map.WriteJacobian(mechanics_.shell(), state_, jacobian_);
   DropColumns();
+  first_columns_.resize(0, 0);
   map.Displacements(state_, base_mm_);
-  factor_.Solve(gradient_, motion_);
+  Solve(gradient_, motion_);
   base_mm_.noalias() -= jacobian_ * motion_;
   by_known_loads_.setZero(jacobian_.rows(), KnownLoads::kCount);
   for (int k = 0; k < KnownLoads::kCount; ++k) {
     if (gradient_by_loads_.col(k).isZero(0)) continue;
-    factor_.Solve(gradient_by_loads_.col(k), motion_);
+    Solve(gradient_by_loads_.col(k), motion_);
     by_known_loads_.col(k).noalias() = -(jacobian_ * motion_);
   }
   tangent_loads_ = loads;
@@ -153,7 +172,9 @@ void Linearization::MakeColumns(std::span<const int> sites) {
     missing.push_back(site);
   }
   if (missing.empty()) return;
-  if (kNodeDofs * static_cast<Eigen::Index>(missing.size()) < jacobian_.rows())
+  if (rings_)
+    MakeTurnedColumns(missing);
+  else if (kNodeDofs * static_cast<Eigen::Index>(missing.size()) < jacobian_.rows())
     MakeNodeColumns(missing);
   else
     MakeAllColumns();
@@ -165,7 +186,7 @@ void Linearization::MakeAllColumns() {
     for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it)
       rows(row, it.col()) = static_cast<float>(it.value());
   }
-  factor_.SolveRows(filled_, rows);
+  factor_->SolveRows(filled_, rows);
   adjoint_.resize(jacobian_.rows(), kNodeDofs * mechanics_.site_count());
   for (int site = 0; site < mechanics_.site_count(); ++site) {
     place_[static_cast<size_t>(site)] = site;
@@ -191,10 +212,66 @@ void Linearization::MakeNodeColumns(const std::vector<int>& missing) {
   adjoint_.rightCols(count) = Solved(std::move(filled), std::move(loads));
 }
 
+// Of the sites between two paths of markers, row by row.
+void Linearization::MakeFirstColumns() {
+  const int parts = mechanics_.mesh().refinement, sites = parts * mechanics_.site_rows();
+  first_columns_.resize(jacobian_.rows(), kNodeDofs * sites);
+  Eigen::VectorXd load = Eigen::VectorXd::Zero(hessian_.rows()), moved;
+  for (int i = 0; i < sites; ++i) {
+    const int site = i / parts * mechanics_.columns() + i % parts;
+    const int dof = mechanics_.shell().Dof(mechanics_.NodeOfSite(site), 0);
+    for (int c = 0; c < kNodeDofs; ++c) {
+      load[dof + c] = 1;
+      rings_->Solve(load, moved);
+      load[dof + c] = 0;
+      first_columns_.col(kNodeDofs * i + c) = (jacobian_ * moved).cast<float>();
+    }
+  }
+}
+
+// A skin of revolution with its markers, turned by the angle between two paths, is itself.
+void Linearization::MakeTurnedColumns(const std::vector<int>& missing) {
+  if (first_columns_.size() == 0) MakeFirstColumns();
+  const int parts = mechanics_.mesh().refinement, paths = mechanics_.columns() / parts;
+  const Eigen::Index rings = jacobian_.rows() / (3 * paths);
+  Eigen::Index to = adjoint_.cols();
+  adjoint_.conservativeResize(jacobian_.rows(), to + kNodeDofs * static_cast<Eigen::Index>(missing.size()));
+  for (const int site : missing) {
+    const int row = site / mechanics_.columns(), column = site % mechanics_.columns();
+    const int by = column / parts;
+    const auto angle = static_cast<float>(2 * kPi * by / paths), c = std::cos(angle), s = std::sin(angle);
+    for (Eigen::Index dof = 0; dof < kNodeDofs; ++dof, ++to) {
+      const float* from = first_columns_.col(kNodeDofs * (row * parts + column % parts) + dof).data();
+      float* turned = adjoint_.col(to).data();
+      for (Eigen::Index marker = 0; marker < rings * paths; ++marker) {
+        const Eigen::Index path = marker % paths, before = path < by ? path - by + paths : path - by;
+        const float* v = from + 3 * (marker - path + before);
+        turned[3 * marker] = c * v[0] - s * v[1];
+        turned[3 * marker + 1] = s * v[0] + c * v[1];
+        turned[3 * marker + 2] = v[2];
+      }
+    }
+    // The loads along x and y are turned, too.
+    auto x = adjoint_.col(to - kNodeDofs), y = adjoint_.col(to - kNodeDofs + 1);
+    const Eigen::VectorXf along_x = c * x - s * y;
+    y = (s * x + c * y).eval();
+    x = along_x;
+  }
+}
+
 // What these loads displace, which are rows: J (K^-1 loads').
 Eigen::MatrixXf Linearization::Solved(std::vector<BlockTridiagonal::Rows> filled,
                                       Eigen::MatrixXf loads) const {
-  factor_.SolveRows(std::move(filled), loads);
+  if (rings_) {
+    Eigen::MatrixXf moved(jacobian_.rows(), loads.rows());
+    Eigen::VectorXd motion;
+    for (Eigen::Index row = 0; row < loads.rows(); ++row) {
+      rings_->Solve(loads.row(row).transpose().cast<double>(), motion);
+      moved.col(row) = (jacobian_ * motion).cast<float>();
+    }
+    return moved;
+  }
+  factor_->SolveRows(std::move(filled), loads);
   Eigen::MatrixXf moved = Eigen::MatrixXf::Zero(loads.rows(), jacobian_.rows());
   for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
     for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it)
@@ -255,7 +332,7 @@ bool Linearization::Rebase(const ShellState& state, const KnownLoads& loads) {
   }
   mechanics_.shell().Gradient(state_, AppliedLoads(mechanics_, loads).loads(), gradient_);
   if (!gradient_.allFinite()) return false;
-  factor_.Solve(gradient_, motion_);
+  Solve(gradient_, motion_);
   mechanics_.markers().Displacements(state_, base_mm_);
   base_mm_.noalias() -= jacobian_ * motion_;
   return base_mm_.allFinite();
@@ -274,7 +351,7 @@ double Linearization::Step(const SiteLoads& loads, const Vec4& known_error, doub
     force.segment<3>(dof) += load;
     force.segment<2>(dof + 3) += Moment(node, tangential) + Turning(node, couple);
   }
-  factor_.Solve(force, motion_);
+  Solve(force, motion_);
   double longest = 0;
   for (int node = 0; node < shell.node_count(); ++node) {
     if (const int dof = shell.Dof(node, 0); dof >= 0)

@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 #include <array>
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,12 +24,17 @@ class Linearization {
 
   /// Makes everything again. False: the stiffness is singular there, or not finite.
   bool At(const ShellState& state, const KnownLoads& loads);
+  /// At that skin, with its stiffness. Of a column of sites' loads the others' follow by turns.
+  bool At(const std::shared_ptr<const InflatedSkin>& skin, const KnownLoads& loads);
   /// Moves to a state nearby and keeps stiffness, columns and frames: only what the skin is out of balance by
   /// is that of the new state, exactly. What steps lead to is then the same equilibrium, in more of them.
   /// False: not finite.
   bool Rebase(const ShellState& state, const KnownLoads& loads);
   /// The same state under other known loads, to first order.
   void SetKnownLoads(const KnownLoads& loads);
+  /// What known loads do, where that is known better than by this tangent: of a skin that sags beside the one
+  /// without weight.
+  void SetByKnownLoads(const ByKnownLoads& by_known_loads) { by_known_loads_ = by_known_loads; }
   bool is_made() const { return is_made_; }
 
   const ShellState& state() const { return state_; }
@@ -71,9 +78,13 @@ class Linearization {
   void FirstOrderMarkers(Eigen::VectorXd& stacked_mm) const;
 
  private:
+  void Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const;
+  bool Finish(const KnownLoads& loads);
   void SetFrames();
   void MakeAllColumns();
   void MakeNodeColumns(const std::vector<int>& missing);
+  void MakeTurnedColumns(const std::vector<int>& missing);
+  void MakeFirstColumns();
   Eigen::MatrixXf Solved(std::vector<BlockTridiagonal::Rows> filled, Eigen::MatrixXf loads) const;
   auto AtSite(int site) const { return adjoint_.middleCols<5>(5 * place_[static_cast<size_t>(site)]); }
   /// The rotations' part of a couple about an axis; of a force on the outer wall, which has one about the
@@ -83,7 +94,8 @@ class Linearization {
 
   const SkinMechanics& mechanics_;
   Eigen::SparseMatrix<double> hessian_;
-  BlockTridiagonal factor_;
+  std::optional<BlockTridiagonal> factor_;      // made when it is asked for
+  std::shared_ptr<const RingStiffness> rings_;  // instead of factor_
   MarkerMap::Jacobian jacobian_;
   ShellState state_, tangent_state_;
   bool is_made_ = false;
@@ -91,8 +103,9 @@ class Linearization {
   Eigen::VectorXd tangent_gradient_, tangent_base_mm_;
   Eigen::VectorXd gradient_, base_mm_, motion_;
   ByKnownLoads gradient_by_loads_, by_known_loads_;
-  Eigen::MatrixXf adjoint_;                     // J K^-1: 3 markers x the five dofs of each site in place_
-  std::vector<Eigen::Index> place_;             // by site, in adjoint_; -1: not made
+  Eigen::MatrixXf adjoint_;          // J K^-1: 3 markers x the five dofs of each site in place_
+  Eigen::MatrixXf first_columns_;    // likewise with rings_, of the sites from the first path to the next one
+  std::vector<Eigen::Index> place_;  // by site, in adjoint_; -1: not made
   std::vector<BlockTridiagonal::Rows> filled_;  // rows of J that reach that row of nodes
   std::vector<Mat3> frames_;
 };

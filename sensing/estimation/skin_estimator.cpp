@@ -151,8 +151,8 @@ double SkinEstimator::SeenMotion(const ShellState& state, const MarkerObservatio
 bool SkinEstimator::Remake(Tangent& tangent, const SkinProblem& problem, const ShellState& state,
                            const Eigen::VectorXd& local_n, SkinEstimate& estimate) {
   ++estimate.work.tangents;
-  const bool is_touched = &tangent != still_.get();
-  return tangent.Make(problem, state, local_n, is_touched ? still_->loads.untouched() : nullptr);
+  if (&tangent == still_.get()) return tangent.MakeUntouched(problem, state);
+  return tangent.Make(problem, state, local_n, still_->loads.untouched());
 }
 
 // The touched skin's next tangent, if one made ahead is due and is better than the one at hand. It is due
@@ -224,11 +224,13 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const SkinProblem& problem, Ski
   const bool linear = options_.model == ForceModel::kLinear;
   const ShellState about = linear ? mechanics_.shell().Rest() : problem.untouched.state;
   const double unit = mechanics_.length_unit();
-  if (!tangent.IsGoodFor(problem, about)) {
-    const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
+  if (!tangent.IsGoodFor(problem, linear ? about : problem.untouched.about())) {
     SkinProblem mine = problem;
-    if (linear) mine.loads = {};
-    if (!Remake(tangent, mine, about, none, estimate)) return false;
+    if (linear) {
+      mine.loads = {};
+      mine.untouched.inflated.reset();
+    }
+    if (!Remake(tangent, mine, about, {}, estimate)) return false;
   }
   estimate.state = about;
   double step_mm = 0;
@@ -396,11 +398,10 @@ SkinProblem SkinEstimator::MakeProblem(const SkinObservation& observation, const
 // What the touched skin's tangents take from the skin without loads. One from 2 mm of inflation away would do
 // for the covariance, but not for the norms: weak loads were missed.
 bool SkinEstimator::PrepareUntouched(const SkinProblem& problem, SkinEstimate& estimate) {
-  const bool is_good = still_->is_prepared && still_->IsNear(problem.untouched.state) &&
+  const bool is_good = still_->is_prepared && still_->IsNear(problem.untouched.about()) &&
                        still_->loads.HasKnownLoads(problem.prior) &&
                        still_->loads.untouched()->IsGoodFor(problem.observed, problem.prior);
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
-  if (!is_good && !Remake(*still_, problem, problem.untouched.state, none, estimate)) return false;
+  if (!is_good && !Remake(*still_, problem, problem.untouched.state, {}, estimate)) return false;
   still_->loads.Hide(problem.observed);
   return true;
 }

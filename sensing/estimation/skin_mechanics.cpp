@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "sensing/core/similar_skin.h"
+#include "sensing/estimation/untouched_skins.h"
 #include "sensing/shell/pressed_skin.h"
-#include "sensing/shell/sparse_cholesky.h"
 
 namespace taclink {
 namespace {
@@ -17,12 +17,6 @@ constexpr double kLongestElement = 0.8, kWidestElementDeg = 15;
 constexpr double kLoadSpreadMm = 3.8;
 constexpr double kLeastShare = 0.02;      // of the largest; less is left out of a spread
 constexpr double kInflationStep = 0.011;  // of PressureScale
-constexpr int kMostInflationSteps = 400;
-constexpr int kParts = 8;          // of a step, where the skin does not stand at its far end
-constexpr int kForgivenSteps = 2;  // that a pressure may be beyond what the skin stands
-constexpr double kSagStepMm = 1;   // in length units: by which a step of specific force moves the slack skin
-constexpr int kMostForceSteps = 60;
-constexpr size_t kMostSolved = 96;  // equilibria that are kept, some 0.3 MB each
 
 MeshRefinement RefinementFor(const LinkModel& model) {
   const double longest = kLongestElement * DecayLengthMm(model);
@@ -36,12 +30,6 @@ MeshRefinement RefinementFor(const LinkModel& model) {
           parts(widest_interval / longest)};
 }
 
-EquilibriumOptions SolverOptions(const LinkModel& model) {
-  EquilibriumOptions options;
-  options.tolerance_n = 1e-7 * model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm;
-  return options;
-}
-
 }  // namespace
 
 SkinMechanics::SkinMechanics(const LinkModel& model, int refinement)
@@ -51,11 +39,13 @@ SkinMechanics::SkinMechanics(const LinkModel& model, int refinement)
       markers_(model, mesh_),
       length_unit_(LengthUnit(model)),
       force_unit_(ForceUnit(model)),
-      pressure_step_mpa_(kInflationStep * PressureScale(model)),
-      equilibrium_(shell_, SolverOptions(model)) {
+      pressure_step_mpa_(kInflationStep * PressureScale(model)) {
   MakeSpread();
   SetUpWeight();
+  untouched_ = std::make_unique<UntouchedSkins>(*this);
 }
+
+SkinMechanics::~SkinMechanics() = default;
 
 bool SkinMechanics::IsBeyondMarkers(int site) const {
   const double z = RestSite(site).z();
@@ -92,7 +82,7 @@ void SkinMechanics::MakeSpread() {
   spread_.makeCompressed();
 }
 
-// Finds the weight's gradient and the grid's step of specific force: by how far it moves the slack skin.
+// Finds the weight's gradient.
 void SkinMechanics::SetUpWeight() {
   gradient_by_specific_force_.setZero(shell_.dof_count(), KnownLoads::kCount);
   mass_per_area_ = model_.MassPerArea();
@@ -106,9 +96,6 @@ void SkinMechanics::SetUpWeight() {
     shell_.Gradient(shell_.Rest(), one, with);
     gradient_by_specific_force_.col(1 + axis) = with - without;
   }
-  const Equilibrium* slack = Solved({});
-  const double mm_per_mps2 = slack->markers_by_loads.rightCols<3>().cwiseAbs().maxCoeff();
-  specific_force_step_mps2_ = kSagStepMm * length_unit_ / mm_per_mps2;
 }
 
 void SkinMechanics::GradientByLoads(const ShellState& state, ByKnownLoads& out) const {
@@ -121,152 +108,13 @@ void SkinMechanics::GradientByLoads(const ShellState& state, ByKnownLoads& out) 
   out.col(0) = with - without;
 }
 
-// From `skin.state` to the equilibrium at its loads, with derivatives.
-bool SkinMechanics::Solve(Equilibrium& skin) {
-  const AppliedLoads applied(*this, skin.loads);
-  const EquilibriumSummary summary = equilibrium_.Solve(applied.loads(), {}, skin.state);
-  if (!summary.ok() || !summary.stable) return false;
-  Eigen::SparseMatrix<double> hessian = shell_.Pattern();
-  SparseCholesky factor(hessian);
-  Eigen::VectorXd gradient, moved;
-  shell_.Hessian(skin.state, applied.loads(), gradient, hessian);
-  if (!factor.Factorise(hessian)) return false;
-  ByKnownLoads motion;
-  GradientByLoads(skin.state, motion);
-  for (int k = 0; k < KnownLoads::kCount; ++k) {
-    if (motion.col(k).isZero(0)) continue;
-    factor.Solve(-motion.col(k), moved);
-    motion.col(k) = moved;
-  }
-  markers_.Displacements(skin.state, skin.markers_mm);
-  MarkerMap::Jacobian jacobian = markers_.MakeJacobian(shell_);
-  markers_.WriteJacobian(shell_, skin.state, jacobian);
-  skin.markers_by_loads = jacobian * motion;
-  const size_t nodes = skin.state.mids_mm.size();
-  skin.mids_by_loads.assign(nodes, Equilibrium::NodeByLoads::Zero());
-  skin.directors_by_loads.assign(nodes, Equilibrium::NodeByLoads::Zero());
-  for (size_t i = 0; i < nodes; ++i) {
-    const int dof = shell_.Dof(static_cast<int>(i), 0);
-    if (dof < 0) continue;
-    const Vec3& d = skin.state.directors[i];
-    const Vec3& t = skin.state.tangents[i];
-    skin.mids_by_loads[i] = motion.middleRows<3>(dof);
-    skin.directors_by_loads[i] = t.cross(d) * motion.row(dof + 3) + d.cross(t).cross(d) * motion.row(dof + 4);
-  }
-  return true;
-}
-
-// Where the way to a grid point comes from: from half the specific force under the same pressure, and without
-// that whole steps of pressure from the step before, parts of a step from its near end.
-SkinMechanics::GridPoint SkinMechanics::Before(const GridPoint& point) {
-  GridPoint before = point;
-  if (std::any_of(point.begin() + 1, point.end(), [](int steps) { return steps != 0; })) {
-    for (size_t k = 1; k < before.size(); ++k) before[k] /= 2;
-    return before;
-  }
-  const int nearer = point[0] > 0 ? point[0] - 1 : point[0] + 1;
-  before[0] = nearer / kParts * kParts;
-  return before;
-}
-
-const SkinMechanics::Equilibrium* SkinMechanics::Solved(const GridPoint& point) {
-  if (const auto found = solved_.find(point); found != solved_.end()) return found->second.get();
-  auto skin = std::make_unique<Equilibrium>();
-  skin->loads.pressure_mpa = point[0] * (pressure_step_mpa_ / kParts);
-  skin->loads.specific_force_mps2 = specific_force_step_mps2_ * Vec3(point[1], point[2], point[3]);
-  if (point == GridPoint{}) {
-    skin->state = shell_.Rest();
-  } else {
-    const Equilibrium* before = Solved(Before(point));
-    if (before == nullptr) return solved_.emplace(point, nullptr).first->second.get();
-    skin->state = before->state;
-  }
-  if (!Solve(*skin)) skin = nullptr;
-  return solved_.emplace(point, std::move(skin)).first->second.get();
+Eigen::VectorXd SkinMechanics::Weight(const KnownLoads& loads) const {
+  if (mass_per_area_ == 0 || loads.specific_force_mps2.isZero(0)) return {};
+  return -gradient_by_specific_force_.rightCols<3>() * loads.specific_force_mps2;
 }
 
 const UntouchedSkin* SkinMechanics::Untouched(const KnownLoads& loads) {
-  KnownLoads at = loads;
-  if (mass_per_area_ == 0) at.specific_force_mps2.setZero();
-  if (!(std::abs(at.pressure_mpa) < (kMostInflationSteps - 1) * pressure_step_mpa_) ||
-      !(at.specific_force_mps2.norm() <= kMostForceSteps * specific_force_step_mps2_))
-    return nullptr;
-  if (solved_.size() > kMostSolved) solved_.clear();
-  for (const int parts : {kParts, 1}) {
-    if (const UntouchedSkin* skin = Between(at, parts)) return skin;
-  }
-  const double part_mpa = pressure_step_mpa_ / kParts;
-  const int toward = at.pressure_mpa > 0 ? -1 : 1;
-  auto part = static_cast<int>(std::trunc(at.pressure_mpa / part_mpa));
-  for (int i = 0; i <= kForgivenSteps * kParts; ++i, part += toward) {
-    at.pressure_mpa = part * part_mpa;
-    if (const UntouchedSkin* skin = Between(at, 1)) return skin;
-  }
-  return nullptr;
-}
-
-// Of the simplex of grid points that the loads lie in: from the lowest corner of the cell along its edges,
-// the largest remainder first (Kuhn's triangulation [kuhn1960]). Pressures are multiples of `parts` of a
-// step.
-const UntouchedSkin* SkinMechanics::Between(const KnownLoads& loads, int parts) {
-  constexpr double kNone = 1e-9;
-  Vec4 at = loads.Stacked();
-  at[0] /= pressure_step_mpa_ * parts / kParts;
-  if (mass_per_area_ > 0) at.tail<3>() /= specific_force_step_mps2_;
-  GridPoint point;
-  std::array<std::pair<double, size_t>, KnownLoads::kCount> rest;
-  for (size_t k = 0; k < point.size(); ++k) {
-    const double steps = at[static_cast<Eigen::Index>(k)], low = std::floor(steps + kNone);
-    point[k] = static_cast<int>(low) * (k == 0 ? parts : 1);
-    rest[k] = {std::max(0.0, steps - low), k};
-  }
-  std::sort(rest.rbegin(), rest.rend());
-  std::array<Corner, KnownLoads::kCount + 1> corners;
-  size_t count = 0;
-  double left = 1;
-  for (size_t k = 0; k <= rest.size(); ++k) {
-    const double next = k < rest.size() ? rest[k].first : 0, share = left - next;
-    if (share > kNone) {
-      const Equilibrium* skin = Solved(point);
-      if (skin == nullptr) return nullptr;
-      corners[count++] = {skin, share};
-    }
-    if (k == rest.size()) break;
-    left = next;
-    point[rest[k].second] += rest[k].second == 0 ? parts : 1;
-  }
-  if (count == 1) return corners.front().skin;
-  return Blend(loads, std::span(corners).first(count));
-}
-
-// Of expansions f_i + D_i (x - x_i) / 2 about corners with barycentric shares s_i: with f quadratic and
-// e_i = x_i - x, each is f(x) + D(x) e_i / 2, and the e_i sum to none [guessab2006].
-const UntouchedSkin* SkinMechanics::Blend(const KnownLoads& loads, std::span<const Corner> corners) {
-  const size_t nodes = corners.front().skin->state.mids_mm.size();
-  if (between_.loads == loads && between_.state.mids_mm.size() == nodes) return &between_;
-  between_.loads = loads;
-  between_.markers_mm.setZero(corners.front().skin->markers_mm.size());
-  between_.markers_by_loads.setZero(between_.markers_mm.size(), KnownLoads::kCount);
-  between_.state.mids_mm.assign(nodes, Vec3::Zero());
-  between_.state.directors.assign(nodes, Vec3::Zero());
-  between_.state.tangents.assign(nodes, Vec3::Zero());
-  for (const auto& [skin, share] : corners) {
-    const Vec4 half = 0.5 * (loads.Stacked() - skin->loads.Stacked());
-    between_.markers_mm += share * (skin->markers_mm + skin->markers_by_loads * half);
-    between_.markers_by_loads += share * skin->markers_by_loads;
-    for (size_t i = 0; i < nodes; ++i) {
-      between_.state.mids_mm[i] += share * (skin->state.mids_mm[i] + skin->mids_by_loads[i] * half);
-      between_.state.directors[i] += share * (skin->state.directors[i] + skin->directors_by_loads[i] * half);
-      between_.state.tangents[i] += share * skin->state.tangents[i];
-    }
-  }
-  for (size_t i = 0; i < nodes; ++i) {
-    Vec3& d = between_.state.directors[i];
-    Vec3& t = between_.state.tangents[i];
-    d.normalize();
-    t = (t - t.dot(d) * d).normalized();
-  }
-  return &between_;
+  return untouched_->Find(loads);
 }
 
 AppliedLoads::AppliedLoads(const SkinMechanics& mechanics, const KnownLoads& loads)

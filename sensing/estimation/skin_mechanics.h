@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 #include <array>
-#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -11,7 +10,7 @@
 #include "sensing/core/known_loads.h"
 #include "sensing/core/link_model.h"
 #include "sensing/shell/body_force.h"
-#include "sensing/shell/equilibrium.h"
+#include "sensing/shell/inflated_skin.h"
 #include "sensing/shell/marker_map.h"
 #include "sensing/shell/nonlinear_shell.h"
 #include "sensing/shell/shell_mesh.h"
@@ -21,10 +20,16 @@ namespace taclink {
 /// Derivatives of a stacked vector by KnownLoads::Stacked().
 using ByKnownLoads = Eigen::Matrix<double, Eigen::Dynamic, KnownLoads::kCount>;
 
+class UntouchedSkins;
+
 /// The skin under known loads alone, which nothing touches.
 struct UntouchedSkin {
   KnownLoads loads;
   ShellState state;
+  /// The skin without weight at nearly the same pressure; null if the weight changes the stiffness too much.
+  std::shared_ptr<const InflatedSkin> inflated = nullptr;
+  /// Where to linearize it.
+  const ShellState& about() const { return inflated ? inflated->state : state; }
   Eigen::VectorXd markers_mm;     ///< displacements from the slack skin without weight, stacked
   ByKnownLoads markers_by_loads;  ///< their derivatives, mm/MPa and mm/(m/s^2)
 };
@@ -35,6 +40,7 @@ class SkinMechanics {
  public:
   /// `refinement`: elements per interval of the marker grid; 0: as many as the skin's dents ask for.
   explicit SkinMechanics(const LinkModel& model, int refinement = 0);
+  ~SkinMechanics();
 
   const LinkModel& model() const { return model_; }
   const ShellMesh& mesh() const { return mesh_; }
@@ -62,37 +68,23 @@ class SkinMechanics {
   double length_unit() const { return length_unit_; }
   double force_unit() const { return force_unit_; }
 
-  /// Pressures that are solved are multiples of this, MPa.
+  /// A small step of inflation, MPa: of 1.1 % of PressureScale.
   double pressure_step() const { return pressure_step_mpa_; }
   /// N per mm^2 of the undeformed mid-surface and m/s^2.
   double mass_per_area() const { return mass_per_area_; }
   const std::vector<Eigen::Vector4d>& corner_areas_mm2() const { return corner_areas_mm2_; }
+  /// The skin's own specific force as loads of its degrees of freedom, N; empty: it has no weight.
+  Eigen::VectorXd Weight(const KnownLoads& loads) const;
   /// Derivatives of the shell's gradient by the known loads at a state.
   void GradientByLoads(const ShellState& state, ByKnownLoads& out) const;
 
-  /// At these loads, or at the nearest pressure at which the skin stands: a reading scatters about zero,
-  /// where a little suction buckles it. Null: two steps nearer to zero there is no stable equilibrium that
-  /// smaller loads lead to, or the loads are beyond all measure. Interpolated between equilibria on a grid of
-  /// pressure and specific force, by first-order expansions about the corners of a simplex, weighted so that
-  /// quadratic dependence is exact. Valid until the next call.
+  /// The equilibrium at these loads. A pressure reading scatters about zero and a small suction buckles the
+  /// skin, so if there is no equilibrium, the nearest pressure with one is taken, up to two pressure steps
+  /// closer to zero. Returns nullptr if there is none, or if the loads are out of range. Valid until the next
+  /// call.
   const UntouchedSkin* Untouched(const KnownLoads& loads);
 
  private:
-  /// Pressure in parts of a step, specific force in steps.
-  using GridPoint = std::array<int, KnownLoads::kCount>;
-  struct Equilibrium : UntouchedSkin {
-    using NodeByLoads = Eigen::Matrix<double, 3, KnownLoads::kCount>;
-    std::vector<NodeByLoads> mids_by_loads, directors_by_loads;
-  };
-  struct Corner {
-    const Equilibrium* skin = nullptr;
-    double share = 0;
-  };
-  const Equilibrium* Solved(const GridPoint& point);
-  static GridPoint Before(const GridPoint& point);
-  const UntouchedSkin* Between(const KnownLoads& loads, int parts);
-  const UntouchedSkin* Blend(const KnownLoads& loads, std::span<const Corner> corners);
-  bool Solve(Equilibrium& skin);
   void MakeSpread();
   void SetUpWeight();
 
@@ -102,12 +94,10 @@ class SkinMechanics {
   MarkerMap markers_;
   Eigen::SparseMatrix<double> spread_;
   double length_unit_ = 1, force_unit_ = 1, pressure_step_mpa_ = 0;
-  double mass_per_area_ = 0, specific_force_step_mps2_ = 0;
+  double mass_per_area_ = 0;
   std::vector<Eigen::Vector4d> corner_areas_mm2_;
   ByKnownLoads gradient_by_specific_force_;  // constant; the pressure's column is zero
-  EquilibriumSolver equilibrium_;
-  std::map<GridPoint, std::unique_ptr<Equilibrium>> solved_;  // null: there is none
-  UntouchedSkin between_;
+  std::unique_ptr<UntouchedSkins> untouched_;
 };
 
 /// Known loads as loads of the shell's elements. What is zero is left out.

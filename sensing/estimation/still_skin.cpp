@@ -39,11 +39,10 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const UntouchedS
   if (!ExplainByKnownLoads(observation.markers, untouched, measured, prior, estimate)) return false;
   if (estimate.loads.chi2_per_dof > kStillChi2PerDof || !AreNeighborsStill()) return false;
   Tangent& tangent = *still_;
-  if (!tangent.is_prepared || !tangent.IsNear(untouched.state) ||
+  if (!tangent.is_prepared || !tangent.IsNear(untouched.about()) ||
       !tangent.loads.IsPreparedFor(observation.markers, prior)) {
-    const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
     const SkinProblem problem = MakeProblem(observation, untouched, measured, prior, estimate.baseline_mm);
-    if (!Remake(tangent, problem, untouched.state, none, estimate)) return false;
+    if (!Remake(tangent, problem, untouched.state, {}, estimate)) return false;
   }
   used_ = &tangent;
   tangent.loads.ConcludeUntouched(observation.markers);
@@ -127,7 +126,7 @@ bool SkinEstimator::AreNeighborsStill() const {
 bool SkinEstimator::IsStanding(const SkinObservation& observation, const UntouchedSkin& untouched,
                                const KnownLoadsPrior& prior) {
   if (!solved_ || IsFirstOrder() || !used_->is_prepared || !still_->is_prepared ||
-      !still_->IsNear(untouched.state))
+      !still_->IsNear(untouched.about()))
     return false;
   const SkinObservation& then = solved_->observation;
   if (observation.baseline_loads.Loads() != then.baseline_loads.Loads() ||

@@ -50,6 +50,18 @@ bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Ei
   return is_prepared;
 }
 
+bool Tangent::MakeUntouched(const SkinProblem& problem, const ShellState& state) {
+  const std::shared_ptr<const InflatedSkin>& inflated = problem.untouched.inflated;
+  const bool is_kept = is_prepared && IsNear(inflated ? inflated->state : state);
+  local_n = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(skin.frames().size()));
+  const bool is_made =
+      is_kept || (inflated ? skin.At(inflated, problem.loads) : skin.At(state, problem.loads));
+  if (is_made && inflated) skin.SetByKnownLoads(problem.untouched.markers_by_loads);
+  is_prepared = is_made && skin.Rebase(state, problem.loads) &&
+                loads.Prepare(skin, problem.untouched, problem.observed, problem.prior, local_n, nullptr);
+  return is_prepared;
+}
+
 void Tangent::Forget() {
   is_prepared = false;
   local_n.resize(0);

@@ -13,7 +13,7 @@ namespace taclink {
 /// What one frame asks.
 struct SkinProblem {
   MarkerObservations observed = {};  ///< from the slack skin
-  UntouchedSkin untouched = {};      ///< a place to linearize at, near what the skin would be untouched
+  UntouchedSkin untouched = {};      ///< the skin under `loads` alone
   KnownLoads loads = {};  ///< those of `untouched`: as measured, or fitted where they are not known well
   KnownLoadsPrior prior = {};
 };
@@ -35,6 +35,9 @@ struct Tangent {
   /// `untouched`: of the skin without loads; null: this is that skin's tangent.
   bool Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local,
             const std::shared_ptr<const UntouchedCovariance>& untouched);
+  /// Of the skin without loads, at `state`: that of the problem or the slack one. Made of its inflated skin,
+  /// where it has one, so that it is good for any attitude.
+  bool MakeUntouched(const SkinProblem& problem, const ShellState& state);
   void Forget();
 
   const double reach_mm, force_unit;

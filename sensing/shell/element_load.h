@@ -11,6 +11,9 @@ class ElementLoad {
   /// Adds its energy, and its derivatives up to `order`, at an element's state.
   virtual void Add(DerivativeOrder order, int element, const ElementState& state,
                    ElementResponse& response) const = 0;
+  /// Not zero: the load is this FollowerPressure on all elements alike, which a shell may apply by itself
+  /// instead of by Add.
+  virtual double uniform_pressure_mpa() const { return 0; }
 
  protected:
   ElementLoad() = default;
@@ -29,6 +32,7 @@ class FollowerPressure final : public ElementLoad {
   explicit FollowerPressure(double pressure_mpa) : pressure_mpa_(pressure_mpa) {}
   void Add(DerivativeOrder order, int element, const ElementState& state,
            ElementResponse& response) const override;
+  double uniform_pressure_mpa() const override { return pressure_mpa_; }
 
  private:
   double pressure_mpa_;

@@ -90,6 +90,7 @@ double EquilibriumSolver::LimitOf(const Eigen::VectorXd& step) const {
 
 EquilibriumSummary EquilibriumSolver::Solve(NonlinearShell::Loads loads, const Eigen::VectorXd& dead_load,
                                             ShellState& state, bool line_search) {
+  shift_ = 0;  // what is found depends on no earlier call
   const bool has_dead = dead_load.size() > 0;
   const ShellState rest = shell_.Rest();
   const auto dead_energy = [&](const ShellState& s) {

@@ -36,20 +36,28 @@ class NonlinearElement {
   /// `rest`: its unstressed state, corners counter-clockwise seen from where the directors point to.
   NonlinearElement(const ElementState& rest, double thickness_mm, const Material& material);
 
+  /// The in-plane Gauss points at one height: covariant to Cartesian strains, both halves of them.
+  struct Layer {
+    double height_mm = 0;  ///< above the mid-surface
+    Lanes weight_mm3;
+    std::array<Lanes3, 3> in_plane;  ///< e11, e22, 2 e12 to Cartesian
+    std::array<Lanes3, 2> warp;      ///< e11, e22, 2 e12 to transverse shears, where a director leans
+    std::array<std::array<Lanes, 4>, 2> shear;  ///< tying shears to Cartesian transverse shears
+    Lanes3 rest_metric;                         ///< g11, g22, 2 g12 at rest
+  };
+
+  /// As far below the mid-surface as above.
+  const std::array<Layer, 2>& layers() const { return layers_; }
+  /// Along xi and along eta.
+  const std::array<double, 2>& shear_moduli_mpa() const { return shear_moduli_mpa_; }
+  /// Of and by the tying shears, times mm (covariant).
+  const Eigen::Matrix4d& tying_stiffness() const { return tying_stiffness_; }
+  const Eigen::Vector4d& rest_tying() const { return rest_tying_; }
+
   /// The energy is infinite where the material law has no answer.
   void Add(DerivativeOrder order, const ElementState& state, ElementResponse& response) const;
 
  private:
-  // The in-plane Gauss points at one height: covariant to Cartesian strains, both halves of them.
-  struct Layer {
-    double height_mm = 0;  // above the mid-surface
-    Lanes weight_mm3;
-    std::array<Lanes3, 3> in_plane;  // e11, e22, 2 e12 to Cartesian
-    std::array<Lanes3, 2> warp;      // e11, e22, 2 e12 to transverse shears, where a director leans
-    std::array<std::array<Lanes, 4>, 2> shear;  // tying shears to Cartesian transverse shears
-    Lanes3 rest_metric;                         // g11, g22, 2 g12 at rest
-  };
-
   struct Strained;
   struct Sums;
   using Corners = Eigen::Matrix<double, 3, 4>;
@@ -67,8 +75,8 @@ class NonlinearElement {
 
   double thickness_mm_;
   Material material_;
-  std::array<double, 2> shear_moduli_mpa_;  // along xi and across it
-  std::array<Layer, 2> layers_;             // as far below the mid-surface as above
+  std::array<double, 2> shear_moduli_mpa_;
+  std::array<Layer, 2> layers_;
   Eigen::Matrix4d tying_stiffness_ = Eigen::Matrix4d::Zero();
   Eigen::Vector4d rest_tying_;
 };

@@ -2,6 +2,7 @@
 
 #include <Eigen/SparseCore>
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "sensing/core/link_model.h"
 #include "sensing/shell/element_load.h"
 #include "sensing/shell/nonlinear_element.h"
+#include "sensing/shell/ring_shell.h"
 #include "sensing/shell/shell_mesh.h"
 
 namespace taclink {
@@ -22,12 +24,17 @@ struct ShellSurface {
   std::vector<Vec3> tangents;
   std::vector<std::array<int, 4>> elements;  ///< counter-clockwise seen from where the directors point to
   double thickness_mm = 0;
+  /// Of a mesh of revolution that is numbered as MakeShellMesh does: elements around. 0: any other.
+  int columns = 0;
   /// By node: three translations, rotation about the tangent, rotation about director x tangent.
   std::vector<std::array<bool, 5>> fixed;
 };
 
 /// The skin of a link, clamped at both ends. `mesh` of MakeShellMesh.
 ShellSurface SkinSurface(const ShellMesh& mesh);
+
+/// Degrees of freedom of a node that does not stand still.
+inline constexpr int kNodeDofs = 5;
 
 /// Where a shell's nodes are, and how they are turned.
 struct ShellState {
@@ -51,6 +58,8 @@ class NonlinearShell {
 
   const ShellSurface& surface() const { return surface_; }
   const Material& material() const { return material_; }
+  /// Not empty: all elements of a ring are alike, and gradients and energies are computed ring by ring.
+  const std::optional<RingShell>& rings() const { return rings_; }
   int node_count() const { return static_cast<int>(surface_.mids_mm.size()); }
   int dof_count() const { return dof_count_; }
   /// Index of a node's degree of freedom (0..4), -1: it stands still.
@@ -72,20 +81,41 @@ class NonlinearShell {
 
   /// Moves and turns the nodes; the rotations are exact.
   void Step(const Eigen::VectorXd& increment, ShellState& state) const;
+  /// One node, by all five of its degrees of freedom.
+  static void StepNode(int node, const Eigen::Matrix<double, 5, 1>& by, ShellState& state);
 
   ElementState StateOf(int element, const ShellState& state) const;
 
- private:
-  static constexpr int kElementDofs = 20;
-  using Local = Eigen::Matrix<double, kElementDofs, 1>;
+  static constexpr int kElementDofs = 4 * kNodeDofs;
+  /// One element's part, with its loads, by the degrees of freedom of its corners, five each, those that
+  /// stand still included.
+  struct ElementPart {
+    double energy_nmm = 0;
+    Eigen::Matrix<double, kElementDofs, 1> gradient;
+    Eigen::Matrix<double, kElementDofs, kElementDofs> hessian;
+  };
+  void SetElementPart(int element, const ShellState& state, Loads loads, ElementPart& part) const;
 
+ private:
   template <typename Visit>
   double ForEachElement(DerivativeOrder order, const ShellState& state, Loads loads, Visit visit) const;
+  double ByRings(DerivativeOrder order, const ShellState& state, Loads loads,
+                 Eigen::VectorXd* gradient) const;
+  void SetPart(int element, const ShellState& state, const ElementResponse& response,
+               ElementPart& part) const;
+  void AddAtCorners(const ShellState& state, int element, const ElementResponse& response,
+                    Eigen::VectorXd& gradient) const;
+  void AddAtNode(const ShellState& state, int node, const Vec3& force, const Vec3& by_director,
+                 Eigen::VectorXd& gradient) const;
+  const NonlinearElement& Element(int element) const {
+    return elements_[static_cast<size_t>(rings_ ? element / rings_->columns() : element)];
+  }
   void MakePattern();
 
   ShellSurface surface_;
   Material material_;
-  std::vector<NonlinearElement> elements_;
+  std::vector<NonlinearElement> elements_;  // with rings_: one of each
+  std::optional<RingShell> rings_;
   std::vector<std::array<int, 5>> dofs_;
   int dof_count_ = 0;
   Eigen::SparseMatrix<double> pattern_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sensing/shell/instructions.h"
+
 namespace taclink {
 namespace {
 
@@ -72,44 +74,67 @@ cv::Rect DomePlace(const Projector& camera, const Dome& dome, double blur_px, cv
   return PlaceOf(sight, dome.radius_mm, HalfWidth(blur_px), size);
 }
 
+namespace {
+
+// A dome in units of its radius, in floats: this is most of a picture's cost.
+struct Drawing {
+  float u_by_x, u_by_y, w_by_x, w_by_y;  // by a pixel
+  float facing, px_by_u, soft;           // soft: edges per px
+  float ambient, direct;                 // levels
+};
+
+// Pixels of a row from where u and w are given. Without branches or aliases, so that the compiler makes it of
+// vectors.
+TACLINK_IN_KERNEL void DrawPixels(const Drawing d, float u0, float w0, int count, uint8_t* __restrict row) {
+  constexpr auto kAside = static_cast<float>(kLightAside);
+  for (int i = 0; i < count; ++i) {
+    const float x = static_cast<float>(i), u = u0 + d.u_by_x * x, w = w0 + d.w_by_x * x;
+    // Signed distances, px, to the ball's outline, (1 - q) over the gradient of q, and to the base's lower
+    // edge.
+    const float q2 = u * u + w * w + 1e-6F;
+    const float gx = u * d.u_by_x + w * d.w_by_x, gy = u * d.u_by_y + w * d.w_by_y;
+    const float to_outline = (1 - std::sqrt(q2)) * std::sqrt(q2 / (gx * gx + gy * gy + 1e-12F));
+    const float to_base = (u + d.facing * std::sqrt(std::max(0.0F, 1 - w * w))) * d.px_by_u;
+    const float t = std::clamp(0.5F + std::min(to_outline, to_base) * d.soft, 0.0F, 1.0F);
+    const float cover = t * t * (3 - 2 * t);
+    const float front = std::sqrt(std::max(0.0F, 1 - u * u - w * w));
+    const float shade = d.ambient + d.direct * std::max(0.0F, front - kAside * u);
+    const float before = static_cast<float>(row[i]), value = before + cover * (shade - before);
+    row[i] = static_cast<uint8_t>(std::clamp(value + 0.5F, 0.0F, 255.0F));
+  }
+}
+
+void DrawPixelsPlain(const Drawing& d, float u0, float w0, int count, uint8_t* row) {
+  DrawPixels(d, u0, w0, count, row);
+}
+TACLINK_FOR_AVX2 void DrawPixelsAvx2(const Drawing& d, float u0, float w0, int count, uint8_t* row) {
+  DrawPixels(d, u0, w0, count, row);
+}
+
+}  // namespace
+
 cv::Rect DrawDome(const Projector& camera, const Dome& dome, double blur_px, cv::Mat& gray) {
   DomeSight sight;
   if (!Look(camera, dome, sight)) return {};
   const double half_width = HalfWidth(blur_px);
   const cv::Rect place = PlaceOf(sight, dome.radius_mm, half_width, gray.size());
-  const int x0 = place.x, x1 = place.x + place.width, y0 = place.y, y1 = place.y + place.height;
-
-  // In units of the radius from here on; floats, as this is most of a picture's cost.
   const Eigen::Matrix2f m = (sight.px_from_mm.inverse() / dome.radius_mm).cast<float>();
-  const float u_by_x = m(0, 0), u_by_y = m(0, 1), w_by_x = m(1, 0), w_by_y = m(1, 1);
-  const float facing = static_cast<float>(sight.facing);
-  const float px_by_u = 1 / std::hypot(u_by_x, u_by_y);
-  const float soft = static_cast<float>(0.5 / half_width);
-  const float light_norm = static_cast<float>(1 / std::hypot(1.0, kLightAside));
-  const float ambient = static_cast<float>(kAmbient * dome.level);
-  const float direct = static_cast<float>((1 - kAmbient) * dome.level) * light_norm;
-  const float aside = static_cast<float>(kLightAside);
-  for (int y = y0; y < y1; ++y) {
-    uint8_t* row = gray.ptr<uint8_t>(y);
-    const float dx = static_cast<float>(x0 - sight.foot_px.x()),
-                dy = static_cast<float>(y - sight.foot_px.y());
-    float u = u_by_x * dx + u_by_y * dy, w = w_by_x * dx + w_by_y * dy;
-    for (int x = x0; x < x1; ++x, u += u_by_x, w += w_by_x) {
-      // Signed distances, px, to the ball's outline, (1 - q) over the gradient of q, and to the base's lower
-      // edge.
-      const float q2 = u * u + w * w + 1e-6F;
-      const float gx = u * u_by_x + w * w_by_x, gy = u * u_by_y + w * w_by_y;
-      const float to_outline = (1 - std::sqrt(q2)) * std::sqrt(q2 / (gx * gx + gy * gy + 1e-12F));
-      const float to_base = (u + facing * std::sqrt(std::max(0.0F, 1 - w * w))) * px_by_u;
-      const float inside = std::min(to_outline, to_base);
-      const float t = std::clamp(0.5F + inside * soft, 0.0F, 1.0F);
-      const float cover = t * t * (3 - 2 * t);
-      if (cover <= 0) continue;
-      const float front = std::sqrt(std::max(0.0F, 1 - u * u - w * w));
-      const float shade = ambient + direct * std::max(0.0F, front - aside * u);
-      const float value = static_cast<float>(row[x]) + cover * (shade - static_cast<float>(row[x]));
-      row[x] = static_cast<uint8_t>(std::clamp(value + 0.5F, 0.0F, 255.0F));
-    }
+  const double light_norm = 1 / std::hypot(1.0, kLightAside);
+  const Drawing drawing{.u_by_x = m(0, 0),
+                        .u_by_y = m(0, 1),
+                        .w_by_x = m(1, 0),
+                        .w_by_y = m(1, 1),
+                        .facing = static_cast<float>(sight.facing),
+                        .px_by_u = 1 / std::hypot(m(0, 0), m(0, 1)),
+                        .soft = static_cast<float>(0.5 / half_width),
+                        .ambient = static_cast<float>(kAmbient * dome.level),
+                        .direct = static_cast<float>((1 - kAmbient) * dome.level * light_norm)};
+  static const auto kDraw = BestInstructions() == Instructions::kPlain ? DrawPixelsPlain : DrawPixelsAvx2;
+  for (int y = place.y; y < place.y + place.height; ++y) {
+    const auto dx = static_cast<float>(place.x - sight.foot_px.x()),
+               dy = static_cast<float>(y - sight.foot_px.y());
+    kDraw(drawing, m(0, 0) * dx + m(0, 1) * dy, m(1, 0) * dx + m(1, 1) * dy, place.width,
+          gray.ptr<uint8_t>(y) + place.x);
   }
   return place;
 }

@@ -1,4 +1,4 @@
-// The untouched skin under known loads: what is interpolated against equilibria that are solved for.
+// The untouched skin under known loads against equilibria by Newton's method.
 #include "sensing/estimation/skin_mechanics.h"
 
 #include <gtest/gtest.h>
@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "sensing/model/model_file.h"
+#include "sensing/shell/equilibrium.h"
 
 namespace taclink {
 namespace {
@@ -36,13 +37,12 @@ class SkinMechanicsTest : public ::testing::TestWithParam<const char*> {
 TEST_P(SkinMechanicsTest, IsTheEquilibriumUnderAnyKnownLoads) {
   for (const KnownLoads& loads :
        {KnownLoads{0, {0, -9.8, 0}}, KnownLoads{3.3e-4, {4.9, -6.9, -4.9}}, KnownLoads{1.07e-3, {1, 2, 9}},
-        KnownLoads{6.1e-4, {}}, KnownLoads{0, {3, 12, -4}}}) {
+        KnownLoads{6.1e-4}, KnownLoads{0, {3, 12, -4}}}) {
     const UntouchedSkin* skin = mechanics_.Untouched(loads);
     ASSERT_TRUE(skin != nullptr);
     EXPECT_EQ(skin->loads.pressure_mpa, loads.pressure_mpa);
     const Eigen::VectorXd expected_mm = Solved(loads);
-    EXPECT_LT(Largest(skin->markers_mm - expected_mm), 4e-3 * Largest(expected_mm) + 1e-3)
-        << loads.Stacked().transpose();
+    EXPECT_LT(Largest(skin->markers_mm - expected_mm), 1e-3) << loads.Stacked().transpose();
     EXPECT_GT(Largest(expected_mm), 0.5);
   }
 }
@@ -61,21 +61,43 @@ TEST_P(SkinMechanicsTest, KnowsItsDerivatives) {
 
 TEST_P(SkinMechanicsTest, RefusesLoadsBeyondAllMeasure) {
   const double nan = std::nan("");
-  for (const KnownLoads& loads : {KnownLoads{nan, {}}, KnownLoads{0, {0, nan, 0}}, KnownLoads{1, {}},
-                                  KnownLoads{0, {1e5, 0, 0}}, KnownLoads{-1, {}}})
+  for (const KnownLoads& loads : {KnownLoads{nan}, KnownLoads{0, {0, nan, 0}}, KnownLoads{1},
+                                  KnownLoads{0, {1e5, 0, 0}}, KnownLoads{-1}})
     EXPECT_EQ(mechanics_.Untouched(loads), nullptr) << loads.Stacked().transpose();
 }
 
-// An arm that turns about all axes: what is kept is bounded, and what comes back is the same.
+// An arm that turns about all axes while it is inflated: what is kept is bounded, and what comes back is the
+// same, to the last bit.
 TEST_P(SkinMechanicsTest, ForgetsAndFindsAgain) {
   const KnownLoads first{2e-4, {9.8, 0, 0}};
-  const Eigen::VectorXd before_mm = mechanics_.Untouched(first)->markers_mm;
-  for (int i = 0; i < 30; ++i) {
+  const UntouchedSkin before = *mechanics_.Untouched(first);
+  for (int i = 0; i < 60; ++i) {
     const double a = 0.7 * i, b = 0.31 * i;
     const Vec3 down = 9.8 * Vec3(std::cos(a) * std::cos(b), std::sin(a) * std::cos(b), std::sin(b));
-    ASSERT_TRUE(mechanics_.Untouched({0, down}) != nullptr) << i;
+    ASSERT_TRUE(mechanics_.Untouched({1e-5 * i, down}) != nullptr) << i;
   }
-  EXPECT_LT(Largest(mechanics_.Untouched(first)->markers_mm - before_mm), 1e-6);
+  const UntouchedSkin* again = mechanics_.Untouched(first);
+  EXPECT_EQ(again->markers_mm, before.markers_mm);
+  EXPECT_EQ(again->markers_by_loads, before.markers_by_loads);
+}
+
+// A gauge scatters about zero. Farther down the skin buckles, and the nearest pressure that it stands is
+// taken; farther still there is none.
+TEST_P(SkinMechanicsTest, StandsLittleSuction) {
+  const double step = mechanics_.pressure_step();
+  const UntouchedSkin* skin = mechanics_.Untouched({-0.02 * step});
+  ASSERT_TRUE(skin != nullptr);
+  EXPECT_EQ(skin->loads.pressure_mpa, -0.02 * step);
+  double lowest = 0;
+  do {
+    lowest -= 0.1 * step;
+    skin = mechanics_.Untouched({lowest});
+    ASSERT_GT(lowest, -100 * step);
+  } while (skin != nullptr && skin->loads.pressure_mpa == lowest);
+  ASSERT_TRUE(skin != nullptr) << "buckled by " << lowest;
+  EXPECT_GT(skin->loads.pressure_mpa, lowest);
+  EXPECT_LT(skin->loads.pressure_mpa, lowest + 0.5 * step);
+  EXPECT_EQ(mechanics_.Untouched({lowest - 4 * step}), nullptr);
 }
 
 // A model that does not say how heavy its skin is: as if it were weightless.
@@ -84,10 +106,11 @@ TEST(WeightlessSkinTest, IsMovedByPressureAlone) {
   model.density_kg_m3 = 0;
   SkinMechanics mechanics(model);
   EXPECT_TRUE(mechanics.Untouched({0, {0, -9.8, 0}})->markers_mm.isZero(1e-12));
-  EXPECT_TRUE(mechanics.Untouched({5e-4, {}})->markers_by_loads.rightCols<3>().isZero(0));
+  EXPECT_TRUE(mechanics.Untouched({5e-4})->markers_by_loads.rightCols<3>().isZero(0));
 }
 
-INSTANTIATE_TEST_SUITE_P(Skins, SkinMechanicsTest, ::testing::Values("cylinder", "barrel"));
+INSTANTIATE_TEST_SUITE_P(Skins, SkinMechanicsTest,
+                         ::testing::Values("cylinder", "barrel", "third", "bottle"));
 
 }  // namespace
 }  // namespace taclink

@@ -1,0 +1,169 @@
+#include "sensing/shell/ring_equilibrium.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <utility>
+
+namespace taclink {
+namespace {
+
+constexpr size_t kMostPairs = 8;
+constexpr int kMostHalvings = 12;
+constexpr double kMostTurn = 0.5;
+constexpr double kDifferenceShare = 3e-4;  // of the thickness: a node's motion, for differences of gradients
+constexpr int kMostMoves = 16;
+constexpr double kNothingLeft = 1e-3;
+constexpr double kNearlyMoved = 0.05;      // what is left, of a motion: a step more is exact enough
+constexpr double kLeastCurvature = 1e-10;  // of a pair, by the product of its lengths
+
+double LongestMotion(const Eigen::VectorXd& step) {
+  double longest2 = 0;
+  for (Eigen::Index i = 0; i + 2 < step.size(); i += kNodeDofs)
+    longest2 = std::max(longest2, step.segment<3>(i).squaredNorm());
+  return std::sqrt(longest2);
+}
+
+}  // namespace
+
+RingEquilibrium::RingEquilibrium(const NonlinearShell& shell, const RingEquilibriumOptions& options)
+    : shell_(shell),
+      options_(options),
+      noise_nmm_(0.01 * shell.material().youngs_modulus_mpa * std::pow(shell.surface().thickness_mm, 3)) {}
+
+double RingEquilibrium::Evaluate(NonlinearShell::Loads loads, const Eigen::VectorXd& dead_load,
+                                 const ShellState& state, Eigen::VectorXd& gradient) const {
+  double energy_nmm = shell_.Gradient(state, loads, gradient);
+  if (dead_load.size() == 0) return energy_nmm;
+  gradient -= dead_load;
+  const std::vector<Vec3>& rest_mm = shell_.surface().mids_mm;
+  for (size_t node = 0; node < rest_mm.size(); ++node) {
+    const int dof = shell_.Dof(static_cast<int>(node), 0);
+    if (dof >= 0) energy_nmm -= dead_load.segment<3>(dof).dot(state.mids_mm[node] - rest_mm[node]);
+  }
+  return energy_nmm;
+}
+
+double RingEquilibrium::ShareInBounds(const Eigen::VectorXd& step) const {
+  double share = 1;
+  for (Eigen::Index i = 0; i < step.size(); ++i) {
+    const double limit = i % kNodeDofs < 3 ? options_.longest_step_mm : kMostTurn;
+    share = std::min(share, limit / std::max(std::abs(step[i]), limit));
+  }
+  return share;
+}
+
+void RingEquilibrium::Remember(const Eigen::VectorXd& step, const Eigen::VectorXd& change) {
+  const double product = step.dot(change);
+  if (!(product > kLeastCurvature * step.norm() * change.norm())) return;
+  if (pairs_.size() == kMostPairs) pairs_.pop_front();
+  pairs_.push_back({step, change, 1 / product});
+}
+
+// The two loops of [nocedal2006, algorithm 7.4].
+void RingEquilibrium::Respond(const RingStiffness& near, const Eigen::VectorXd& forces,
+                              Eigen::VectorXd& motion) const {
+  std::array<double, kMostPairs> shares{};
+  Eigen::VectorXd left = forces;
+  for (size_t i = pairs_.size(); i-- > 0;) {
+    shares[i] = pairs_[i].scale * pairs_[i].step.dot(left);
+    left -= shares[i] * pairs_[i].change;
+  }
+  near.Solve(left, motion);
+  for (size_t i = 0; i < pairs_.size(); ++i)
+    motion += (shares[i] - pairs_[i].scale * pairs_[i].change.dot(motion)) * pairs_[i].step;
+}
+
+RingEquilibrium::Summary RingEquilibrium::Solve(const RingStiffness& near, NonlinearShell::Loads loads,
+                                                const Eigen::VectorXd& dead_load, ShellState& state) {
+  pairs_.clear();
+  Summary summary;
+  double energy_nmm = Evaluate(loads, dead_load, state, gradient_);
+  ++summary.evaluations;
+  if (!std::isfinite(energy_nmm) || !gradient_.allFinite()) return summary;
+  for (;;) {
+    Respond(near, -gradient_, step_);
+    if (!step_.allFinite()) return summary;
+    const double share_in_bounds = ShareInBounds(step_);
+    step_ *= share_in_bounds;
+    summary.last_step_mm = LongestMotion(step_);
+    if (share_in_bounds == 1 && summary.last_step_mm < options_.tolerance_mm) {
+      shell_.Step(step_, state);
+      summary.converged = true;
+      return summary;
+    }
+    const double slope = gradient_.dot(step_);
+    double share = 1, trial_nmm = 0;
+    for (int halving = 0;; ++halving, share /= 2) {
+      if (summary.evaluations >= options_.most_evaluations || halving > kMostHalvings) return summary;
+      trial_ = state;
+      shell_.Step(share * step_, trial_);
+      trial_nmm = Evaluate(loads, dead_load, trial_, next_gradient_);
+      ++summary.evaluations;
+      // Below what the energy resolves, a step is taken on trust.
+      const double noise = 1e-11 * std::max(noise_nmm_, std::abs(energy_nmm));
+      if (next_gradient_.allFinite() && trial_nmm <= energy_nmm + 1e-4 * share * slope + noise) break;
+    }
+    Remember(share * step_, next_gradient_ - gradient_);
+    std::swap(state, trial_);
+    std::swap(gradient_, next_gradient_);
+    energy_nmm = trial_nmm;
+  }
+}
+
+// Conjugate gradients [golub2013], preconditioned by the pairs of Solve; products with the stiffness are
+// differences of gradients. Stops where the next step is a share `least` of the motion.
+bool RingEquilibrium::FindResponse(const RingStiffness& near, NonlinearShell::Loads loads,
+                                   const ShellState& state, const Eigen::VectorXd& forces, double least,
+                                   Eigen::VectorXd& motion) {
+  shell_.Gradient(state, loads, gradient_);
+  const auto times_stiffness = [&](const Eigen::VectorXd& direction, Eigen::VectorXd& product) {
+    const double share = kDifferenceShare * shell_.surface().thickness_mm / LongestMotion(direction);
+    trial_ = state;
+    shell_.Step(share * direction, trial_);
+    shell_.Gradient(trial_, loads, next_gradient_);
+    product = (next_gradient_ - gradient_) / share;
+  };
+  Eigen::VectorXd left = forces, direction = Eigen::VectorXd::Zero(forces.size()), next_step, stiff;
+  if (!motion.isZero(0)) {
+    times_stiffness(motion, stiff);
+    left -= stiff;
+  }
+  double last_product = 1;
+  for (int iteration = 0; iteration < kMostMoves; ++iteration) {
+    Respond(near, left, next_step);
+    if (LongestMotion(next_step) < least * LongestMotion(motion)) {
+      motion += next_step;  // its length is one but for that share of it
+      return motion.allFinite();
+    }
+    const double product = left.dot(next_step);
+    direction = next_step + product / last_product * direction;
+    last_product = product;
+    times_stiffness(direction, stiff);
+    const double length = product / direction.dot(stiff);
+    if (!(length > 0) || !std::isfinite(length)) return false;
+    motion += length * direction;
+    left -= length * stiff;
+  }
+  return motion.allFinite();
+}
+
+bool RingEquilibrium::Response(const RingStiffness& near, NonlinearShell::Loads loads,
+                               const ShellState& state, const Eigen::VectorXd& forces,
+                               Eigen::VectorXd& motion) {
+  return FindResponse(near, loads, state, forces, kNearlyMoved, motion);
+}
+
+// Directions of conjugate gradients have positive curvature as long as the stiffness is positive definite in
+// the space that they span; in that of a force everywhere what is soft beside the base's comes first.
+bool RingEquilibrium::IsStable(const RingStiffness& near, NonlinearShell::Loads loads,
+                               const ShellState& state) {
+  std::minstd_rand random(1);
+  std::uniform_real_distribution<double> number(-1, 1);
+  Eigen::VectorXd forces(shell_.dof_count()), motion = Eigen::VectorXd::Zero(shell_.dof_count());
+  for (double& force : forces) force = number(random);
+  return FindResponse(near, loads, state, forces, kNothingLeft, motion);
+}
+
+}  // namespace taclink
