@@ -212,19 +212,30 @@ void Linearization::MakeNodeColumns(const std::vector<int>& missing) {
   adjoint_.rightCols(count) = Solved(std::move(filled), std::move(loads));
 }
 
-// Of the sites between two paths of markers, row by row.
+// Of the sites between two paths of markers, row by row. K^-1 J' of the markers of one path gives how these
+// respond to loads at all sites; what a load does to another path is that, rotated.
 void Linearization::MakeFirstColumns() {
-  const int parts = mechanics_.mesh().refinement, sites = parts * mechanics_.site_rows();
+  const int parts = mechanics_.mesh().refinement, around = mechanics_.columns(), paths = around / parts;
+  const Eigen::Index sites = parts * mechanics_.site_rows(), rings = jacobian_.rows() / (3 * paths);
   first_columns_.resize(jacobian_.rows(), kNodeDofs * sites);
-  Eigen::VectorXd load = Eigen::VectorXd::Zero(hessian_.rows()), moved;
-  for (int i = 0; i < sites; ++i) {
-    const int site = i / parts * mechanics_.columns() + i % parts;
-    const int dof = mechanics_.shell().Dof(mechanics_.NodeOfSite(site), 0);
-    for (int c = 0; c < kNodeDofs; ++c) {
-      load[dof + c] = 1;
-      rings_->Solve(load, moved);
-      load[dof + c] = 0;
-      first_columns_.col(kNodeDofs * i + c) = (jacobian_ * moved).cast<float>();
+  std::array<Eigen::VectorXd, 3> pulled;
+  for (Eigen::Index ring = 0; ring < rings; ++ring) {
+    for (Eigen::Index c = 0; c < 3; ++c)
+      rings_->Solve(jacobian_.row(3 * ring * paths + c).transpose(), pulled[static_cast<size_t>(c)]);
+    for (int path = 0; path < paths; ++path) {
+      Mat3 turn = Mat3::Identity();
+      turn.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(2 * kPi * path / paths).toRotationMatrix();
+      for (Eigen::Index i = 0; i < sites; ++i) {
+        const int row = static_cast<int>(i) / parts, column = static_cast<int>(i) % parts - path * parts;
+        const int site = row * around + (column + around) % around;
+        const int dof = mechanics_.shell().Dof(mechanics_.NodeOfSite(site), 0);
+        Eigen::Matrix<double, 3, kNodeDofs> response;
+        for (Eigen::Index c = 0; c < 3; ++c)
+          response.row(c) = pulled[static_cast<size_t>(c)].segment<kNodeDofs>(dof).transpose();
+        response = (turn * response).eval();
+        response.leftCols<3>() = (response.leftCols<3>() * turn.transpose()).eval();
+        first_columns_.block<3, kNodeDofs>(3 * (ring * paths + path), kNodeDofs * i) = response.cast<float>();
+      }
     }
   }
 }

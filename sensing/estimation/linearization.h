@@ -36,6 +36,8 @@ class Linearization {
   /// without weight.
   void SetByKnownLoads(const ByKnownLoads& by_known_loads) { by_known_loads_ = by_known_loads; }
   bool is_made() const { return is_made_; }
+  /// Linearized at an inflated skin: stiffness and columns are invariant under rotation.
+  bool is_of_revolution() const { return rings_ != nullptr; }
 
   const ShellState& state() const { return state_; }
   /// Where stiffness, columns and frames are from.

@@ -1,6 +1,7 @@
 #include "sensing/estimation/load_columns.h"
 
 #include <cassert>
+#include <utility>
 
 #include "sensing/shell/dense.h"
 
@@ -13,14 +14,25 @@ void LoadColumns::Clear(int loads) {
   gram_.resize(0, 0);
 }
 
-void LoadColumns::Append(std::span<const int> loads, const Eigen::MatrixXf& whitened) {
-  assert(whitened.cols() == static_cast<Eigen::Index>(loads.size()));
-  const Eigen::Index before = columns_.cols(), added = whitened.cols();
+void LoadColumns::AddPlaces(std::span<const int> loads) {
   for (const int load : loads) {
     assert(!Has(load));
     place_[static_cast<size_t>(load)] = static_cast<int>(loads_.size());
     loads_.push_back(load);
   }
+}
+
+void LoadColumns::Set(std::span<const int> loads, Eigen::MatrixXf whitened, Eigen::MatrixXf gram) {
+  assert(loads_.empty() && whitened.cols() == static_cast<Eigen::Index>(loads.size()));
+  AddPlaces(loads);
+  columns_ = std::move(whitened);
+  gram_ = std::move(gram);
+}
+
+void LoadColumns::Append(std::span<const int> loads, const Eigen::MatrixXf& whitened) {
+  assert(whitened.cols() == static_cast<Eigen::Index>(loads.size()));
+  const Eigen::Index before = columns_.cols(), added = whitened.cols();
+  AddPlaces(loads);
   columns_.conservativeResize(whitened.rows(), before + added);
   columns_.rightCols(added) = whitened;
   if (before == 0) {

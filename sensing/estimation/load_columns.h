@@ -14,6 +14,8 @@ class LoadColumns {
   void Clear(int loads);
   /// Columns of these loads, which have none yet; `whitened`: one column a load.
   void Append(std::span<const int> loads, const Eigen::MatrixXf& whitened);
+  /// The first columns, whose Gram matrix is known.
+  void Set(std::span<const int> loads, Eigen::MatrixXf whitened, Eigen::MatrixXf gram);
 
   bool Has(int load) const { return place_[static_cast<size_t>(load)] >= 0; }
   bool HasAll() const { return loads_.size() == place_.size(); }
@@ -28,6 +30,8 @@ class LoadColumns {
   auto Column(int load) const { return columns_.col(Place(load)); }
 
  private:
+  void AddPlaces(std::span<const int> loads);
+
   std::vector<int> loads_, place_;  // place_: by load, -1: none
   Eigen::MatrixXf columns_, gram_;
 };

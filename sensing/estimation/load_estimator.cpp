@@ -53,11 +53,13 @@ bool LoadEstimator::Prepare(Linearization& skin, const UntouchedSkin& untouched_
   const Eigen::MatrixXf of_loads = covariance_.ColumnsOfLoads(skin, local_n),
                         of_noise = ColumnsOfNoise(observed);
   camera_modes_.Write(observed, camera_modes_mm_);
+  const Eigen::MatrixXd& of_baseline = untouched_->by_baseline_mm;
+  model_columns_ = of_loads.cols() + of_baseline.cols();
   Eigen::MatrixXf more(of_loads.rows(),
-                       of_loads.cols() + of_noise.cols() + camera_modes_mm_.cols() + known_errors_.cols());
-  more << of_loads, of_noise, camera_modes_mm_.cast<float>(), by_known_loads_.cast<float>();
-  model_columns_ = of_loads.cols();
-  if (!whitening_.Set({untouched_, &untouched_->factor}, std::move(more))) return false;
+                       model_columns_ + of_noise.cols() + camera_modes_mm_.cols() + known_errors_.cols());
+  more << of_loads, of_baseline.cast<float>(), of_noise, camera_modes_mm_.cast<float>(),
+      by_known_loads_.cast<float>();
+  if (!whitening_.Set(untouched_->factored, std::move(more))) return false;
   model_covariance_.clear();
   whitened_known_loads_ = whitening_.Applied(by_known_loads_);
   hidden_.resize(0, 0);
@@ -65,7 +67,10 @@ bool LoadEstimator::Prepare(Linearization& skin, const UntouchedSkin& untouched_
   limits_.by_site_n.resize(0);
   hidden_projected_ = 0;
   columns_.Clear(mechanics_.site_count() + mechanics_.site_rows());
-  MakeColumns(skin, LikelyLoads(is_touched ? local_n : Eigen::VectorXd()));
+  if (!is_touched && untouched_->ring)
+    MakeRotatedColumns(skin);
+  else
+    MakeColumns(skin, LikelyLoads(is_touched ? local_n : Eigen::VectorXd()));
   if (!is_touched) skin.DropColumns();
   return columns_.columns().allFinite();
 }
@@ -108,27 +113,75 @@ void LoadEstimator::MakeColumns(Linearization& skin, std::vector<int> loads) {
   loads.erase(std::unique(loads.begin(), loads.end()), loads.end());
   std::erase_if(loads, [&](int load) { return columns_.Has(load); });
   if (loads.empty()) return;
-  std::vector<int> loaded;
-  for (const int load : loads) {
-    if (IsBand(load)) continue;
-    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), load); it; ++it)
-      loaded.push_back(static_cast<int>(it.row()));
-  }
-  skin.MakeColumns(loaded);
-  const Eigen::MatrixXf rings = IsBand(loads.back()) ? skin.RingColumns() : Eigen::MatrixXf();
-  Eigen::MatrixXf made = Eigen::MatrixXf::Zero(whitening_.size(), static_cast<Eigen::Index>(loads.size()));
-  for (Eigen::Index i = 0; i < made.cols(); ++i) {
-    const int load = loads[static_cast<size_t>(i)];
-    if (IsBand(load)) {
-      made.col(i) = rings.col(load - mechanics_.site_count());
-      continue;
-    }
-    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), load); it; ++it)
-      made.col(i) +=
-          static_cast<float>(it.value()) * skin.Column(Linearization::kInward, static_cast<int>(it.row()));
+  const auto bands = std::lower_bound(loads.begin(), loads.end(), mechanics_.site_count());
+  const std::span<const int> sites(loads.begin(), bands);
+  Eigen::MatrixXf made(whitening_.size(), static_cast<Eigen::Index>(loads.size()));
+  made.leftCols(static_cast<Eigen::Index>(sites.size())) = SiteColumns(skin, sites);
+  if (bands != loads.end()) {
+    const Eigen::MatrixXf rings = skin.RingColumns();
+    for (size_t i = sites.size(); i < loads.size(); ++i)
+      made.col(static_cast<Eigen::Index>(i)) = rings.col(loads[i] - mechanics_.site_count());
   }
   whitening_.Apply(made);
   columns_.Append(loads, made);
+}
+
+// What 1 N inward at these sites displaces.
+Eigen::MatrixXf LoadEstimator::SiteColumns(Linearization& skin, std::span<const int> sites) const {
+  std::vector<int> loaded;
+  for (const int site : sites) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), site); it; ++it)
+      loaded.push_back(static_cast<int>(it.row()));
+  }
+  skin.MakeColumns(loaded);
+  Eigen::MatrixXf columns =
+      Eigen::MatrixXf::Zero(3 * mechanics_.marker_count(), static_cast<Eigen::Index>(sites.size()));
+  for (Eigen::Index i = 0; i < columns.cols(); ++i) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), sites[static_cast<size_t>(i)]);
+         it; ++it)
+      columns.col(i) +=
+          static_cast<float>(it.value()) * skin.Column(Linearization::kInward, static_cast<int>(it.row()));
+  }
+  return columns;
+}
+
+// Of all loads of a skin of revolution: those of the first group of sites and their rotations, which have
+// block-circulant Gram matrices; then what camera motion and other errors, which are not, take from both.
+void LoadEstimator::MakeRotatedColumns(Linearization& skin) {
+  const RingCovariance& ring = *untouched_->ring;
+  const int groups = ring.spectrum().groups(), around = mechanics_.columns(), wide = around / groups;
+  const int rows = mechanics_.site_rows();
+  std::vector<int> first_sites, loads;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < wide; ++column) first_sites.push_back(row * around + column);
+  }
+  Eigen::MatrixXf first = SiteColumns(skin, first_sites);
+  ring.Whiten(first);
+  const Eigen::Index count = first.cols(), sites = groups * count;
+  Eigen::MatrixXf all(first.rows(), sites + rows), gram(sites + rows, sites + rows), products;
+  for (int group = 0; group < groups; ++group) {
+    ring.RotateWhitened(first, group, all.middleCols(group * count, count));
+    for (const int site : first_sites) loads.push_back(site + group * wide);
+  }
+  const Eigen::MatrixXf sums = ring.SumOfRotations(first);
+  for (int row = 0; row < rows; ++row) {
+    all.col(sites + row) = sums.middleCols(row * wide, wide).rowwise().sum() / static_cast<float>(around);
+    loads.push_back(mechanics_.site_count() + row);
+  }
+  dense::TransposedProduct(first, all, products);
+  for (int column = 0; column < groups; ++column) {
+    for (int group = 0; group < groups; ++group)
+      gram.block(group * count, column * count, count, count) =
+          products.middleCols((column - group + groups) % groups * count, count);
+    gram.block(column * count, sites, count, rows) = products.rightCols(rows);
+  }
+  const Eigen::MatrixXf bands = all.rightCols(rows);
+  gram.bottomRightCorner(rows, rows) = bands.transpose() * bands;
+  gram.bottomLeftCorner(rows, sites) = gram.topRightCorner(sites, rows).transpose();
+  const Eigen::MatrixXf explained = whitening_.Finish(all);
+  if (explained.rows() > 0) dense::AddTransposedProduct(-1, explained, explained, gram);
+  gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
+  columns_.Set(loads, std::move(all), std::move(gram));
 }
 
 // Of M m with independent m ~ N(0, 1): what all markers leave of it, M (I - M' covariance^-1 M) M'.

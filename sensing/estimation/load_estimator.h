@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -149,6 +150,8 @@ class LoadEstimator {
   void WriteCameraCovariances();
   void WriteRegions();
   void MakeColumns(Linearization& skin, std::vector<int> loads);
+  void MakeRotatedColumns(Linearization& skin);
+  Eigen::MatrixXf SiteColumns(Linearization& skin, std::span<const int> sites) const;
   std::vector<int> LikelyLoads(const Eigen::VectorXd& local_n) const;
   /// The sites that a column of the problem loads, and the share of each: one site, or a band's.
   template <typename Visit>
@@ -227,7 +230,7 @@ class LoadEstimator {
   std::vector<Mat3> noise_mm2_;  // by marker
   Eigen::MatrixXd camera_modes_mm_;
   Whitening whitening_;
-  Eigen::Index model_columns_ = 0;                          // of whitening_: that loads add
+  Eigen::Index model_columns_ = 0;                          // of whitening_: that loads and baseline add
   std::vector<Mat3> model_covariance_, camera_covariance_;  // empty: not written since Prepare
   KnownLoadsErrors known_errors_;
   Eigen::MatrixXd by_known_loads_, whitened_known_loads_;  // stacked, by known_errors_

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "sensing/estimation/load_estimator.h"
-#include "sensing/shell/dense.h"
 
 namespace taclink {
 namespace {
@@ -224,29 +223,35 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
   }
 }
 
-// Factors of the covariance of 3 x 3 markers each.
+// Cholesky factors of the covariance of 3 x 3 markers each, lower half.
 // The cameras' motion is all markers' together: a region must not have one of its own.
 void LoadEstimator::WriteRegions() {
-  Eigen::MatrixXf covariance_mm2 = untouched_->covariance_mm2;  // lower half
   const Eigen::MatrixXf& all = whitening_.columns();
-  const Eigen::Index known = known_errors_.cols();
-  dense::AddOuter(all.leftCols(all.cols() - known - camera_modes_mm_.cols()), covariance_mm2);
-  dense::AddOuter(all.rightCols(known), covariance_mm2);
+  const Eigen::Index known = known_errors_.cols(), others = all.cols() - known - camera_modes_mm_.cols();
   const LinkModel& model = mechanics_.model();
   const int paths = model.markers.paths, rings = model.markers.rings();
   regions_.clear();
   for (int marker = 0; marker < model.markers.count(); ++marker) {
     const int path = model.PathOf(marker), ring = model.RingOf(marker);
     if (path % 2 != 0) continue;
-    Region region;
+    std::vector<int> markers;
     for (int r = std::max(0, ring - 1); r <= std::min(rings - 1, ring + 1); ++r) {
-      for (int p = path - 1; p <= path + 1; ++p) {
-        const int neighbor = model.MarkerIndex((p + paths) % paths, r);
-        for (int c = 0; c < 3; ++c) region.rows.push_back(3 * neighbor + c);
-      }
+      for (int p = path - 1; p <= path + 1; ++p) markers.push_back(model.MarkerIndex((p + paths) % paths, r));
     }
-    std::sort(region.rows.begin(), region.rows.end());
-    region.factor.compute(Eigen::MatrixXf(covariance_mm2(region.rows, region.rows)));
+    std::sort(markers.begin(), markers.end());
+    Region region;
+    for (const int each : markers) {
+      for (int c = 0; c < 3; ++c) region.rows.push_back(3 * each + c);
+    }
+    const Eigen::MatrixXf more = all(region.rows, Eigen::all);
+    Eigen::MatrixXf covariance_mm2 = more.leftCols(others) * more.leftCols(others).transpose();
+    covariance_mm2 += more.rightCols(known) * more.rightCols(known).transpose();
+    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(markers.size()); ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j)
+        covariance_mm2.block<3, 3>(3 * i, 3 * j) +=
+            untouched_->factored->Block(markers[static_cast<size_t>(i)], markers[static_cast<size_t>(j)]);
+    }
+    region.factor.compute(covariance_mm2);
     regions_.push_back(std::move(region));
   }
 }

@@ -1,7 +1,6 @@
 #include "sensing/estimation/marker_covariance.h"
 
 #include <cmath>
-#include <numeric>
 
 #include "sensing/shell/dense.h"
 
@@ -34,6 +33,10 @@ MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics, const Neighbo
     bow_mm_[3 * m + 2] =
         kBowMm * mechanics.length_unit() * std::sin(kPi * mechanics.RestMarker(m).z() / length_mm);
   }
+  // Strays() chooses sites like the squares of a board, of two columns of nodes.
+  const int period = mechanics.mesh().refinement % 2 == 0 ? 1 : 2;
+  if (mechanics.model().markers.paths % period == 0)
+    spectrum_ = std::make_shared<const RingSpectrum>(mechanics, period);
 }
 
 void MarkerCovariance::SetState(const Linearization& skin, const UntouchedSkin& untouched) {
@@ -47,6 +50,11 @@ void MarkerCovariance::SetState(const Linearization& skin, const UntouchedSkin& 
   }
   moved_mm_ =
       moved_mm_.cwiseMax(kSpreadShare * (near_.motion_near * moved_mm_.asDiagonal()).rowwise().maxCoeff());
+  const Eigen::Index paths = mechanics_.model().markers.paths;
+  for (Eigen::Index first = 0; first < markers; first += paths) {
+    auto ring = grown_mm_.segment(first, paths);
+    ring.setConstant(ring.norm() / std::sqrt(static_cast<double>(paths)));
+  }
   grown_mm_ = kByInflation * grown_mm_.cwiseMax(kLeastInflation * grown_mm_.maxCoeff());
 }
 
@@ -65,7 +73,31 @@ void MarkerCovariance::WriteUntouched(Linearization& skin, Eigen::MatrixXd& cova
     }
   }
   covariance_mm2.selfadjointView<Eigen::Lower>().rankUpdate(bow_mm_);
-  AddUntouchedStray(skin, covariance_mm2);
+  Eigen::MatrixXf stray_mm2 = Eigen::MatrixXf::Zero(bow_mm_.size(), bow_mm_.size());
+  dense::AddOuter(UntouchedStrays(skin, mechanics_.columns()), stray_mm2);
+  covariance_mm2.triangularView<Eigen::Lower>() += stray_mm2.cast<double>();
+}
+
+// Growth and bow are alike all around.
+RingCovarianceParts MarkerCovariance::UntouchedParts(Linearization& skin) const {
+  const int paths = mechanics_.model().markers.paths, period = spectrum_->period();
+  const double floor_mm = kFloorMm * mechanics_.length_unit();
+  RingCovarianceParts parts;
+  parts.columns = UntouchedStrays(skin, mechanics_.columns() / spectrum_->groups());
+  parts.local.assign(static_cast<size_t>(mechanics_.marker_count() / paths),
+                     floor_mm * floor_mm * Mat3::Identity());
+  parts.common.setZero(spectrum_->block(), spectrum_->block());
+  for (int i = 0; i < mechanics_.marker_count(); ++i) {
+    if (i % paths >= period) continue;
+    for (int j = 0; j < mechanics_.marker_count(); ++j) {
+      if (j % paths >= period) continue;
+      const double growth = grown_mm_[i] * grown_mm_[j] * near_.growth_alike(i, j);
+      const Vec3 by_direction(growth, 0,
+                              kAxialShare * kAxialShare * growth + bow_mm_[3 * i + 2] * bow_mm_[3 * j + 2]);
+      parts.common.block<3, 3>(spectrum_->PlaceOf(i), spectrum_->PlaceOf(j)) = by_direction.asDiagonal();
+    }
+  }
+  return parts;
 }
 
 Eigen::VectorXd MarkerCovariance::Direct(const Eigen::VectorXd& pulls_per_mm) const {
@@ -100,18 +132,17 @@ std::vector<MarkerCovariance::Stray> MarkerCovariance::Strays(const Eigen::Vecto
   return strays;
 }
 
-void MarkerCovariance::AddUntouchedStray(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const {
-  std::vector<int> sites(static_cast<size_t>(mechanics_.site_count()));
-  std::iota(sites.begin(), sites.end(), 0);
+Eigen::MatrixXf MarkerCovariance::UntouchedStrays(Linearization& skin, int columns) const {
+  std::vector<Stray> strays = Strays(Eigen::VectorXd::Zero(mechanics_.site_count()));
+  std::erase_if(strays, [&](const Stray& stray) { return stray.site % mechanics_.columns() >= columns; });
+  std::vector<int> sites;
+  for (const Stray& stray : strays) sites.push_back(stray.site);
   skin.MakeColumns(sites);
-  const std::vector<Stray> strays = Strays(Eigen::VectorXd::Zero(mechanics_.site_count()));
   Eigen::MatrixXf scaled(bow_mm_.size(), static_cast<Eigen::Index>(strays.size()));
   Eigen::Index used = 0;
   for (const Stray& stray : strays)
     scaled.col(used++) = static_cast<float>(stray.untouched_n) * skin.Column(stray.direction, stray.site);
-  Eigen::MatrixXf stray_mm2 = Eigen::MatrixXf::Zero(bow_mm_.size(), bow_mm_.size());
-  dense::AddOuter(scaled, stray_mm2);
-  covariance_mm2.triangularView<Eigen::Lower>() += stray_mm2.cast<double>();
+  return scaled;
 }
 
 // Of the markers' covariance in one direction, by Cholesky with pivots: the largest variance that is left

@@ -6,6 +6,7 @@
 #include "sensing/estimation/assimilation.h"
 #include "sensing/estimation/linearization.h"
 #include "sensing/estimation/neighborhoods.h"
+#include "sensing/estimation/ring_covariance.h"
 #include "sensing/estimation/skin_mechanics.h"
 
 namespace taclink {
@@ -26,6 +27,10 @@ class MarkerCovariance {
   /// at each site, around and along at a quarter of them each, which stand for four. Lower half, stacked
   /// markers. Makes all columns.
   void WriteUntouched(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const;
+  /// The same where `skin` is of revolution. Makes the columns of one group of sites.
+  RingCovarianceParts UntouchedParts(Linearization& skin) const;
+  /// Null: the skin's stray forces are in no group of paths alike.
+  const std::shared_ptr<const RingSpectrum>& spectrum() const { return spectrum_; }
   /// What loads add, one column for each independent error of unit variance: a share of the motion, and the
   /// stray forces that are more where something presses. `local_n`: force in the neighborhood of each site.
   /// Sets the stray forces' standard deviations. Makes the columns of the sites where more is.
@@ -55,7 +60,8 @@ class MarkerCovariance {
     double untouched_n = 0, local_n = 0;
   };
   std::vector<Stray> Strays(const Eigen::VectorXd& local_n) const;
-  void AddUntouchedStray(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const;
+  /// Stacked markers, by stray force; of the sites in the first columns of nodes.
+  Eigen::MatrixXf UntouchedStrays(Linearization& skin, int columns) const;
   Eigen::MatrixXd MotionColumns() const;  // by pivoted Cholesky decomposition [harbrecht2012]
 
   static constexpr double kUnseenMm = 30;  // in SkinMechanics' units
@@ -63,8 +69,9 @@ class MarkerCovariance {
   const SkinMechanics& mechanics_;
   const Neighborhoods& near_;
   Eigen::VectorXd bow_mm_;
-  Eigen::Matrix2Xd outward_;             // by marker, unit, at rest
-  Eigen::VectorXd moved_mm_, grown_mm_;  // by marker, standard deviations
+  Eigen::Matrix2Xd outward_;  // by marker, unit, at rest
+  std::shared_ptr<const RingSpectrum> spectrum_;
+  Eigen::VectorXd moved_mm_, grown_mm_;  // by marker, standard deviations; grown_mm_ is alike in a ring
   std::array<Eigen::VectorXd, 3> stray_n_;
 };
 

@@ -1,10 +1,11 @@
 #include "sensing/estimation/untouched_covariance.h"
 
 #include <Eigen/Eigenvalues>
+#include <numeric>
+#include <optional>
 
 #include "sensing/core/median.h"
 #include "sensing/estimation/camera_noise.h"
-#include "sensing/shell/dense.h"
 
 namespace taclink {
 namespace {
@@ -13,6 +14,11 @@ constexpr double kMostHidden = 0.25;  // of the markers: so many may be taken ou
 
 bool IsMany(size_t hidden, size_t markers) {
   return static_cast<double>(hidden) > kMostHidden * static_cast<double>(markers);
+}
+
+bool IsOther(double variance_mm2, double other_mm2) {
+  constexpr double kMost = kSameNoise * kSameNoise;
+  return variance_mm2 > kMost * other_mm2 || other_mm2 > kMost * variance_mm2;
 }
 
 // Of a direction that is not seen, the usual one of those that are: a frame in which it is seen then needs no
@@ -35,6 +41,54 @@ std::vector<Mat3> NoiseOfAll(const MarkerObservations& observed, double unseen_m
                            seen.axes * seen.variances_mm2.asDiagonal() * seen.axes.transpose());
   }
   return noise_mm2;
+}
+
+// Of one ring, in cylindrical coordinates: the mean over the markers that are seen in all directions, or over
+// all if none is, and not much better or worse than the median one.
+Mat3 NoiseOfRing(const RingSpectrum& spectrum, const MarkerObservations& observed,
+                 const std::vector<Mat3>& noise_mm2, size_t first, double unseen_mm) {
+  const double least = 1 / (kUnseenShare * unseen_mm * unseen_mm);
+  const auto end = first + static_cast<size_t>(spectrum.groups() * spectrum.period());
+  std::vector<size_t> markers;
+  for (size_t m = first; m < end; ++m) {
+    if (observed.information[m].allFinite() && IsSurelySeen(observed.information[m], least))
+      markers.push_back(m);
+  }
+  if (markers.empty()) {
+    markers.resize(end - first);
+    std::iota(markers.begin(), markers.end(), first);
+  }
+  std::vector<double> traces;
+  for (const size_t m : markers) traces.push_back(noise_mm2[m].trace());
+  const double median = Median(traces);
+  Mat3 sum = Mat3::Zero();
+  int count = 0;
+  for (const size_t m : markers) {
+    if (IsOther(noise_mm2[m].trace(), median)) continue;
+    const Mat3 frame = spectrum.FrameOf(static_cast<int>(m)).cast<double>();
+    sum += frame.transpose() * noise_mm2[m] * frame;
+    ++count;
+  }
+  return sum / count;
+}
+
+// By ring, where that is about the noise of all markers but a few.
+std::optional<std::vector<Mat3>> NoiseByRing(const RingSpectrum& spectrum, const MarkerObservations& observed,
+                                             const std::vector<Mat3>& noise_mm2, double unseen_mm) {
+  const auto paths = static_cast<size_t>(spectrum.groups() * spectrum.period());
+  std::vector<Mat3> by_ring;
+  int others = 0;
+  for (size_t first = 0; first < noise_mm2.size(); first += paths) {
+    by_ring.push_back(NoiseOfRing(spectrum, observed, noise_mm2, first, unseen_mm));
+    for (size_t m = first; m < first + paths; ++m) {
+      const Mat3 frame = spectrum.FrameOf(static_cast<int>(m)).cast<double>();
+      const auto [then, now] =
+          ChangeOf(frame * by_ring.back() * frame.transpose(), observed.information[m], unseen_mm);
+      if (IsOther(then, now)) ++others;
+    }
+  }
+  if (others > kOtherNoiseShare * static_cast<double>(noise_mm2.size())) return std::nullopt;
+  return by_ring;
 }
 
 }  // namespace
@@ -63,25 +117,41 @@ std::shared_ptr<const UntouchedCovariance> UntouchedCovariance::Make(Linearizati
                                                                      const MarkerObservations& observed,
                                                                      const KnownLoadsPrior& prior) {
   auto made = std::make_shared<UntouchedCovariance>();
-  Eigen::MatrixXd all_mm2;
-  model.WriteUntouched(skin, all_mm2);
+  const size_t markers = observed.information.size();
   made->unseen_mm = model.unseen_mm();
   made->noise_mm2 = NoiseOfAll(observed, made->unseen_mm);
   made->baseline_errors = prior.baseline;
   made->by_baseline_mm = prior.baseline_mm;
-  made->by_baseline_mm.conservativeResize(all_mm2.rows(), prior.baseline_mm.cols());
-  if (made->by_baseline_mm.cols() > 0)  // Eigen divides by their number
-    all_mm2.selfadjointView<Eigen::Lower>().rankUpdate(made->by_baseline_mm);
-  for (size_t m = 0; m < observed.information.size(); ++m) {
-    const auto at = 3 * static_cast<Eigen::Index>(m);
-    auto block = all_mm2.block<3, 3>(at, at);
-    const auto bow_mm = model.bow_mm().segment<3>(at);
-    made->marker_mm2.emplace_back(Mat3(block.selfadjointView<Eigen::Lower>()) - bow_mm * bow_mm.transpose());
-    block += made->noise_mm2[m];
+  made->by_baseline_mm.conservativeResize(3 * static_cast<Eigen::Index>(markers), prior.baseline_mm.cols());
+  std::optional<std::vector<Mat3>> by_ring;
+  if (skin.is_of_revolution() && model.spectrum())
+    by_ring = NoiseByRing(*model.spectrum(), observed, made->noise_mm2, made->unseen_mm);
+  if (by_ring) {
+    RingCovarianceParts parts = model.UntouchedParts(skin);
+    for (size_t ring = 0; ring < by_ring->size(); ++ring) parts.local[ring] += (*by_ring)[ring];
+    for (size_t m = 0; m < markers; ++m) {
+      const Mat3 frame = model.spectrum()->FrameOf(static_cast<int>(m)).cast<double>();
+      made->noise_mm2[m] = frame * (*by_ring)[m * by_ring->size() / markers] * frame.transpose();
+    }
+    made->ring = RingCovariance::Make(model.spectrum(), parts);
+    made->factored = made->ring;
+  } else {
+    Eigen::MatrixXd all_mm2;
+    model.WriteUntouched(skin, all_mm2);
+    for (size_t m = 0; m < markers; ++m) {
+      const auto at = 3 * static_cast<Eigen::Index>(m);
+      all_mm2.block<3, 3>(at, at) += made->noise_mm2[m];
+    }
+    const auto dense = std::make_shared<const DenseCovariance>(std::move(all_mm2));
+    if (dense->is_factored()) made->factored = dense;
   }
-  made->covariance_mm2 = all_mm2.cast<float>();
-  if (!dense::Cholesky(all_mm2)) return nullptr;
-  made->factor = all_mm2.cast<float>();
+  if (!made->factored) return nullptr;
+  for (size_t m = 0; m < markers; ++m) {
+    const auto marker = static_cast<int>(m);
+    const auto bow_mm = model.bow_mm().segment<3>(3 * marker);
+    made->marker_mm2.emplace_back(made->factored->Block(marker, marker).cast<double>() - made->noise_mm2[m] -
+                                  bow_mm * bow_mm.transpose());
+  }
   return made;
 }
 

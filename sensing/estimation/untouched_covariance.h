@@ -30,10 +30,12 @@ struct KnownLoadsPrior {
 constexpr double kSameNoise = 2, kOtherNoiseShare = 0.02;
 
 /// The covariance of the markers' errors that loads, the known ones and the cameras' motion do not change: of
-/// the cameras' noise, of the baseline, and of the model where nothing presses. Made of the skin without
-/// loads, it is shared by the tangents of the touched skin, which add what is more. Constant.
+/// the cameras' noise and of the model where nothing presses. Made of the skin without loads, it is shared by
+/// the tangents of the touched skin, which add what is more. Immutable.
 struct UntouchedCovariance {
-  /// Null: the covariance has no factor. Makes all columns of `skin`.
+  /// Null: the covariance is not positive definite. If `skin` is of revolution and the cameras see the
+  /// markers of each ring about equally well, their noise is averaged over the ring, so that the covariance
+  /// is invariant under rotation.
   static std::shared_ptr<const UntouchedCovariance> Make(Linearization& skin, const MarkerCovariance& model,
                                                          const MarkerObservations& observed,
                                                          const KnownLoadsPrior& prior);
@@ -44,14 +46,14 @@ struct UntouchedCovariance {
 
   double unseen_mm = 0;            ///< standard deviation of a direction in which a marker is not seen
   std::vector<Mat3> noise_mm2;     ///< by marker, of the cameras; usual ones where they do not see it
-  std::vector<Mat3> marker_mm2;    ///< by marker, without noise and bow
+  std::vector<Mat3> marker_mm2;    ///< by marker, without noise, baseline and bow
   Eigen::MatrixXd by_baseline_mm;  ///< stacked, by the baseline's errors of known loads
   KnownLoadsErrors baseline_errors;
   bool HasBaseline(const KnownLoadsPrior& prior) const;
   /// Few of the markers that it counts as seen are hidden now, in any direction, or seen worse.
   bool LosesFew(const MarkerObservations& observed) const;
-  Eigen::MatrixXf covariance_mm2;  ///< lower half
-  Eigen::MatrixXf factor;          ///< of that, lower
+  std::shared_ptr<const FactoredCovariance> factored;  ///< without the baseline's errors
+  std::shared_ptr<const RingCovariance> ring;          ///< the same; null: it is not invariant under rotation
 };
 
 }  // namespace taclink

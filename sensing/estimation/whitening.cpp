@@ -7,27 +7,23 @@
 
 namespace taclink {
 
-bool Whitening::Set(std::shared_ptr<const Eigen::MatrixXf> lower, Eigen::MatrixXf columns) {
-  lower_ = std::move(lower);
+bool Whitening::Set(std::shared_ptr<const FactoredCovariance> shared, Eigen::MatrixXf columns) {
+  shared_ = std::move(shared);
   columns_ = std::move(columns);
   whitened_ = columns_;
-  dense::SolveLower(*lower_, whitened_);
+  shared_->Whiten(whitened_);
   const Eigen::Index count = columns_.cols();
   Eigen::MatrixXf gram(count, count);
   dense::Gram(whitened_, gram);
-  Eigen::MatrixXd factor = gram.cast<double>();
+  Eigen::MatrixXd factor = gram.cast<double>().triangularView<Eigen::Lower>();
   factor.diagonal().array() += 1;
   if (!dense::Cholesky(factor)) return false;
   const Eigen::Index last = std::min<Eigen::Index>(count, kMostLast);
   last_factor_ = factor.bottomRightCorner(last, last);
-  // K' = (I + A')^-1 A^-1.
-  Eigen::MatrixXf single = factor.cast<float>(), shrink = Eigen::MatrixXf::Identity(count, count);
-  dense::SolveLower(single, shrink);
-  single.diagonal().array() += 1;
-  dense::SolveLowerTransposed(single, shrink);
-  shrunk_.setZero(columns_.rows(), count);
-  dense::SetProduct(1, whitened_, shrink, shrunk_);
-  return shrunk_.allFinite();
+  factor_ = factor.cast<float>();
+  shifted_factor_ = factor_;
+  shifted_factor_.diagonal().array() += 1;
+  return whitened_.allFinite() && factor_.allFinite();
 }
 
 // The corner of (A A')^-1 is that of the corner of A, which is lower triangular.
@@ -38,11 +34,19 @@ Whitening::SmallMatrix Whitening::LastPosterior(Eigen::Index count) const {
 }
 
 void Whitening::Apply(Eigen::Ref<Eigen::MatrixXf> x) const {
-  dense::SolveLower(*lower_, x);
-  if (columns_.cols() == 0) return;
-  Eigen::MatrixXf shares;
-  dense::TransposedProduct(whitened_, Eigen::MatrixXf(x), shares);
-  dense::AddProduct(-1, shrunk_, shares, false, x);
+  shared_->Whiten(x);
+  Finish(x);
+}
+
+Eigen::MatrixXf Whitening::Finish(Eigen::Ref<Eigen::MatrixXf> whitened) const {
+  Eigen::MatrixXf explained(columns_.cols(), whitened.cols());
+  if (columns_.cols() == 0) return explained;
+  dense::TransposedProduct(whitened_, Eigen::MatrixXf(whitened), explained);
+  dense::SolveLower(factor_, explained);
+  Eigen::MatrixXf shares = explained;
+  dense::SolveLowerTransposed(shifted_factor_, shares);
+  dense::AddProduct(-1, whitened_, shares, false, whitened);
+  return explained;
 }
 
 Eigen::VectorXd Whitening::Applied(const Eigen::VectorXd& x) const {
@@ -56,16 +60,19 @@ Eigen::MatrixXd Whitening::Applied(const Eigen::MatrixXd& x) const {
 }
 
 Eigen::VectorXd Whitening::Transposed(const Eigen::VectorXd& x) const {
-  Eigen::MatrixXf single = x.cast<float>();
-  single -= whitened_ * (shrunk_.transpose() * single);
-  dense::SolveLowerTransposed(*lower_, single);
-  return single.col(0).cast<double>();
+  Eigen::VectorXf single = x.cast<float>();
+  if (columns_.cols() > 0) {
+    Eigen::MatrixXf shares = whitened_.transpose() * single;
+    dense::SolveLower(shifted_factor_, shares);
+    dense::SolveLowerTransposed(factor_, shares);
+    single -= whitened_ * shares;
+  }
+  return shared_->WhitenTransposed(single).cast<double>();
 }
 
 Eigen::VectorXd Whitening::Covariance(const Eigen::VectorXd& x) const {
   const Eigen::VectorXf single = x.cast<float>();
-  const Eigen::VectorXf half = lower_->triangularView<Eigen::Lower>().transpose() * single;
-  Eigen::VectorXf all = lower_->triangularView<Eigen::Lower>() * half;
+  Eigen::VectorXf all = shared_->Times(single);
   all += columns_ * (columns_.transpose() * single);
   return all.cast<double>();
 }

@@ -3,23 +3,28 @@
 #include <Eigen/Core>
 #include <memory>
 
+#include "sensing/estimation/factored_covariance.h"
+
 namespace taclink {
 
-/// Makes errors independent, of unit variance: a matrix M' with M M' = C^-1, C = S + U U'. S is given by a
-/// factor that others share, U by its columns, far fewer than rows, so that a change of C costs little. With
-/// S = L L', W = L^-1 U and A A' = I + W' W (Cholesky), M' = (I - W K' W') L^-1, K = A^-T (I + A)^-1
-/// [andrews1968], [whitaker2002]. Single precision. Constant between calls of Set, by one thread at a time.
+/// Makes errors independent, of unit variance: a matrix M' with M M' = C^-1, C = S + U U'. S is shared with
+/// others, U is given by its columns, far fewer than rows, so that a change of C costs little. With
+/// B' B = S^-1, W = B U and A A' = I + W' W (Cholesky), M' = (I - W K' W') B, K = A^-T (I + A)^-1
+/// [andrews1968], [whitaker2002]. Single precision. Immutable between calls of Set.
 class Whitening {
  public:
   static constexpr int kMostLast = 4;
   using SmallMatrix =
       Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostLast, kMostLast>;
 
-  /// `lower`: L; `columns`: U. False: one of them is not finite.
-  bool Set(std::shared_ptr<const Eigen::MatrixXf> lower, Eigen::MatrixXf columns);
+  /// `shared`: S; `columns`: U. False: one of them is not finite.
+  bool Set(std::shared_ptr<const FactoredCovariance> shared, Eigen::MatrixXf columns);
   Eigen::Index size() const { return columns_.rows(); }
   /// x := M' x.
   void Apply(Eigen::Ref<Eigen::MatrixXf> x) const;
+  /// The rest of Apply, for B x; returns A^-1 W' B x. M' x has the Gram matrix of B x less that of the
+  /// result.
+  Eigen::MatrixXf Finish(Eigen::Ref<Eigen::MatrixXf> whitened) const;
   Eigen::VectorXd Applied(const Eigen::VectorXd& x) const;
   Eigen::MatrixXd Applied(const Eigen::MatrixXd& x) const;
   /// M x; of M' e, that is C^-1 e.
@@ -32,9 +37,9 @@ class Whitening {
   SmallMatrix LastPosterior(Eigen::Index count) const;
 
  private:
-  std::shared_ptr<const Eigen::MatrixXf> lower_;
-  Eigen::MatrixXf columns_, whitened_, shrunk_;  // U, W, W K'
-  SmallMatrix last_factor_;                      // the lower right corner of A, up to kMostLast
+  std::shared_ptr<const FactoredCovariance> shared_;
+  Eigen::MatrixXf columns_, whitened_, factor_, shifted_factor_;  // U, W, A, I + A
+  SmallMatrix last_factor_;  // the lower right corner of A, up to kMostLast
 };
 
 }  // namespace taclink
