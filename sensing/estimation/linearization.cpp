@@ -177,21 +177,22 @@ void Linearization::MakeColumns(std::span<const int> sites) {
   else if (kNodeDofs * static_cast<Eigen::Index>(missing.size()) < jacobian_.rows())
     MakeNodeColumns(missing);
   else
-    MakeAllColumns();
+    MakeColumnsFromMarkers(missing);
 }
 
-void Linearization::MakeAllColumns() {
+void Linearization::MakeColumnsFromMarkers(const std::vector<int>& missing) {
   Eigen::MatrixXf rows = Eigen::MatrixXf::Zero(jacobian_.rows(), jacobian_.cols());
   for (Eigen::Index row = 0; row < jacobian_.rows(); ++row) {
     for (MarkerMap::Jacobian::InnerIterator it(jacobian_, row); it; ++it)
       rows(row, it.col()) = static_cast<float>(it.value());
   }
   factor_->SolveRows(filled_, rows);
-  adjoint_.resize(jacobian_.rows(), kNodeDofs * mechanics_.site_count());
-  for (int site = 0; site < mechanics_.site_count(); ++site) {
-    place_[static_cast<size_t>(site)] = site;
-    adjoint_.middleCols<kNodeDofs>(kNodeDofs * site) =
+  Eigen::Index to = adjoint_.cols();
+  adjoint_.conservativeResize(jacobian_.rows(), to + kNodeDofs * static_cast<Eigen::Index>(missing.size()));
+  for (const int site : missing) {
+    adjoint_.middleCols<kNodeDofs>(to) =
         rows.middleCols<kNodeDofs>(mechanics_.shell().Dof(mechanics_.NodeOfSite(site), 0));
+    to += kNodeDofs;
   }
 }
 

@@ -24,7 +24,8 @@ class Linearization {
 
   /// Makes everything again. False: the stiffness is singular there, or not finite.
   bool At(const ShellState& state, const KnownLoads& loads);
-  /// At that skin, with its stiffness. Of a column of sites' loads the others' follow by turns.
+  /// Linearizes at an inflated skin, with its factored stiffness. Columns of all sites are rotations of those
+  /// of the first ones.
   bool At(const std::shared_ptr<const InflatedSkin>& skin, const KnownLoads& loads);
   /// Moves to a state nearby and keeps stiffness, columns and frames: only what the skin is out of balance by
   /// is that of the new state, exactly. What steps lead to is then the same equilibrium, in more of them.
@@ -32,8 +33,7 @@ class Linearization {
   bool Rebase(const ShellState& state, const KnownLoads& loads);
   /// The same state under other known loads, to first order.
   void SetKnownLoads(const KnownLoads& loads);
-  /// What known loads do, where that is known better than by this tangent: of a skin that sags beside the one
-  /// without weight.
+  /// Overrides the derivatives by known loads, for example with those of the skin that sags.
   void SetByKnownLoads(const ByKnownLoads& by_known_loads) { by_known_loads_ = by_known_loads; }
   bool is_made() const { return is_made_; }
   /// Linearized at an inflated skin: stiffness and columns are invariant under rotation.
@@ -83,7 +83,7 @@ class Linearization {
   void Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const;
   bool Finish(const KnownLoads& loads);
   void SetFrames();
-  void MakeAllColumns();
+  void MakeColumnsFromMarkers(const std::vector<int>& missing);
   void MakeNodeColumns(const std::vector<int>& missing);
   void MakeTurnedColumns(const std::vector<int>& missing);
   void MakeFirstColumns();

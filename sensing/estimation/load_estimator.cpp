@@ -145,8 +145,9 @@ Eigen::MatrixXf LoadEstimator::SiteColumns(Linearization& skin, std::span<const 
   return columns;
 }
 
-// Of all loads of a skin of revolution: those of the first group of sites and their rotations, which have
-// block-circulant Gram matrices; then what camera motion and other errors, which are not, take from both.
+// Of all loads of a skin of revolution: the columns of the first group of sites and their rotations, whose
+// Gram matrix is block-circulant. Whitening::Finish then subtracts the low-rank part (camera motion,
+// baseline, known loads), which is not invariant under rotation.
 void LoadEstimator::MakeRotatedColumns(Linearization& skin) {
   const RingCovariance& ring = *untouched_->ring;
   const int groups = ring.spectrum().groups(), around = mechanics_.columns(), wide = around / groups;
@@ -413,7 +414,7 @@ std::vector<LoadEstimator::Hill> LoadEstimator::Select(Linearization& skin,
   for (int pass = 0; pass < kReweightings && is_selected_ && !chosen_.empty(); ++pass) {
     near.setZero();
     for (int site = 0; site < sites; ++site) {
-      if (loads_[site] > 0) near.head(sites) += loads_[site] * near_.load_sites.col(site);
+      if (loads_[site] > 0) near_.load_sites.AddTo(near.head(sites), site, loads_[site]);
     }
     for (Eigen::Index band = sites; band < near.size(); ++band)
       near[band] = near.segment((band - sites) * around, around).mean();
@@ -507,7 +508,7 @@ LoadEstimator::Solution LoadEstimator::Refit(const std::vector<int>& chosen,
   const double unit = mechanics_.force_unit();
   Eigen::VectorXd near_n = Eigen::VectorXd::Zero(mechanics_.site_count());
   for (const int column : chosen)
-    ForSites(column, [&](int from, double) { near_n += loads_[from] * near_.load_sites.col(from); });
+    ForSites(column, [&](int from, double) { near_.load_sites.AddTo(near_n, from, loads_[from]); });
   for (Eigen::Index i = 0; i < n; ++i) {
     const int column = chosen[static_cast<size_t>(i)];
     double near_column_n = 0;

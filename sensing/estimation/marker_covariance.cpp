@@ -33,7 +33,7 @@ MarkerCovariance::MarkerCovariance(const SkinMechanics& mechanics, const Neighbo
     bow_mm_[3 * m + 2] =
         kBowMm * mechanics.length_unit() * std::sin(kPi * mechanics.RestMarker(m).z() / length_mm);
   }
-  // Strays() chooses sites like the squares of a board, of two columns of nodes.
+  // Strays() selects sites in a checkerboard pattern with a period of two node columns.
   const int period = mechanics.mesh().refinement % 2 == 0 ? 1 : 2;
   if (mechanics.model().markers.paths % period == 0)
     spectrum_ = std::make_shared<const RingSpectrum>(mechanics, period);
@@ -193,7 +193,7 @@ Eigen::MatrixXf MarkerCovariance::ColumnsOfLoads(Linearization& skin, const Eige
 Eigen::VectorXd MarkerCovariance::LocalOfSites(const Eigen::VectorXd& forces_n) const {
   Eigen::VectorXd local_n = Eigen::VectorXd::Zero(forces_n.size());
   for (Eigen::Index site = 0; site < forces_n.size(); ++site) {
-    if (forces_n[site] != 0) local_n += forces_n[site] * near_.local_sites.col(site);
+    if (forces_n[site] != 0) near_.local_sites.AddTo(local_n, static_cast<int>(site), forces_n[site]);
   }
   return local_n;
 }

@@ -29,7 +29,7 @@ class MarkerCovariance {
   void WriteUntouched(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const;
   /// The same where `skin` is of revolution. Makes the columns of one group of sites.
   RingCovarianceParts UntouchedParts(Linearization& skin) const;
-  /// Null: the skin's stray forces are in no group of paths alike.
+  /// Null if the pattern of stray forces is not periodic around the axis.
   const std::shared_ptr<const RingSpectrum>& spectrum() const { return spectrum_; }
   /// What loads add, one column for each independent error of unit variance: a share of the motion, and the
   /// stray forces that are more where something presses. `local_n`: force in the neighborhood of each site.

@@ -30,14 +30,34 @@ Eigen::MatrixXd Bells(int count, double width, Distance2 distance2) {
 
 }  // namespace
 
+SiteBells::SiteBells(const SkinMechanics& mechanics, double width_mm)
+    : columns_(mechanics.columns()), about_first_(mechanics.site_count(), mechanics.site_rows()) {
+  for (int row = 0; row < mechanics.site_rows(); ++row) {
+    const Vec3& first_mm = mechanics.RestSite(row * columns_);
+    for (int site = 0; site < mechanics.site_count(); ++site)
+      about_first_(site, row) = Bell((mechanics.RestSite(site) - first_mm).squaredNorm(), width_mm);
+  }
+}
+
+double SiteBells::operator()(int site, int other) const {
+  const int apart = (site % columns_ - other % columns_ + columns_) % columns_;
+  return about_first_(site / columns_ * columns_ + apart, other / columns_);
+}
+
+void SiteBells::AddTo(Eigen::Ref<Eigen::VectorXd> sum, int site, double scale) const {
+  const Eigen::Index column = site % columns_, behind = columns_ - column;
+  const auto about_first = about_first_.col(site / columns_);
+  for (Eigen::Index row = 0; row < sum.size(); row += columns_) {
+    sum.segment(row + column, behind) += scale * about_first.segment(row, behind);
+    sum.segment(row, column) += scale * about_first.segment(row + behind, column);
+  }
+}
+
 Neighborhoods::Neighborhoods(const SkinMechanics& mechanics) {
   const int markers = mechanics.marker_count(), sites = mechanics.site_count();
   const double unit = mechanics.length_unit();
   const auto of_markers = [&](int i, int j) {
     return (mechanics.RestMarker(i) - mechanics.RestMarker(j)).squaredNorm();
-  };
-  const auto of_sites = [&](int i, int j) {
-    return (mechanics.RestSite(i) - mechanics.RestSite(j)).squaredNorm();
   };
   const auto along = [&](int i, int j) {
     const double off = mechanics.RestMarker(i).z() - mechanics.RestMarker(j).z();
@@ -46,8 +66,8 @@ Neighborhoods::Neighborhoods(const SkinMechanics& mechanics) {
   motion_near = Bells(markers, kSpreadMm * unit, of_markers);
   motion_alike = kMotionShare * Bells(markers, kMotionLengthMm * unit, of_markers);
   growth_alike = Bells(markers, kInflationLengthMm * unit, along);
-  local_sites = Bells(sites, kLocalMm * unit, of_sites);
-  load_sites = Bells(sites, kHillMm * unit, of_sites);
+  local_sites = SiteBells(mechanics, kLocalMm * unit);
+  load_sites = SiteBells(mechanics, kHillMm * unit);
   local_markers.resize(sites, markers);
   for (int m = 0; m < markers; ++m) {
     for (int site = 0; site < sites; ++site)

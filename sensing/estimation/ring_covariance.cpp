@@ -55,6 +55,7 @@ std::shared_ptr<const RingCovariance> RingCovariance::Make(std::shared_ptr<const
     made->covariance_mm2_.push_back(stored(all));
     made->whitening_.push_back(stored(inverse));
   }
+  made->SetBlocks();
   return made;
 }
 
@@ -113,21 +114,28 @@ Eigen::VectorXf RingCovariance::Times(const Eigen::VectorXf& x) const {
   return spectrum_->TransformBack(parts);
 }
 
-// The inverse transform of S_k, by the difference of the markers' groups.
+// The inverse transform of S_k.
+void RingCovariance::SetBlocks() {
+  const int groups = spectrum_->groups();
+  for (int apart = 0; apart < groups; ++apart) {
+    Eigen::MatrixXf& sum = apart_mm2_.emplace_back();
+    sum.setZero(spectrum_->block(), spectrum_->block());
+    for (int k = 0; k < spectrum_->harmonics(); ++k) {
+      const Harmonic& by = covariance_mm2_[static_cast<size_t>(k)];
+      const double angle = spectrum_->Angle(k, apart), scale = (spectrum_->IsReal(k) ? 1.0 : 2.0) / groups;
+      sum += static_cast<float>(scale * std::cos(angle)) * by.real;
+      if (!spectrum_->IsReal(k)) sum -= static_cast<float>(scale * std::sin(angle)) * by.imaginary;
+    }
+  }
+}
+
 Eigen::Matrix3f RingCovariance::Block(int marker, int other) const {
   const int groups = spectrum_->groups();
   const int apart = (spectrum_->GroupOf(marker) - spectrum_->GroupOf(other) + groups) % groups;
-  const Eigen::Index row = spectrum_->PlaceOf(marker), column = spectrum_->PlaceOf(other);
-  Eigen::Matrix3f sum = Eigen::Matrix3f::Zero();
-  for (int k = 0; k < spectrum_->harmonics(); ++k) {
-    const Harmonic& by = covariance_mm2_[static_cast<size_t>(k)];
-    const double angle = spectrum_->Angle(k, apart);
-    const float scale = (spectrum_->IsReal(k) ? 1.0F : 2.0F) / static_cast<float>(groups);
-    sum += scale * static_cast<float>(std::cos(angle)) * by.real.block<3, 3>(row, column);
-    if (!spectrum_->IsReal(k))
-      sum -= scale * static_cast<float>(std::sin(angle)) * by.imaginary.block<3, 3>(row, column);
-  }
-  return spectrum_->FrameOf(marker) * sum * spectrum_->FrameOf(other).transpose();
+  return spectrum_->FrameOf(marker) *
+         apart_mm2_[static_cast<size_t>(apart)].block<3, 3>(spectrum_->PlaceOf(marker),
+                                                            spectrum_->PlaceOf(other)) *
+         spectrum_->FrameOf(other).transpose();
 }
 
 // Rotation multiplies c - i s by exp(-i k theta g).

@@ -46,9 +46,11 @@ class RingCovariance : public FactoredCovariance {
     Eigen::MatrixXf real, imaginary;
   };
   explicit RingCovariance(std::shared_ptr<const RingSpectrum> spectrum) : spectrum_(std::move(spectrum)) {}
+  void SetBlocks();
 
   std::shared_ptr<const RingSpectrum> spectrum_;
   std::vector<Harmonic> covariance_mm2_, whitening_;  // S_k, L_k^-1
+  std::vector<Eigen::MatrixXf> apart_mm2_;            // blocks of S, by the difference of the groups
 };
 
 }  // namespace taclink

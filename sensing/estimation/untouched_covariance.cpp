@@ -1,6 +1,7 @@
 #include "sensing/estimation/untouched_covariance.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <numeric>
 #include <optional>
 
@@ -72,9 +73,17 @@ Mat3 NoiseOfRing(const RingSpectrum& spectrum, const MarkerObservations& observe
   return sum / count;
 }
 
-// By ring, where that is about the noise of all markers but a few.
+// Camera noise averaged by ring; nullopt if more than kOtherNoiseShare of the markers differ from that by
+// more than kSameNoise, or if many are not seen in some direction: NoiseOfAll() gives these noise of another
+// size.
 std::optional<std::vector<Mat3>> NoiseByRing(const RingSpectrum& spectrum, const MarkerObservations& observed,
                                              const std::vector<Mat3>& noise_mm2, double unseen_mm) {
+  const double least = 1 / (kUnseenShare * unseen_mm * unseen_mm);
+  const auto is_hidden = [&](const Mat3& information) {
+    return !information.allFinite() || !IsSurelySeen(information, least);
+  };
+  const auto hidden = std::ranges::count_if(observed.information, is_hidden);
+  if (IsMany(static_cast<size_t>(hidden), noise_mm2.size())) return std::nullopt;
   const auto paths = static_cast<size_t>(spectrum.groups() * spectrum.period());
   std::vector<Mat3> by_ring;
   int others = 0;

@@ -11,7 +11,7 @@ constexpr int kMostInflationSteps = 400, kMostForceSteps = 120;
 constexpr double kToleranceMm = 1e-4, kLongestStepMm = 8;  // in length units
 constexpr int kForgivenSteps = 2;   // that a pressure may be beyond what the skin stands
 constexpr double kSagStepMm = 0.5;  // in length units: by which a step of specific force moves the slack skin
-constexpr size_t kMostInflated = 12, kMostExpansions = 32;  // that are kept, some 0.15 MB each
+constexpr size_t kMostInflated = 24, kMostExpansions = 32;  // that are kept, some 0.15 MB each
 // Largest relative difference between the marker derivatives by known loads of the skin with its weight and
 // of the inflated skin, up to which the latter's stiffness is taken for both. Contact loads then differ by
 // less than half of it, as they do between tangents 0.4 mm of inflation apart.
@@ -22,6 +22,11 @@ EquilibriumOptions SolverOptions(const LinkModel& model) {
   EquilibriumOptions options;
   options.tolerance_n = 1e-7 * model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm;
   return options;
+}
+
+template <typename Map>
+void EraseOldest(Map& map) {
+  map.erase(std::ranges::min_element(map, {}, [](const auto& each) { return each.second.used; }));
 }
 
 }  // namespace
@@ -62,10 +67,15 @@ UntouchedSkins::~UntouchedSkins() = default;
 // suctions of the grid.
 UntouchedSkins::Inflation UntouchedSkins::Inflated(int part) {
   const auto at = [this](int each) {
-    const auto found = inflated_.find(each);
-    if (found != inflated_.end()) return found->second;
+    if (const auto found = inflated_.find(each); found != inflated_.end()) {
+      found->second.used = calls_;
+      return found->second.skin;
+    }
+    if (inflated_.size() >= kMostInflated) EraseOldest(inflated_);
     auto skin = is_round_ ? Inflate(mechanics_.shell(), each * part_mpa_) : std::nullopt;
-    return inflated_[each] = skin ? std::make_shared<const InflatedSkin>(*std::move(skin)) : nullptr;
+    Inflation made = skin ? std::make_shared<const InflatedSkin>(*std::move(skin)) : nullptr;
+    inflated_[each] = {made, calls_};
+    return made;
   };
   for (int before = -kParts; before > part; before -= kParts) {
     if (!at(before)) return nullptr;
@@ -91,12 +101,11 @@ const UntouchedSkin* UntouchedSkins::Find(const KnownLoads& loads) {
       !(at.specific_force_mps2.norm() <= kMostForceSteps * specific_force_step_mps2_))
     return nullptr;
   ++calls_;
-  if (inflated_.size() >= kMostInflated) inflated_.clear();
   if (const UntouchedSkin* skin = FindAt(at)) return skin;
-  const int toward = at.pressure_mpa > 0 ? -1 : 1;
+  // Less suction; less pressure does not help a skin that collapses under its weight.
   auto part = static_cast<int>(std::trunc(at.pressure_mpa / part_mpa_));
-  if (part * part_mpa_ == at.pressure_mpa) part += toward;
-  for (int i = 0; i <= kForgivenSteps * kParts; ++i, part += toward) {
+  if (part * part_mpa_ == at.pressure_mpa) ++part;
+  for (int i = 0; at.pressure_mpa < 0 && i <= kForgivenSteps * kParts; ++i, ++part) {
     at.pressure_mpa = part * part_mpa_;
     if (const UntouchedSkin* skin = FindAt(at)) return skin;
   }
@@ -138,10 +147,7 @@ const UntouchedSkins::Expansion* UntouchedSkins::Expanded(const GridPoint& point
   // Where the skin does not stand at the nearest pressure of the grid, it may at the one before.
   if (!from && point[0] < 0) return Expanded({point[0] + 1, point[1], point[2], point[3]});
   if (!from) return nullptr;
-  if (expansions_.size() >= kMostExpansions) {
-    expansions_.erase(
-        std::ranges::min_element(expansions_, {}, [](const auto& each) { return each.second.used; }));
-  }
+  if (expansions_.size() >= kMostExpansions) EraseOldest(expansions_);
   Expansion made;
   made.used = calls_;
   made.skin.loads = {point[0] * part_mpa_, specific_force_step_mps2_ * Vec3(point[1], point[2], point[3])};
@@ -194,6 +200,7 @@ bool UntouchedSkins::SolveBySteps(const ShellState& from, const KnownLoads& from
     const EquilibriumSummary summary = in_steps_->Solve(applied.loads(), {}, state);
     if (!summary.ok() || !summary.stable) return false;
   }
+  equilibrium_.Forget();
   return true;
 }
 

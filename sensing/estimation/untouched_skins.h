@@ -59,13 +59,18 @@ class UntouchedSkins {
 
   const SkinMechanics& mechanics_;
   const double part_mpa_;
-  const bool is_round_;                  // if not, no equilibrium is found; all regular meshes are
+  const bool is_round_;  // a surface of revolution, as MakeShellMesh makes; else Find returns nullptr
   double specific_force_step_mps2_ = 0;  // 0: the skin has no weight
   RingEquilibrium equilibrium_;
   std::unique_ptr<EquilibriumSolver> in_steps_;  // made when it is asked for
   MarkerMap::Jacobian jacobian_;
   ByKnownLoads gradient_, motion_, by_base_;
-  std::map<int, Inflation> inflated_;  // by parts; null: it does not stand
+  /// Null if there is no equilibrium.
+  struct CachedInflation {
+    Inflation skin;
+    uint64_t used = 0;  // when, in calls
+  };
+  std::map<int, CachedInflation> inflated_;  // by parts
   std::map<GridPoint, Expansion> expansions_;
   uint64_t calls_ = 0;
   /// Found last; used 0: nothing.

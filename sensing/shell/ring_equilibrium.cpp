@@ -134,7 +134,7 @@ bool RingEquilibrium::FindResponse(const RingStiffness& near, NonlinearShell::Lo
   for (int iteration = 0; iteration < kMostMoves; ++iteration) {
     Respond(near, left, next_step);
     if (LongestMotion(next_step) < least * LongestMotion(motion)) {
-      motion += next_step;  // its length is one but for that share of it
+      motion += next_step;  // its step length is 1 to within `least`
       return motion.allFinite();
     }
     const double product = left.dot(next_step);
@@ -156,7 +156,8 @@ bool RingEquilibrium::Response(const RingStiffness& near, NonlinearShell::Loads 
 }
 
 // Directions of conjugate gradients have positive curvature as long as the stiffness is positive definite in
-// the space that they span; in that of a force everywhere what is soft beside the base's comes first.
+// the space that they span. Started from a random force, that space first contains directions that are soft
+// relative to the preconditioner.
 bool RingEquilibrium::IsStable(const RingStiffness& near, NonlinearShell::Loads loads,
                                const ShellState& state) {
   std::minstd_rand random(1);

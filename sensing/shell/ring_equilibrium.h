@@ -9,7 +9,7 @@
 namespace taclink {
 
 struct RingEquilibriumOptions {
-  double tolerance_mm = 1e-4;  ///< longest motion of a node in the last step; turns: as many rad
+  double tolerance_mm = 1e-4;  ///< longest motion of a node in the last step
   int most_evaluations = 60;   ///< of the gradient
   double longest_step_mm = 8;  ///< turns: half a radian
 };
@@ -29,6 +29,9 @@ class RingEquilibrium {
   /// From `state` to an equilibrium. `dead_load`: by degree of freedom, forces alone (N); empty: none.
   Summary Solve(const RingStiffness& near, NonlinearShell::Loads loads, const Eigen::VectorXd& dead_load,
                 ShellState& state);
+
+  /// Response() and IsStable() then start from `near` alone.
+  void Forget() { pairs_.clear(); }
 
   /// How forces move the skin about `state`, where the last Solve ended, to first order. `motion`: an
   /// estimate of it (zeros where there is none), of which a last step of at most 5 percent is corrected.

@@ -54,7 +54,8 @@ bool RingBlocks::Fit(const NonlinearShell& shell) {
   return true;
 }
 
-// The column of elements beside the axis' first one, on its other side, is that turned back by one.
+// By symmetry, the element on the other side of a column of nodes contributes the terms of this element's
+// second column of corners.
 double RingBlocks::Set(const NonlinearShell& shell, const ShellState& state, NonlinearShell::Loads loads,
                        Eigen::VectorXd& gradient) {
   const int columns = shell.rings()->columns(), rows = shell.rings()->rows();

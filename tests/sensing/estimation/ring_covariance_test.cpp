@@ -156,6 +156,20 @@ TEST_P(RingCovarianceTest, IsNotOfUnequalNoise) {
   EXPECT_TRUE(estimator.IsPreparedFor(observed_, {}));
 }
 
+// Many hidden markers have noise of another size: a tangent must be good for the frame that it is made of.
+TEST_P(RingCovarianceTest, IsGoodForItsOwnFrameIfMarkersAreHidden) {
+  LoadEstimator estimator(mechanics_, near_);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(mechanics_.site_count());
+  const std::vector<Mat3> seen = observed_.information;
+  for (const size_t every : {3, 5}) {
+    observed_.information = seen;
+    for (size_t m = 0; m < seen.size(); m += every) observed_.information[m].setZero();
+    ASSERT_TRUE(estimator.Prepare(round_, skin_, observed_, {}, none, nullptr));
+    EXPECT_EQ(estimator.untouched()->ring == nullptr, every == 3);
+    EXPECT_TRUE(estimator.IsPreparedFor(observed_, {})) << every;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(ShippedModels, RingCovarianceTest, ::testing::Values("cylinder", "barrel", "third"));
 
 }  // namespace
