@@ -11,8 +11,6 @@ namespace taclink {
 class FactoredCovariance {
  public:
   virtual ~FactoredCovariance() = default;
-  /// Number of rows, three per marker.
-  virtual Eigen::Index size() const = 0;
   /// x := B x, by columns.
   virtual void Whiten(Eigen::Ref<Eigen::MatrixXf> x) const = 0;
   /// B' x.
@@ -31,7 +29,6 @@ class DenseCovariance : public FactoredCovariance {
   /// False: the covariance is not positive definite; the other functions must not be called.
   bool is_factored() const { return is_factored_; }
 
-  Eigen::Index size() const override { return lower_.rows(); }
   void Whiten(Eigen::Ref<Eigen::MatrixXf> x) const override;
   Eigen::VectorXf WhitenTransposed(const Eigen::VectorXf& x) const override;
   Eigen::VectorXf Times(const Eigen::VectorXf& x) const override;

@@ -1,15 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/SparseCore>
 #include <array>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include "sensing/estimation/marker_responses.h"
 #include "sensing/estimation/skin_mechanics.h"
-#include "sensing/shell/block_tridiagonal.h"
+#include "sensing/estimation/skin_stiffness.h"
 
 namespace taclink {
 
@@ -21,6 +20,8 @@ namespace taclink {
 class Linearization {
  public:
   explicit Linearization(const SkinMechanics& mechanics);
+  Linearization(const Linearization&) = delete;
+  Linearization& operator=(const Linearization&) = delete;
 
   /// Makes everything again. False: the stiffness is singular there, or not finite.
   bool At(const ShellState& state, const KnownLoads& loads);
@@ -33,28 +34,30 @@ class Linearization {
   bool Rebase(const ShellState& state, const KnownLoads& loads);
   /// The same state under other known loads, to first order.
   void SetKnownLoads(const KnownLoads& loads);
-  /// Overrides the derivatives by known loads, for example with those of the skin that sags.
-  void SetByKnownLoads(const ByKnownLoads& by_known_loads) { by_known_loads_ = by_known_loads; }
+  /// Until it is made again, derivatives by known loads are those of this skin, which sags.
+  void TakeKnownLoadsFrom(const UntouchedSkin& skin) {
+    by_known_loads_ = skin.markers_by_loads;
+    motion_by_loads_ = skin.motion;
+  }
   bool is_made() const { return is_made_; }
   /// Linearized at an inflated skin: stiffness and columns are invariant under rotation.
-  bool is_of_revolution() const { return rings_ != nullptr; }
+  bool is_of_revolution() const { return stiffness_.is_of_revolution(); }
 
   const ShellState& state() const { return state_; }
   /// Where stiffness, columns and frames are from.
   const ShellState& tangent_state() const { return tangent_state_; }
-  const KnownLoads& known_loads() const { return loads_; }
   const Eigen::VectorXd& base_mm() const { return base_mm_; }
   /// Directions of the load of a site, in its frame.
   enum Direction { kInward, kAround, kAlong };
   /// Makes the columns of these sites, where they are not made yet: one solution for all.
-  void MakeColumns(std::span<const int> sites);
+  void MakeColumns(std::span<const int> sites) { responses_.Make(stiffness_, sites); }
   /// Displacement of the stacked markers by a load that acts on a site's node alone, mm/N. The site's columns
   /// must have been made.
   Eigen::VectorXf Column(Direction direction, int site) const;
   /// Likewise, of 1 N inward that a row of sites shares, for all rows; by row. Needs no columns.
   Eigen::MatrixXf RingColumns() const;
   /// Gives back the columns' memory.
-  void DropColumns();
+  void DropColumns() { responses_.Drop(); }
   const ByKnownLoads& by_known_loads() const { return by_known_loads_; }
   /// By site; columns inward, around, along; unit, perpendicular.
   const std::vector<Mat3>& frames() const { return frames_; }
@@ -80,35 +83,24 @@ class Linearization {
   void FirstOrderMarkers(Eigen::VectorXd& stacked_mm) const;
 
  private:
-  void Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const;
   bool Finish(const KnownLoads& loads);
   void SetFrames();
-  void MakeColumnsFromMarkers(const std::vector<int>& missing);
-  void MakeNodeColumns(const std::vector<int>& missing);
-  void MakeTurnedColumns(const std::vector<int>& missing);
-  void MakeFirstColumns();
-  Eigen::MatrixXf Solved(std::vector<BlockTridiagonal::Rows> filled, Eigen::MatrixXf loads) const;
-  auto AtSite(int site) const { return adjoint_.middleCols<5>(5 * place_[static_cast<size_t>(site)]); }
   /// The rotations' part of a couple about an axis; of a force on the outer wall, which has one about the
   /// mid-surface.
   Vec2 Turning(int node, const Vec3& couple) const;
   Vec2 Moment(int node, const Vec3& direction) const;
 
   const SkinMechanics& mechanics_;
-  Eigen::SparseMatrix<double> hessian_;
-  std::optional<BlockTridiagonal> factor_;      // made when it is asked for
-  std::shared_ptr<const RingStiffness> rings_;  // instead of factor_
+  SkinStiffness stiffness_;
   MarkerMap::Jacobian jacobian_;
+  MarkerResponses responses_;
   ShellState state_, tangent_state_;
   bool is_made_ = false;
   KnownLoads loads_, tangent_loads_;
   Eigen::VectorXd tangent_gradient_, tangent_base_mm_;
   Eigen::VectorXd gradient_, base_mm_, motion_;
   ByKnownLoads gradient_by_loads_, by_known_loads_;
-  Eigen::MatrixXf adjoint_;          // J K^-1: 3 markers x the five dofs of each site in place_
-  Eigen::MatrixXf first_columns_;    // likewise with rings_, of the sites from the first path to the next one
-  std::vector<Eigen::Index> place_;  // by site, in adjoint_; -1: not made
-  std::vector<BlockTridiagonal::Rows> filled_;  // rows of J that reach that row of nodes
+  Eigen::MatrixX4f motion_by_loads_;  // no rows: by the stiffness
   std::vector<Mat3> frames_;
 };
 

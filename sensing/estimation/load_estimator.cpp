@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "sensing/estimation/camera_noise.h"
+#include "sensing/estimation/site_columns.h"
 #include "sensing/shell/dense.h"
 
 namespace taclink {
@@ -116,7 +117,7 @@ void LoadEstimator::MakeColumns(Linearization& skin, std::vector<int> loads) {
   const auto bands = std::lower_bound(loads.begin(), loads.end(), mechanics_.site_count());
   const std::span<const int> sites(loads.begin(), bands);
   Eigen::MatrixXf made(whitening_.size(), static_cast<Eigen::Index>(loads.size()));
-  made.leftCols(static_cast<Eigen::Index>(sites.size())) = SiteColumns(skin, sites);
+  made.leftCols(static_cast<Eigen::Index>(sites.size())) = SiteColumns(mechanics_, skin, sites);
   if (bands != loads.end()) {
     const Eigen::MatrixXf rings = skin.RingColumns();
     for (size_t i = sites.size(); i < loads.size(); ++i)
@@ -126,63 +127,14 @@ void LoadEstimator::MakeColumns(Linearization& skin, std::vector<int> loads) {
   columns_.Append(loads, made);
 }
 
-// What 1 N inward at these sites displaces.
-Eigen::MatrixXf LoadEstimator::SiteColumns(Linearization& skin, std::span<const int> sites) const {
-  std::vector<int> loaded;
-  for (const int site : sites) {
-    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), site); it; ++it)
-      loaded.push_back(static_cast<int>(it.row()));
-  }
-  skin.MakeColumns(loaded);
-  Eigen::MatrixXf columns =
-      Eigen::MatrixXf::Zero(3 * mechanics_.marker_count(), static_cast<Eigen::Index>(sites.size()));
-  for (Eigen::Index i = 0; i < columns.cols(); ++i) {
-    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), sites[static_cast<size_t>(i)]);
-         it; ++it)
-      columns.col(i) +=
-          static_cast<float>(it.value()) * skin.Column(Linearization::kInward, static_cast<int>(it.row()));
-  }
-  return columns;
-}
-
-// Of all loads of a skin of revolution: the columns of the first group of sites and their rotations, whose
-// Gram matrix is block-circulant. Whitening::Finish then subtracts the low-rank part (camera motion,
+// Those of all loads of a skin of revolution. Whitening::Finish subtracts the low-rank part (camera motion,
 // baseline, known loads), which is not invariant under rotation.
 void LoadEstimator::MakeRotatedColumns(Linearization& skin) {
-  const RingCovariance& ring = *untouched_->ring;
-  const int groups = ring.spectrum().groups(), around = mechanics_.columns(), wide = around / groups;
-  const int rows = mechanics_.site_rows();
-  std::vector<int> first_sites, loads;
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < wide; ++column) first_sites.push_back(row * around + column);
-  }
-  Eigen::MatrixXf first = SiteColumns(skin, first_sites);
-  ring.Whiten(first);
-  const Eigen::Index count = first.cols(), sites = groups * count;
-  Eigen::MatrixXf all(first.rows(), sites + rows), gram(sites + rows, sites + rows), products;
-  for (int group = 0; group < groups; ++group) {
-    ring.RotateWhitened(first, group, all.middleCols(group * count, count));
-    for (const int site : first_sites) loads.push_back(site + group * wide);
-  }
-  const Eigen::MatrixXf sums = ring.SumOfRotations(first);
-  for (int row = 0; row < rows; ++row) {
-    all.col(sites + row) = sums.middleCols(row * wide, wide).rowwise().sum() / static_cast<float>(around);
-    loads.push_back(mechanics_.site_count() + row);
-  }
-  dense::TransposedProduct(first, all, products);
-  for (int column = 0; column < groups; ++column) {
-    for (int group = 0; group < groups; ++group)
-      gram.block(group * count, column * count, count, count) =
-          products.middleCols((column - group + groups) % groups * count, count);
-    gram.block(column * count, sites, count, rows) = products.rightCols(rows);
-  }
-  const Eigen::MatrixXf bands = all.rightCols(rows);
-  gram.bottomRightCorner(rows, rows) = bands.transpose() * bands;
-  gram.bottomLeftCorner(rows, sites) = gram.topRightCorner(sites, rows).transpose();
-  const Eigen::MatrixXf explained = whitening_.Finish(all);
-  if (explained.rows() > 0) dense::AddTransposedProduct(-1, explained, explained, gram);
-  gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
-  columns_.Set(loads, std::move(all), std::move(gram));
+  RotatedColumns all(mechanics_, *untouched_->ring, skin);
+  const Eigen::MatrixXf explained = whitening_.Finish(all.whitened);
+  if (explained.rows() > 0) dense::AddTransposedProduct(-1, explained, explained, all.gram);
+  all.gram.triangularView<Eigen::StrictlyUpper>() = all.gram.transpose();
+  columns_.Set(all.loads, std::move(all.whitened), std::move(all.gram));
 }
 
 // Of M m with independent m ~ N(0, 1): what all markers leave of it, M (I - M' covariance^-1 M) M'.

@@ -151,7 +151,6 @@ class LoadEstimator {
   void WriteRegions();
   void MakeColumns(Linearization& skin, std::vector<int> loads);
   void MakeRotatedColumns(Linearization& skin);
-  Eigen::MatrixXf SiteColumns(Linearization& skin, std::span<const int> sites) const;
   std::vector<int> LikelyLoads(const Eigen::VectorXd& local_n) const;
   /// The sites that a column of the problem loads, and the share of each: one site, or a band's.
   template <typename Visit>

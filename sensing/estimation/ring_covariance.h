@@ -29,7 +29,6 @@ class RingCovariance : public FactoredCovariance {
                                                     const RingCovarianceParts& parts);
 
   const RingSpectrum& spectrum() const { return *spectrum_; }
-  Eigen::Index size() const override { return spectrum_->block() * spectrum_->groups(); }
   void Whiten(Eigen::Ref<Eigen::MatrixXf> x) const override;
   Eigen::VectorXf WhitenTransposed(const Eigen::VectorXf& x) const override;
   Eigen::VectorXf Times(const Eigen::VectorXf& x) const override;

@@ -32,6 +32,7 @@ struct UntouchedSkin {
   const ShellState& about() const { return inflated ? inflated->state : state; }
   Eigen::VectorXd markers_mm;     ///< displacements from the slack skin without weight, stacked
   ByKnownLoads markers_by_loads;  ///< their derivatives, mm/MPa and mm/(m/s^2)
+  Eigen::MatrixX4f motion;        ///< likewise, of the degrees of freedom
 };
 
 /// What a link's estimates share: the shell, its markers, the sites where loads may act, and the skin under
@@ -78,10 +79,10 @@ class SkinMechanics {
   /// Derivatives of the shell's gradient by the known loads at a state.
   void GradientByLoads(const ShellState& state, ByKnownLoads& out) const;
 
-  /// The equilibrium at these loads. A pressure reading scatters about zero and a small suction buckles the
-  /// skin, so if there is no equilibrium, the nearest pressure with one is taken, up to two pressure steps
-  /// closer to zero. Returns nullptr if there is none, or if the loads are out of range. Valid until the next
-  /// call.
+  /// The stable equilibrium under these loads that is clear of the tube. Pressure readings scatter about zero
+  /// and a small suction buckles the skin: under suction without such an equilibrium, that of the nearest
+  /// grid pressure up to two pressure steps closer to zero. Returns nullptr if none of them has one. Valid
+  /// until the next call.
   const UntouchedSkin* Untouched(const KnownLoads& loads);
 
  private:

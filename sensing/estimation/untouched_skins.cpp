@@ -7,8 +7,11 @@ namespace taclink {
 namespace {
 
 constexpr int kParts = 4;  // of SkinMechanics::pressure_step: the grid of pressures
-constexpr int kMostInflationSteps = 400, kMostForceSteps = 120;
+constexpr int kMostInflationSteps = 400, kMostForceSteps = 1'000'000;
 constexpr double kToleranceMm = 1e-4, kLongestStepMm = 8;  // in length units
+// Of the gradient: skins that stand clear of their tube take up to 60, those that buckle onto it 400 and
+// more.
+constexpr int kMostEvaluations = 150;
 constexpr int kForgivenSteps = 2;   // that a pressure may be beyond what the skin stands
 constexpr double kSagStepMm = 0.5;  // in length units: by which a step of specific force moves the slack skin
 constexpr size_t kMostInflated = 24, kMostExpansions = 32;  // that are kept, some 0.15 MB each
@@ -16,12 +19,15 @@ constexpr size_t kMostInflated = 24, kMostExpansions = 32;  // that are kept, so
 // of the inflated skin, up to which the latter's stiffness is taken for both. Contact loads then differ by
 // less than half of it, as they do between tangents 0.4 mm of inflation apart.
 constexpr double kAboutAsStiff = 0.25;
-constexpr std::array<int, 2> kSteps = {4, 16};  // of a way that RingEquilibrium does not find
 
-EquilibriumOptions SolverOptions(const LinkModel& model) {
-  EquilibriumOptions options;
-  options.tolerance_n = 1e-7 * model.material.youngs_modulus_mpa * model.thickness_mm * model.thickness_mm;
-  return options;
+// The mid-surface lies half the wall's thickness outside of what touches the tube, so that the search may
+// pass a little beyond what is accepted.
+RingEquilibriumOptions SearchOptions(const SkinMechanics& mechanics) {
+  const double tube_mm = mechanics.model().tube_outer_radius_mm;
+  return {.tolerance_mm = kToleranceMm * mechanics.length_unit(),
+          .most_evaluations = kMostEvaluations,
+          .longest_step_mm = kLongestStepMm * mechanics.length_unit(),
+          .least_radius_mm = tube_mm > 0 ? tube_mm : -1};
 }
 
 template <typename Map>
@@ -31,40 +37,23 @@ void EraseOldest(Map& map) {
 
 }  // namespace
 
-// The pressure alone; weight is a dead load.
-class UntouchedSkins::Pressure {
- public:
-  explicit Pressure(const KnownLoads& loads) : pressure_(loads.pressure_mpa) {
-    if (loads.pressure_mpa != 0) loads_ = {&one_, 1};
-  }
-  Pressure(const Pressure&) = delete;
-  Pressure& operator=(const Pressure&) = delete;
-  NonlinearShell::Loads loads() const { return loads_; }
-
- private:
-  FollowerPressure pressure_;
-  const ElementLoad* one_ = &pressure_;
-  NonlinearShell::Loads loads_;
-};
-
 UntouchedSkins::UntouchedSkins(const SkinMechanics& mechanics)
     : mechanics_(mechanics),
       part_mpa_(mechanics.pressure_step() / kParts),
       is_round_(RingBlocks::Fit(mechanics.shell())),
-      equilibrium_(mechanics.shell(), {.tolerance_mm = kToleranceMm * mechanics.length_unit(),
-                                       .longest_step_mm = kLongestStepMm * mechanics.length_unit()}),
+      equilibrium_(mechanics.shell(), SearchOptions(mechanics)),
       jacobian_(mechanics.markers().MakeJacobian(mechanics.shell())) {
   if (mechanics.mass_per_area() == 0) return;
   const Expansion* slack = Expanded({});
-  if (slack == nullptr || slack->way == Way::kNone) return;  // nor is there one under any load
+  if (slack == nullptr || !slack->is_found) return;  // nor is there one under any load
   const double mm_per_mps2 = slack->skin.markers_by_loads.rightCols<3>().cwiseAbs().maxCoeff();
   specific_force_step_mps2_ = kSagStepMm * mechanics.length_unit() / mm_per_mps2;
 }
 
 UntouchedSkins::~UntouchedSkins() = default;
 
-// Null if there is no stable equilibrium. Under suction there is one only if there is one at all smaller
-// suctions of the grid.
+// Returns nullptr if no stable equilibrium exists at this pressure or, under suction, at a smaller suction of
+// the grid.
 UntouchedSkins::Inflation UntouchedSkins::Inflated(int part) {
   const auto at = [this](int each) {
     if (const auto found = inflated_.find(each); found != inflated_.end()) {
@@ -116,7 +105,7 @@ const UntouchedSkin* UntouchedSkins::FindAt(const KnownLoads& loads) {
   for (Recent& recent : recent_) {
     if (recent.used == 0 || recent.skin.loads != loads) continue;
     recent.used = calls_;
-    return &recent.skin;
+    return recent.is_found ? &recent.skin : nullptr;
   }
   GridPoint point = {static_cast<int>(std::round(loads.pressure_mpa / part_mpa_)), 0, 0, 0};
   for (size_t k = 1; k < point.size() && specific_force_step_mps2_ > 0; ++k)
@@ -125,109 +114,78 @@ const UntouchedSkin* UntouchedSkins::FindAt(const KnownLoads& loads) {
   const Inflation base = Base(loads.pressure_mpa);
   if (!base) return nullptr;
   const Expansion* near = Expanded(point);
-  if (near == nullptr || near->way == Way::kNone) return nullptr;
+  if (near == nullptr || !near->is_found) return nullptr;
   Recent& found = *std::ranges::min_element(recent_, {}, &Recent::used);
-  found.used = 0;
+  found.used = calls_;
   UntouchedSkin& skin = found.skin;
   skin.loads = loads;
-  if (!SolveNear(*near, *base, loads, skin.state)) return nullptr;
+  skin.state = near->skin.state;
+  mechanics_.shell().Step(near->motion * (loads.Stacked() - near->skin.loads.Stacked()), skin.state);
   motion_ = near->motion;
-  if (!WriteDerivatives(base, near->way, skin, motion_)) return nullptr;
-  found.used = calls_;
-  return &skin;
+  found.is_found = Solve(*base, loads, skin.state) && WriteDerivatives(base, skin, motion_);
+  return found.is_found ? &skin : nullptr;
 }
 
-// Null if there is no inflated skin at that pressure.
+// Returns nullptr if no inflated skin is stable at that pressure.
 const UntouchedSkins::Expansion* UntouchedSkins::Expanded(const GridPoint& point) {
   if (const auto found = expansions_.find(point); found != expansions_.end()) {
     found->second.used = calls_;
     return &found->second;
   }
-  const Inflation from = Inflated(point[0]);
+  const Inflation base = Inflated(point[0]);
   // Where the skin does not stand at the nearest pressure of the grid, it may at the one before.
-  if (!from && point[0] < 0) return Expanded({point[0] + 1, point[1], point[2], point[3]});
-  if (!from) return nullptr;
+  if (!base && point[0] < 0) return Expanded({point[0] + 1, point[1], point[2], point[3]});
+  if (!base) return nullptr;
   if (expansions_.size() >= kMostExpansions) EraseOldest(expansions_);
   Expansion made;
   made.used = calls_;
   made.skin.loads = {point[0] * part_mpa_, specific_force_step_mps2_ * Vec3(point[1], point[2], point[3])};
-  made.skin.state = from->state;
-  made.way = SolveFromBase(*from, made.skin.loads, made.skin.state);
+  made.skin.state = base->state;
   made.motion.setZero(mechanics_.shell().dof_count(), KnownLoads::kCount);
-  if (made.way != Way::kNone &&
-      !(WriteDerivatives(from, made.way, made.skin, made.motion) &&
-        equilibrium_.IsStable(from->stiffness, Pressure(made.skin.loads).loads(), made.skin.state)))
-    made.way = Way::kNone;
+  made.is_found = Solve(*base, made.skin.loads, made.skin.state) &&
+                  WriteDerivatives(base, made.skin, made.motion) &&
+                  equilibrium_.IsStable(base->stiffness, PressureLoads(made.skin.loads.pressure_mpa).loads(),
+                                        made.skin.state);
   return &expansions_.emplace(point, std::move(made)).first->second;
 }
 
-UntouchedSkins::Way UntouchedSkins::SolveFromBase(const InflatedSkin& base, const KnownLoads& loads,
-                                                  ShellState& state) {
-  const Pressure pressure(loads);
-  state = base.state;
-  if (equilibrium_.Solve(base.stiffness, pressure.loads(), mechanics_.Weight(loads), state).converged)
-    return Way::kFromBase;
-  for (const int steps : kSteps) {
-    if (SolveBySteps(base.state, {loads.pressure_mpa, Vec3::Zero()}, steps, loads, state))
-      return Way::kInSteps;
-  }
-  return Way::kNone;
+// From `state` nearby.
+bool UntouchedSkins::Solve(const InflatedSkin& base, const KnownLoads& loads, ShellState& state) {
+  const PressureLoads pressure(loads.pressure_mpa);
+  return equilibrium_.Solve(base.stiffness, pressure.loads(), mechanics_.Weight(loads), state).converged &&
+         IsClearOfTube(state);
 }
 
-bool UntouchedSkins::SolveNear(const Expansion& near, const InflatedSkin& base, const KnownLoads& loads,
-                               ShellState& state) {
-  ShellState from = near.skin.state;
-  mechanics_.shell().Step(near.motion * (loads.Stacked() - near.skin.loads.Stacked()), from);
-  if (near.way == Way::kFromBase) {
-    const Pressure pressure(loads);
-    state = from;
-    if (equilibrium_.Solve(base.stiffness, pressure.loads(), mechanics_.Weight(loads), state).converged)
-      return true;
-  }
-  return SolveBySteps(from, loads, 1, loads, state) ||
-         SolveBySteps(near.skin.state, near.skin.loads, kSteps.front(), loads, state);
+bool UntouchedSkins::IsClearOfTube(const ShellState& state) const {
+  const LinkModel& model = mechanics_.model();
+  const double least_mm = model.tube_outer_radius_mm + model.thickness_mm / 2;
+  return model.tube_outer_radius_mm == 0 || std::ranges::all_of(state.mids_mm, [least_mm](const Vec3& mid) {
+           return mid.head<2>().norm() > least_mm;
+         });
 }
 
-bool UntouchedSkins::SolveBySteps(const ShellState& from, const KnownLoads& from_loads, int steps,
-                                  const KnownLoads& loads, ShellState& state) {
-  if (!in_steps_)
-    in_steps_ = std::make_unique<EquilibriumSolver>(mechanics_.shell(), SolverOptions(mechanics_.model()));
-  state = from;
-  for (int step = 1; step <= steps; ++step) {
-    const double share = static_cast<double>(step) / steps;
-    const AppliedLoads applied(
-        mechanics_, KnownLoads::FromStacked((1 - share) * from_loads.Stacked() + share * loads.Stacked()));
-    const EquilibriumSummary summary = in_steps_->Solve(applied.loads(), {}, state);
-    if (!summary.ok() || !summary.stable) return false;
-  }
-  equilibrium_.Forget();
-  return true;
-}
-
-// Completes `skin` at its state. `motion`: in and out, see RingEquilibrium::Response.
-bool UntouchedSkins::WriteDerivatives(const Inflation& base, Way way, UntouchedSkin& skin,
-                                      ByKnownLoads& motion) {
+// Completes `skin` at its state. `motion`: in and out, see RingEquilibrium::Response. False: the equilibrium
+// is not stable.
+bool UntouchedSkins::WriteDerivatives(const Inflation& base, UntouchedSkin& skin, ByKnownLoads& motion) {
   const MarkerMap& map = mechanics_.markers();
   map.Displacements(skin.state, skin.markers_mm);
   map.WriteJacobian(mechanics_.shell(), skin.state, jacobian_);
   mechanics_.GradientByLoads(skin.state, gradient_);
-  const Pressure pressure(skin.loads);
-  Eigen::VectorXd moved, moved_by_base;
+  const PressureLoads pressure(skin.loads.pressure_mpa);
+  if (!equilibrium_.Response(base->stiffness, pressure.loads(), skin.state, -gradient_, motion)) return false;
   by_base_.setZero(motion.rows(), KnownLoads::kCount);
+  Eigen::VectorXd moved;
   for (int k = 0; k < KnownLoads::kCount; ++k) {
     if (gradient_.col(k).isZero(0)) continue;
-    moved = motion.col(k);
-    if (!equilibrium_.Response(base->stiffness, pressure.loads(), skin.state, -gradient_.col(k), moved))
-      return false;
-    motion.col(k) = moved;
-    base->stiffness.Solve(-gradient_.col(k), moved_by_base);
-    by_base_.col(k) = moved_by_base;
+    base->stiffness.Solve(-gradient_.col(k), moved);
+    by_base_.col(k) = moved;
   }
   skin.markers_by_loads = jacobian_ * motion;
+  skin.motion = motion.cast<float>();
   const ByKnownLoads off = skin.markers_by_loads - jacobian_ * by_base_;
   const bool is_stiff_as_base =
       (off.colwise().norm().array() <= kAboutAsStiff * skin.markers_by_loads.colwise().norm().array()).all();
-  skin.inflated = way == Way::kFromBase && is_stiff_as_base ? base : nullptr;
+  skin.inflated = is_stiff_as_base ? base : nullptr;
   return true;
 }
 

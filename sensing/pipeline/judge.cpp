@@ -45,8 +45,8 @@ std::optional<Reason> FailureReason(EstimateFailure failure) {
       return std::nullopt;
     case EstimateFailure::kNoEquilibrium:
       return Reason{ReasonId::kNoEquilibrium,
-                    "no skin of this model is stable under the measured pressure; check the pressure and the "
-                    "model's material"};
+                    "no skin of this model is stable and clear of its tube under the measured pressure and "
+                    "acceleration; check both, and the model's material and density"};
     case EstimateFailure::kImpossible:
       return Reason{ReasonId::kImpossible,
                     "what was found is not physically possible; check that the calibration is this link's"};

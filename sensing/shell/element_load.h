@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "sensing/shell/nonlinear_element.h"
 
 namespace taclink {
@@ -36,6 +38,20 @@ class FollowerPressure final : public ElementLoad {
 
  private:
   double pressure_mpa_;
+};
+
+/// A FollowerPressure as the loads of a shell; none where it is zero.
+class PressureLoads {
+ public:
+  explicit PressureLoads(double pressure_mpa) : pressure_(pressure_mpa), is_any_(pressure_mpa != 0) {}
+  PressureLoads(const PressureLoads&) = delete;
+  PressureLoads& operator=(const PressureLoads&) = delete;
+  std::span<const ElementLoad* const> loads() const { return {&one_, is_any_ ? 1U : 0U}; }
+
+ private:
+  FollowerPressure pressure_;
+  const ElementLoad* one_ = &pressure_;
+  bool is_any_;
 };
 
 }  // namespace taclink

@@ -6,6 +6,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "sensing/shell/node_steps.h"
+
 namespace taclink {
 namespace {
 
@@ -20,14 +22,10 @@ constexpr double kMostInflationTurn = 0.5;
 // One column of nodes, in cylindrical coordinates, of a state that is the same all around.
 class Column {
  public:
-  Column(const NonlinearShell& shell, double pressure_mpa) : shell_(shell), pressure_(pressure_mpa) {
-    if (pressure_mpa != 0) loads_ = {&one_, 1};
-  }
-  Column(const Column&) = delete;
-  Column& operator=(const Column&) = delete;
+  Column(const NonlinearShell& shell, double pressure_mpa) : shell_(shell), pressure_(pressure_mpa) {}
 
   /// Energy, gradient and blocks at a state.
-  double Set(const ShellState& state) { return blocks_.Set(shell_, state, loads_, gradient_); }
+  double Set(const ShellState& state) { return blocks_.Set(shell_, state, pressure_.loads(), gradient_); }
   const RingBlocks& blocks() const { return blocks_; }
 
   double LargestForce() const {
@@ -69,9 +67,7 @@ class Column {
 
  private:
   const NonlinearShell& shell_;
-  FollowerPressure pressure_;
-  const ElementLoad* one_ = &pressure_;
-  NonlinearShell::Loads loads_;
+  PressureLoads pressure_;
   RingBlocks blocks_;
   Eigen::VectorXd gradient_;
 };
@@ -107,37 +103,19 @@ void Move(const NonlinearShell& shell, double share, const Eigen::VectorXd& step
   }
 }
 
-// Share of a step that keeps motions and turns in bounds.
-double ShareInBounds(const NonlinearShell& shell, const Eigen::VectorXd& step) {
-  const double longest_mm = kLongestStepShare * shell.surface().mids_mm.front().head<2>().norm();
-  double share = 1;
-  for (Eigen::Index i = 0; i < step.size(); ++i) {
-    const double limit = i % kNodeDofs < 3 ? longest_mm : kMostInflationTurn;
-    share = std::min(share, limit / std::max(std::abs(step[i]), limit));
-  }
-  return share;
-}
-
-double Longest(const Eigen::VectorXd& step) {
-  double longest = 0;
-  for (Eigen::Index i = 0; i < step.size(); ++i) {
-    if (i % kNodeDofs < 3) longest = std::max(longest, std::abs(step[i]));
-  }
-  return longest;
-}
-
 // Newton's method from a state nearby; `column` is then of where it ends. False: it finds no equilibrium.
 bool Settle(const NonlinearShell& shell, Column& column, ShellState& state) {
   const double modulus_mpa = shell.material().youngs_modulus_mpa, thickness_mm = shell.surface().thickness_mm;
   const double tolerance_n = kToleranceShare * modulus_mpa * thickness_mm * thickness_mm;
+  const double longest_mm = kLongestStepShare * shell.surface().mids_mm.front().head<2>().norm();
   double energy_nmm = column.Set(state);
   Eigen::VectorXd step;
   for (int iteration = 0; iteration < kMostNewtonSteps; ++iteration) {
     if (column.LargestForce() <= tolerance_n) return true;
     double slope = 0;
     if (!column.FindStep(step, slope)) return false;
-    if (Longest(step) < kNoStepShare * thickness_mm) return true;  // forces of a foil are rounded
-    double share = ShareInBounds(shell, step);
+    if (LongestTranslation(step) < kNoStepShare * thickness_mm) return true;  // forces of a foil are rounded
+    double share = ShareWithin(step, longest_mm, kMostInflationTurn);
     // Below what the energy resolves, a step is taken on trust.
     const double noise = 1e-12 * std::abs(energy_nmm) + 1e-13 * modulus_mpa * std::pow(thickness_mm, 3);
     for (int halving = 0;; ++halving, share /= 2) {

@@ -14,6 +14,20 @@ inline Instructions BestInstructions() {
   return Instructions::kPlain;
 }
 
+/// The variant of a kernel for the best instruction set.
+template <typename Kernel>
+Kernel BestOf(Kernel plain, Kernel avx2, Kernel avx512) {
+  switch (BestInstructions()) {
+    case Instructions::kAvx512:
+      return avx512;
+    case Instructions::kAvx2:
+      return avx2;
+    case Instructions::kPlain:
+      break;
+  }
+  return plain;
+}
+
 #if defined(__x86_64__)
 #define TACLINK_FOR_AVX2 __attribute__((target("arch=x86-64-v3")))
 #define TACLINK_FOR_AVX512 __attribute__((target("arch=x86-64-v4")))

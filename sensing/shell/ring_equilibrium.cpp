@@ -6,6 +6,8 @@
 #include <random>
 #include <utility>
 
+#include "sensing/shell/node_steps.h"
+
 namespace taclink {
 namespace {
 
@@ -13,17 +15,9 @@ constexpr size_t kMostPairs = 8;
 constexpr int kMostHalvings = 12;
 constexpr double kMostTurn = 0.5;
 constexpr double kDifferenceShare = 3e-4;  // of the thickness: a node's motion, for differences of gradients
-constexpr int kMostMoves = 16;
-constexpr double kNothingLeft = 1e-3;
-constexpr double kNearlyMoved = 0.05;      // what is left, of a motion: a step more is exact enough
-constexpr double kLeastCurvature = 1e-10;  // of a pair, by the product of its lengths
-
-double LongestMotion(const Eigen::VectorXd& step) {
-  double longest2 = 0;
-  for (Eigen::Index i = 0; i + 2 < step.size(); i += kNodeDofs)
-    longest2 = std::max(longest2, step.segment<3>(i).squaredNorm());
-  return std::sqrt(longest2);
-}
+constexpr int kStabilityIterations = 16, kMostResponseIterations = 60;
+constexpr double kStabilityStep = 1e-3, kResponseStep = 0.05;  // the last one's share of the motion
+constexpr double kLeastCurvature = 1e-10;                      // of a pair, by the product of its lengths
 
 }  // namespace
 
@@ -45,13 +39,11 @@ double RingEquilibrium::Evaluate(NonlinearShell::Loads loads, const Eigen::Vecto
   return energy_nmm;
 }
 
-double RingEquilibrium::ShareInBounds(const Eigen::VectorXd& step) const {
-  double share = 1;
-  for (Eigen::Index i = 0; i < step.size(); ++i) {
-    const double limit = i % kNodeDofs < 3 ? options_.longest_step_mm : kMostTurn;
-    share = std::min(share, limit / std::max(std::abs(step[i]), limit));
-  }
-  return share;
+bool RingEquilibrium::IsTooFarIn(const ShellState& state) const {
+  if (options_.least_radius_mm < 0) return false;
+  const double least2 = options_.least_radius_mm * options_.least_radius_mm;
+  return std::ranges::any_of(state.mids_mm,
+                             [least2](const Vec3& mid) { return mid.head<2>().squaredNorm() < least2; });
 }
 
 void RingEquilibrium::Remember(const Eigen::VectorXd& step, const Eigen::VectorXd& change) {
@@ -85,10 +77,9 @@ RingEquilibrium::Summary RingEquilibrium::Solve(const RingStiffness& near, Nonli
   for (;;) {
     Respond(near, -gradient_, step_);
     if (!step_.allFinite()) return summary;
-    const double share_in_bounds = ShareInBounds(step_);
+    const double share_in_bounds = ShareWithin(step_, options_.longest_step_mm, kMostTurn);
     step_ *= share_in_bounds;
-    summary.last_step_mm = LongestMotion(step_);
-    if (share_in_bounds == 1 && summary.last_step_mm < options_.tolerance_mm) {
+    if (share_in_bounds == 1 && LongestTranslation(step_) < options_.tolerance_mm) {
       shell_.Step(step_, state);
       summary.converged = true;
       return summary;
@@ -109,17 +100,20 @@ RingEquilibrium::Summary RingEquilibrium::Solve(const RingStiffness& near, Nonli
     std::swap(state, trial_);
     std::swap(gradient_, next_gradient_);
     energy_nmm = trial_nmm;
+    if (IsTooFarIn(state)) return summary;
   }
 }
 
 // Conjugate gradients [golub2013], preconditioned by the pairs of Solve; products with the stiffness are
-// differences of gradients. Stops where the next step is a share `least` of the motion.
-bool RingEquilibrium::FindResponse(const RingStiffness& near, NonlinearShell::Loads loads,
-                                   const ShellState& state, const Eigen::VectorXd& forces, double least,
-                                   Eigen::VectorXd& motion) {
-  shell_.Gradient(state, loads, gradient_);
+// differences to `gradient_`, which is that at `state`. Converged: the next step is a share `least` of the
+// motion.
+RingEquilibrium::Outcome RingEquilibrium::FindResponse(const RingStiffness& near, NonlinearShell::Loads loads,
+                                                       const ShellState& state, const Eigen::VectorXd& forces,
+                                                       double least, int most_iterations,
+                                                       Eigen::VectorXd& motion) {
+  const double thickness_mm = shell_.surface().thickness_mm;
   const auto times_stiffness = [&](const Eigen::VectorXd& direction, Eigen::VectorXd& product) {
-    const double share = kDifferenceShare * shell_.surface().thickness_mm / LongestMotion(direction);
+    const double share = kDifferenceShare * thickness_mm / LongestMotion(direction, thickness_mm);
     trial_ = state;
     shell_.Step(share * direction, trial_);
     shell_.Gradient(trial_, loads, next_gradient_);
@@ -131,28 +125,37 @@ bool RingEquilibrium::FindResponse(const RingStiffness& near, NonlinearShell::Lo
     left -= stiff;
   }
   double last_product = 1;
-  for (int iteration = 0; iteration < kMostMoves; ++iteration) {
+  for (int iteration = 0; iteration < most_iterations; ++iteration) {
     Respond(near, left, next_step);
-    if (LongestMotion(next_step) < least * LongestMotion(motion)) {
+    if (LongestMotion(next_step, thickness_mm) <= least * LongestMotion(motion, thickness_mm)) {
       motion += next_step;  // its step length is 1 to within `least`
-      return motion.allFinite();
+      return motion.allFinite() ? Outcome::kConverged : Outcome::kUnsettled;
     }
     const double product = left.dot(next_step);
     direction = next_step + product / last_product * direction;
     last_product = product;
     times_stiffness(direction, stiff);
     const double length = product / direction.dot(stiff);
-    if (!(length > 0) || !std::isfinite(length)) return false;
+    if (!(length > 0) || !std::isfinite(length)) return Outcome::kIndefinite;
     motion += length * direction;
     left -= length * stiff;
   }
-  return motion.allFinite();
+  return Outcome::kUnsettled;
 }
 
 bool RingEquilibrium::Response(const RingStiffness& near, NonlinearShell::Loads loads,
-                               const ShellState& state, const Eigen::VectorXd& forces,
-                               Eigen::VectorXd& motion) {
-  return FindResponse(near, loads, state, forces, kNearlyMoved, motion);
+                               const ShellState& state, const Eigen::Ref<const Eigen::MatrixXd>& forces,
+                               Eigen::Ref<Eigen::MatrixXd> motions) {
+  shell_.Gradient(state, loads, gradient_);
+  Eigen::VectorXd motion;
+  for (Eigen::Index k = 0; k < forces.cols(); ++k) {
+    motion = motions.col(k);
+    if (FindResponse(near, loads, state, forces.col(k), kResponseStep, kMostResponseIterations, motion) !=
+        Outcome::kConverged)
+      return false;
+    motions.col(k) = motion;
+  }
+  return true;
 }
 
 // Directions of conjugate gradients have positive curvature as long as the stiffness is positive definite in
@@ -164,7 +167,9 @@ bool RingEquilibrium::IsStable(const RingStiffness& near, NonlinearShell::Loads 
   std::uniform_real_distribution<double> number(-1, 1);
   Eigen::VectorXd forces(shell_.dof_count()), motion = Eigen::VectorXd::Zero(shell_.dof_count());
   for (double& force : forces) force = number(random);
-  return FindResponse(near, loads, state, forces, kNothingLeft, motion);
+  shell_.Gradient(state, loads, gradient_);
+  return FindResponse(near, loads, state, forces, kStabilityStep, kStabilityIterations, motion) !=
+         Outcome::kIndefinite;
 }
 
 }  // namespace taclink

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <deque>
 
 #include "sensing/shell/nonlinear_shell.h"
@@ -9,9 +10,10 @@
 namespace taclink {
 
 struct RingEquilibriumOptions {
-  double tolerance_mm = 1e-4;  ///< longest motion of a node in the last step
-  int most_evaluations = 60;   ///< of the gradient
-  double longest_step_mm = 8;  ///< turns: half a radian
+  double tolerance_mm = 1e-4;   ///< longest motion of a node in the last step
+  int most_evaluations = 60;    ///< of the gradient
+  double longest_step_mm = 8;   ///< rotations: half a radian
+  double least_radius_mm = -1;  ///< the search ends where a node comes closer to the axis
 };
 
 /// Finds a skin's equilibrium by minimizing its energy with L-BFGS [nocedal2006, section 7.2] and a line
@@ -24,21 +26,19 @@ class RingEquilibrium {
   struct Summary {
     bool converged = false;
     int evaluations = 0;
-    double last_step_mm = 0;
   };
   /// From `state` to an equilibrium. `dead_load`: by degree of freedom, forces alone (N); empty: none.
   Summary Solve(const RingStiffness& near, NonlinearShell::Loads loads, const Eigen::VectorXd& dead_load,
                 ShellState& state);
 
-  /// Response() and IsStable() then start from `near` alone.
-  void Forget() { pairs_.clear(); }
-
-  /// How forces move the skin about `state`, where the last Solve ended, to first order. `motion`: an
-  /// estimate of it (zeros where there is none), of which a last step of at most 5 percent is corrected.
-  /// `loads`: without dead ones. False: the stiffness there is not positive definite.
+  /// The first-order motion by forces (columns) about `state`, where the last Solve ended. `loads`: without
+  /// dead ones. `motions`: in, an estimate by column, zero where there is none; out, of which the last
+  /// correction was at most 5 percent. False: the stiffness there is not positive definite, or conjugate
+  /// gradients do not converge.
   bool Response(const RingStiffness& near, NonlinearShell::Loads loads, const ShellState& state,
-                const Eigen::VectorXd& forces, Eigen::VectorXd& motion);
-  /// Likewise: whether the equilibrium at `state` is stable, as far as sixteen conjugate gradients see.
+                const Eigen::Ref<const Eigen::MatrixXd>& forces, Eigen::Ref<Eigen::MatrixXd> motions);
+  /// Whether the equilibrium at `state` is stable, as far as sixteen conjugate gradients see. `loads`: as
+  /// for Response.
   bool IsStable(const RingStiffness& near, NonlinearShell::Loads loads, const ShellState& state);
 
  private:
@@ -50,9 +50,11 @@ class RingEquilibrium {
                   Eigen::VectorXd& gradient) const;
   /// The approximate inverse stiffness that the last Solve has come to.
   void Respond(const RingStiffness& near, const Eigen::VectorXd& forces, Eigen::VectorXd& motion) const;
-  bool FindResponse(const RingStiffness& near, NonlinearShell::Loads loads, const ShellState& state,
-                    const Eigen::VectorXd& forces, double least, Eigen::VectorXd& motion);
-  double ShareInBounds(const Eigen::VectorXd& step) const;
+  enum class Outcome : uint8_t { kConverged, kIndefinite, kUnsettled };
+  Outcome FindResponse(const RingStiffness& near, NonlinearShell::Loads loads, const ShellState& state,
+                       const Eigen::VectorXd& forces, double least, int most_iterations,
+                       Eigen::VectorXd& motion);
+  bool IsTooFarIn(const ShellState& state) const;
   void Remember(const Eigen::VectorXd& step, const Eigen::VectorXd& change);
 
   const NonlinearShell& shell_;

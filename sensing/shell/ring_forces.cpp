@@ -295,23 +295,10 @@ TACLINK_FOR_AVX512 double RunAvx512(const Arguments& in) {
   return Run<8>(in);
 }
 
-using Kernel = double (*)(const Arguments&);
-Kernel BestKernel() {
-  switch (BestInstructions()) {
-    case Instructions::kAvx512:
-      return RunAvx512;
-    case Instructions::kAvx2:
-      return RunAvx2;
-    case Instructions::kPlain:
-      break;
-  }
-  return RunPlain;
-}
-
 }  // namespace
 
 double RingElements::Forces(const RingField& state, double pressure_mpa, RingField* forces) const {
-  static const Kernel kKernel = BestKernel();
+  static double (*const kKernel)(const Arguments&) = BestOf(RunPlain, RunAvx2, RunAvx512);
   if (forces == nullptr) return kKernel({*this, state, pressure_mpa, nullptr});
   const auto rows = static_cast<int>(rings.size()) + 1;
   forces->Resize(rows, state.columns());

@@ -272,22 +272,6 @@ void SolvePlain(const SolveArguments& in) {
 TACLINK_FOR_AVX2 void SolveAvx2(const SolveArguments& in) {
   SolveAll(in);
 }
-TACLINK_FOR_AVX512 void SolveAvx512(const SolveArguments& in) {
-  SolveAll(in);
-}
-
-using SolveKernel = void (*)(const SolveArguments&);
-SolveKernel BestSolveKernel() {
-  switch (BestInstructions()) {
-    case Instructions::kAvx512:
-      return SolveAvx512;
-    case Instructions::kAvx2:
-      return SolveAvx2;
-    case Instructions::kPlain:
-      break;
-  }
-  return SolvePlain;
-}
 
 }  // namespace
 
@@ -323,7 +307,8 @@ void RingStiffness::Store(const std::vector<float>& by_column, Eigen::VectorXd& 
 
 void RingStiffness::Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const {
   assert(rhs.size() == dofs_ * columns_);
-  static const SolveKernel kKernel = BestSolveKernel();
+  // Eight lanes of single precision fill the registers of AVX2.
+  static void (*const kKernel)(const SolveArguments&) = BestOf(SolvePlain, SolveAvx2, SolveAvx2);
   thread_local std::vector<float> by_column, harmonic, spectrum;
   Load(rhs, by_column);
   harmonic.resize(static_cast<size_t>(2 * dofs_ * kLanes));
