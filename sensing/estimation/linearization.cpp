@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sensing/shell/node_steps.h"
+
 namespace taclink {
 namespace {
 
@@ -120,7 +122,6 @@ bool Linearization::Finish(const KnownLoads& loads) {
   const MarkerMap& map = mechanics_.markers();
   map.WriteJacobian(mechanics_.shell(), state_, jacobian_);
   responses_.Clear();
-  motion_by_loads_.resize(0, KnownLoads::kCount);
   map.Displacements(state_, base_mm_);
   stiffness_.Solve(gradient_, motion_);
   base_mm_.noalias() -= jacobian_ * motion_;
@@ -197,9 +198,7 @@ bool Linearization::Rebase(const ShellState& state, const KnownLoads& loads) {
 double Linearization::Step(const SiteLoads& loads, const Vec4& known_error, double longest_mm,
                            ShellState& state) {
   const NonlinearShell& shell = mechanics_.shell();
-  const bool has_motion = motion_by_loads_.rows() > 0;
-  Eigen::VectorXd force = -gradient_;
-  if (!has_motion) force -= gradient_by_loads_ * known_error;
+  Eigen::VectorXd force = -gradient_ - gradient_by_loads_ * known_error;
   for (int site = 0; site < mechanics_.site_count(); ++site) {
     const int node = mechanics_.NodeOfSite(site), dof = shell.Dof(node, 0);
     const Mat3& frame = frames_[static_cast<size_t>(site)];
@@ -210,12 +209,7 @@ double Linearization::Step(const SiteLoads& loads, const Vec4& known_error, doub
     force.segment<2>(dof + 3) += Moment(node, tangential) + Turning(node, couple);
   }
   stiffness_.Solve(force, motion_);
-  if (has_motion) motion_ += motion_by_loads_.cast<double>() * known_error;
-  double longest = 0;
-  for (int node = 0; node < shell.node_count(); ++node) {
-    if (const int dof = shell.Dof(node, 0); dof >= 0)
-      longest = std::max(longest, motion_.segment<3>(dof).norm());
-  }
+  const double longest = LongestTranslation(motion_);
   if (!std::isfinite(longest)) return longest;
   state = state_;
   shell.Step(std::min(1.0, longest_mm / std::max(longest, 1e-12)) * motion_, state);

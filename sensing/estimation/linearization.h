@@ -34,11 +34,6 @@ class Linearization {
   bool Rebase(const ShellState& state, const KnownLoads& loads);
   /// The same state under other known loads, to first order.
   void SetKnownLoads(const KnownLoads& loads);
-  /// Until it is made again, derivatives by known loads are those of this skin, which sags.
-  void TakeKnownLoadsFrom(const UntouchedSkin& skin) {
-    by_known_loads_ = skin.markers_by_loads;
-    motion_by_loads_ = skin.motion;
-  }
   bool is_made() const { return is_made_; }
   /// Linearized at an inflated skin: stiffness and columns are invariant under rotation.
   bool is_of_revolution() const { return stiffness_.is_of_revolution(); }
@@ -100,7 +95,6 @@ class Linearization {
   Eigen::VectorXd tangent_gradient_, tangent_base_mm_;
   Eigen::VectorXd gradient_, base_mm_, motion_;
   ByKnownLoads gradient_by_loads_, by_known_loads_;
-  Eigen::MatrixX4f motion_by_loads_;  // no rows: by the stiffness
   std::vector<Mat3> frames_;
 };
 

@@ -32,7 +32,6 @@ struct UntouchedSkin {
   const ShellState& about() const { return inflated ? inflated->state : state; }
   Eigen::VectorXd markers_mm;     ///< displacements from the slack skin without weight, stacked
   ByKnownLoads markers_by_loads;  ///< their derivatives, mm/MPa and mm/(m/s^2)
-  Eigen::MatrixX4f motion;        ///< likewise, of the degrees of freedom
 };
 
 /// What a link's estimates share: the shell, its markers, the sites where loads may act, and the skin under

@@ -56,7 +56,6 @@ bool Tangent::MakeUntouched(const SkinProblem& problem, const ShellState& state)
   local_n = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(skin.frames().size()));
   const bool is_made =
       is_kept || (inflated ? skin.At(inflated, problem.loads) : skin.At(state, problem.loads));
-  if (is_made && inflated) skin.TakeKnownLoadsFrom(problem.untouched);
   is_prepared = is_made && skin.Rebase(state, problem.loads) &&
                 loads.Prepare(skin, problem.untouched, problem.observed, problem.prior, local_n, nullptr);
   return is_prepared;

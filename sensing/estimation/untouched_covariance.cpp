@@ -12,6 +12,8 @@ namespace taclink {
 namespace {
 
 constexpr double kMostHidden = 0.25;  // of the markers: so many may be taken out of the problem
+// Of the markers: so many may be worse than their ring, each for three more columns of LoadEstimator.
+constexpr double kMostWorse = 0.1;
 
 bool IsMany(size_t hidden, size_t markers) {
   return static_cast<double>(hidden) > kMostHidden * static_cast<double>(markers);
@@ -73,9 +75,9 @@ Mat3 NoiseOfRing(const RingSpectrum& spectrum, const MarkerObservations& observe
   return sum / count;
 }
 
-// Camera noise averaged by ring; nullopt if more than kOtherNoiseShare of the markers differ from that by
-// more than kSameNoise, or if many are not seen in some direction: NoiseOfAll() gives these noise of another
-// size.
+// Camera noise averaged by ring; nullopt if more than kOtherNoiseShare of the markers are better than that by
+// more than kSameNoise, or kMostWorse worse, or if many are not seen in some direction: NoiseOfAll() gives
+// these noise of another size.
 std::optional<std::vector<Mat3>> NoiseByRing(const RingSpectrum& spectrum, const MarkerObservations& observed,
                                              const std::vector<Mat3>& noise_mm2, double unseen_mm) {
   const double least = 1 / (kUnseenShare * unseen_mm * unseen_mm);
@@ -86,17 +88,18 @@ std::optional<std::vector<Mat3>> NoiseByRing(const RingSpectrum& spectrum, const
   if (IsMany(static_cast<size_t>(hidden), noise_mm2.size())) return std::nullopt;
   const auto paths = static_cast<size_t>(spectrum.groups() * spectrum.period());
   std::vector<Mat3> by_ring;
-  int others = 0;
+  int better = 0, worse = 0;
   for (size_t first = 0; first < noise_mm2.size(); first += paths) {
     by_ring.push_back(NoiseOfRing(spectrum, observed, noise_mm2, first, unseen_mm));
     for (size_t m = first; m < first + paths; ++m) {
       const Mat3 frame = spectrum.FrameOf(static_cast<int>(m)).cast<double>();
       const auto [then, now] =
           ChangeOf(frame * by_ring.back() * frame.transpose(), observed.information[m], unseen_mm);
-      if (IsOther(then, now)) ++others;
+      if (IsOther(then, now)) ++(then > now ? better : worse);
     }
   }
-  if (others > kOtherNoiseShare * static_cast<double>(noise_mm2.size())) return std::nullopt;
+  const auto markers = static_cast<double>(noise_mm2.size());
+  if (better > kOtherNoiseShare * markers || worse > kMostWorse * markers) return std::nullopt;
   return by_ring;
 }
 

@@ -33,9 +33,9 @@ constexpr double kSameNoise = 2, kOtherNoiseShare = 0.02;
 /// the cameras' noise and of the model where nothing presses. Made of the skin without loads, it is shared by
 /// the tangents of the touched skin, which add what is more. Immutable.
 struct UntouchedCovariance {
-  /// Null: the covariance is not positive definite. If `skin` is of revolution and the cameras see the
-  /// markers of each ring about equally well, their noise is averaged over the ring, so that the covariance
-  /// is invariant under rotation.
+  /// Returns nullptr if the covariance is not positive definite. If `skin` is of revolution and the cameras
+  /// see few markers much better or worse than others of the same ring, their noise is averaged over the
+  /// ring, so that the covariance is invariant under rotation; what is worse is left to the tangents.
   static std::shared_ptr<const UntouchedCovariance> Make(Linearization& skin, const MarkerCovariance& model,
                                                          const MarkerObservations& observed,
                                                          const KnownLoadsPrior& prior);
@@ -45,7 +45,7 @@ struct UntouchedCovariance {
   bool IsGoodFor(const MarkerObservations& observed, const KnownLoadsPrior& prior) const;
 
   double unseen_mm = 0;            ///< standard deviation of a direction in which a marker is not seen
-  std::vector<Mat3> noise_mm2;     ///< by marker, of the cameras; usual ones where they do not see it
+  std::vector<Mat3> noise_mm2;     ///< by marker, of the cameras; the median where they do not see it
   std::vector<Mat3> marker_mm2;    ///< by marker, without noise, baseline and bow
   Eigen::MatrixXd by_baseline_mm;  ///< stacked, by the baseline's errors of known loads
   KnownLoadsErrors baseline_errors;

@@ -9,9 +9,9 @@ namespace {
 constexpr int kParts = 4;  // of SkinMechanics::pressure_step: the grid of pressures
 constexpr int kMostInflationSteps = 400, kMostForceSteps = 1'000'000;
 constexpr double kToleranceMm = 1e-4, kLongestStepMm = 8;  // in length units
-// Of the gradient: skins that stand clear of their tube take up to 60, those that buckle onto it 400 and
-// more.
-constexpr int kMostEvaluations = 150;
+// RingEquilibrium::Stability above which a skin does not become unstable within a step of the grid.
+constexpr double kSurelyStable = 0.5;
+constexpr double kResponseTolerance = 0.05;
 constexpr int kForgivenSteps = 2;   // that a pressure may be beyond what the skin stands
 constexpr double kSagStepMm = 0.5;  // in length units: by which a step of specific force moves the slack skin
 constexpr size_t kMostInflated = 24, kMostExpansions = 32;  // that are kept, some 0.15 MB each
@@ -25,7 +25,6 @@ constexpr double kAboutAsStiff = 0.25;
 RingEquilibriumOptions SearchOptions(const SkinMechanics& mechanics) {
   const double tube_mm = mechanics.model().tube_outer_radius_mm;
   return {.tolerance_mm = kToleranceMm * mechanics.length_unit(),
-          .most_evaluations = kMostEvaluations,
           .longest_step_mm = kLongestStepMm * mechanics.length_unit(),
           .least_radius_mm = tube_mm > 0 ? tube_mm : -1};
 }
@@ -44,10 +43,10 @@ UntouchedSkins::UntouchedSkins(const SkinMechanics& mechanics)
       equilibrium_(mechanics.shell(), SearchOptions(mechanics)),
       jacobian_(mechanics.markers().MakeJacobian(mechanics.shell())) {
   if (mechanics.mass_per_area() == 0) return;
-  const Expansion* slack = Expanded({});
-  if (slack == nullptr || !slack->is_found) return;  // nor is there one under any load
+  const Answer* slack = Expanded({});
+  if (slack == nullptr || !slack->is_found) return;
   const double mm_per_mps2 = slack->skin.markers_by_loads.rightCols<3>().cwiseAbs().maxCoeff();
-  specific_force_step_mps2_ = kSagStepMm * mechanics.length_unit() / mm_per_mps2;
+  if (mm_per_mps2 > 0) specific_force_step_mps2_ = kSagStepMm * mechanics.length_unit() / mm_per_mps2;
 }
 
 UntouchedSkins::~UntouchedSkins() = default;
@@ -91,18 +90,27 @@ const UntouchedSkin* UntouchedSkins::Find(const KnownLoads& loads) {
     return nullptr;
   ++calls_;
   if (const UntouchedSkin* skin = FindAt(at)) return skin;
-  // Less suction; less pressure does not help a skin that collapses under its weight.
-  auto part = static_cast<int>(std::trunc(at.pressure_mpa / part_mpa_));
-  if (part * part_mpa_ == at.pressure_mpa) ++part;
-  for (int i = 0; at.pressure_mpa < 0 && i <= kForgivenSteps * kParts; ++i, ++part) {
-    at.pressure_mpa = part * part_mpa_;
-    if (const UntouchedSkin* skin = FindAt(at)) return skin;
+  return at.pressure_mpa < 0 ? FindUnderLessSuction(at) : nullptr;
+}
+
+// At the strongest suction of the grid that the skin stands, by bisection; it stands all weaker ones.
+const UntouchedSkin* UntouchedSkins::FindUnderLessSuction(KnownLoads loads) {
+  auto fails = static_cast<int>(std::ceil(loads.pressure_mpa / part_mpa_)) - 1;
+  int stands = std::min(0, fails + kForgivenSteps * kParts);
+  const auto find = [&](int part) {
+    loads.pressure_mpa = part * part_mpa_;
+    return FindAt(loads);
+  };
+  if (find(stands) == nullptr) return nullptr;
+  while (stands - fails > 1) {
+    const int middle = fails + (stands - fails) / 2;
+    (find(middle) != nullptr ? stands : fails) = middle;
   }
-  return nullptr;
+  return find(stands);
 }
 
 const UntouchedSkin* UntouchedSkins::FindAt(const KnownLoads& loads) {
-  for (Recent& recent : recent_) {
+  for (Answer& recent : recent_) {
     if (recent.used == 0 || recent.skin.loads != loads) continue;
     recent.used = calls_;
     return recent.is_found ? &recent.skin : nullptr;
@@ -113,21 +121,26 @@ const UntouchedSkin* UntouchedSkins::FindAt(const KnownLoads& loads) {
         std::round(loads.specific_force_mps2[static_cast<Eigen::Index>(k) - 1] / specific_force_step_mps2_));
   const Inflation base = Base(loads.pressure_mpa);
   if (!base) return nullptr;
-  const Expansion* near = Expanded(point);
+  const Answer* near = Expanded(point);
   if (near == nullptr || !near->is_found) return nullptr;
-  Recent& found = *std::ranges::min_element(recent_, {}, &Recent::used);
+  Answer& found = *std::ranges::min_element(recent_, {}, &Answer::used);
   found.used = calls_;
   UntouchedSkin& skin = found.skin;
   skin.loads = loads;
   skin.state = near->skin.state;
-  mechanics_.shell().Step(near->motion * (loads.Stacked() - near->skin.loads.Stacked()), skin.state);
-  motion_ = near->motion;
-  found.is_found = Solve(*base, loads, skin.state) && WriteDerivatives(base, skin, motion_);
+  found.motion = near->motion;
+  found.stability = near->stability;
+  const Vec4 more = loads.Stacked() - near->skin.loads.Stacked();
+  mechanics_.shell().Step(found.motion.cast<double>() * more, skin.state);
+  // Under suction the inflated skin, too, may be about to buckle.
+  const bool is_surely_stable = loads.pressure_mpa >= 0 && found.stability > kSurelyStable;
+  found.is_found = Solve(*base, loads, skin.state) && (is_surely_stable || WriteStability(*base, found)) &&
+                   WriteDerivatives(base, found);
   return found.is_found ? &skin : nullptr;
 }
 
 // Returns nullptr if no inflated skin is stable at that pressure.
-const UntouchedSkins::Expansion* UntouchedSkins::Expanded(const GridPoint& point) {
+const UntouchedSkins::Answer* UntouchedSkins::Expanded(const GridPoint& point) {
   if (const auto found = expansions_.find(point); found != expansions_.end()) {
     found->second.used = calls_;
     return &found->second;
@@ -137,15 +150,13 @@ const UntouchedSkins::Expansion* UntouchedSkins::Expanded(const GridPoint& point
   if (!base && point[0] < 0) return Expanded({point[0] + 1, point[1], point[2], point[3]});
   if (!base) return nullptr;
   if (expansions_.size() >= kMostExpansions) EraseOldest(expansions_);
-  Expansion made;
+  Answer made;
   made.used = calls_;
   made.skin.loads = {point[0] * part_mpa_, specific_force_step_mps2_ * Vec3(point[1], point[2], point[3])};
   made.skin.state = base->state;
   made.motion.setZero(mechanics_.shell().dof_count(), KnownLoads::kCount);
-  made.is_found = Solve(*base, made.skin.loads, made.skin.state) &&
-                  WriteDerivatives(base, made.skin, made.motion) &&
-                  equilibrium_.IsStable(base->stiffness, PressureLoads(made.skin.loads.pressure_mpa).loads(),
-                                        made.skin.state);
+  made.is_found = Solve(*base, made.skin.loads, made.skin.state) && WriteStability(*base, made) &&
+                  WriteDerivatives(base, made);
   return &expansions_.emplace(point, std::move(made)).first->second;
 }
 
@@ -164,24 +175,34 @@ bool UntouchedSkins::IsClearOfTube(const ShellState& state) const {
          });
 }
 
-// Completes `skin` at its state. `motion`: in and out, see RingEquilibrium::Response. False: the equilibrium
-// is not stable.
-bool UntouchedSkins::WriteDerivatives(const Inflation& base, UntouchedSkin& skin, ByKnownLoads& motion) {
+// False: the equilibrium is not stable.
+bool UntouchedSkins::WriteStability(const InflatedSkin& base, Answer& answer) {
+  const PressureLoads pressure(answer.skin.loads.pressure_mpa);
+  answer.stability = equilibrium_.Stability(base.stiffness, pressure.loads(), answer.skin.state);
+  return answer.stability > 0;
+}
+
+// Completes the skin at its state; `motion` is first an estimate. False: see RingEquilibrium::Response.
+bool UntouchedSkins::WriteDerivatives(const Inflation& base, Answer& answer) {
+  UntouchedSkin& skin = answer.skin;
   const MarkerMap& map = mechanics_.markers();
   map.Displacements(skin.state, skin.markers_mm);
   map.WriteJacobian(mechanics_.shell(), skin.state, jacobian_);
   mechanics_.GradientByLoads(skin.state, gradient_);
   const PressureLoads pressure(skin.loads.pressure_mpa);
-  if (!equilibrium_.Response(base->stiffness, pressure.loads(), skin.state, -gradient_, motion)) return false;
-  by_base_.setZero(motion.rows(), KnownLoads::kCount);
+  motion_ = answer.motion.cast<double>();
+  const double tolerance = kResponseTolerance * std::min(1.0, answer.stability);
+  if (!equilibrium_.Response(base->stiffness, pressure.loads(), skin.state, -gradient_, tolerance, motion_))
+    return false;
+  answer.motion = motion_.cast<float>();
+  by_base_.setZero(motion_.rows(), KnownLoads::kCount);
   Eigen::VectorXd moved;
   for (int k = 0; k < KnownLoads::kCount; ++k) {
     if (gradient_.col(k).isZero(0)) continue;
     base->stiffness.Solve(-gradient_.col(k), moved);
     by_base_.col(k) = moved;
   }
-  skin.markers_by_loads = jacobian_ * motion;
-  skin.motion = motion.cast<float>();
+  skin.markers_by_loads = jacobian_ * motion_;
   const ByKnownLoads off = skin.markers_by_loads - jacobian_ * by_base_;
   const bool is_stiff_as_base =
       (off.colwise().norm().array() <= kAboutAsStiff * skin.markers_by_loads.colwise().norm().array()).all();

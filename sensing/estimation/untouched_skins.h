@@ -14,7 +14,7 @@ namespace taclink {
 /// Finds the equilibrium under any known loads. Under pressure alone the skin is axisymmetric (InflatedSkin);
 /// those of the last pressures, on a fine grid, are kept. RingEquilibrium then solves for the given loads
 /// with the stiffness of the inflated skin, started from a first-order expansion about the nearest point of a
-/// grid of loads (Expansion). The result is an equilibrium of exactly these loads, which is stable and clear
+/// grid of loads. The result is an equilibrium of exactly these loads, which is stable and clear
 /// of the tube. Not thread-safe.
 class UntouchedSkins {
  public:
@@ -28,23 +28,25 @@ class UntouchedSkins {
  private:
   /// Pressure in parts of a step, specific force in steps.
   using GridPoint = std::array<int, KnownLoads::kCount>;
-  /// An equilibrium with the derivatives of its degrees of freedom by the known loads.
-  struct Expansion {
+  struct Answer {
     bool is_found = false;
     UntouchedSkin skin;
-    ByKnownLoads motion;
-    uint64_t used = 0;  // when, in calls
+    Eigen::MatrixX4f motion;  // derivatives of the degrees of freedom by the known loads
+    double stability = 0;     // see RingEquilibrium
+    uint64_t used = 0;        // when, in calls; 0: never
   };
 
   using Inflation = std::shared_ptr<const InflatedSkin>;
 
   Inflation Inflated(int part);
   Inflation Base(double pressure_mpa);
-  const Expansion* Expanded(const GridPoint& point);
+  const Answer* Expanded(const GridPoint& point);
   const UntouchedSkin* FindAt(const KnownLoads& loads);
   bool Solve(const InflatedSkin& base, const KnownLoads& loads, ShellState& state);
   bool IsClearOfTube(const ShellState& state) const;
-  bool WriteDerivatives(const Inflation& base, UntouchedSkin& skin, ByKnownLoads& motion);
+  bool WriteStability(const InflatedSkin& base, Answer& answer);
+  bool WriteDerivatives(const Inflation& base, Answer& answer);
+  const UntouchedSkin* FindUnderLessSuction(KnownLoads loads);
 
   const SkinMechanics& mechanics_;
   const double part_mpa_;
@@ -58,15 +60,9 @@ class UntouchedSkins {
     uint64_t used = 0;  // when, in calls
   };
   std::map<int, CachedInflation> inflated_;  // by parts
-  std::map<GridPoint, Expansion> expansions_;
+  std::map<GridPoint, Answer> expansions_;
   uint64_t calls_ = 0;
-  /// What was asked for last; used 0: nothing.
-  struct Recent {
-    bool is_found = false;
-    UntouchedSkin skin;
-    uint64_t used = 0;  // when, in calls
-  };
-  std::array<Recent, 8> recent_;
+  std::array<Answer, 8> recent_;  // to what was asked for last
 };
 
 }  // namespace taclink

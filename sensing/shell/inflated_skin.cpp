@@ -14,6 +14,7 @@ namespace {
 constexpr int kEven = 3;  // of a node's degrees of freedom, under reflection
 constexpr std::array<Eigen::Index, kEven> kEvenDofs = {0, 2, 3};
 constexpr int kMostNewtonSteps = 60, kMostNewtonHalvings = 30, kMostInflations = 64;
+constexpr int kMostStepsOfAll = 150;        // of Newton's method, of all pressures on the way
 constexpr double kToleranceShare = 1e-11;   // of Young's modulus times thickness squared: N
 constexpr double kNoStepShare = 1e-11;      // of the thickness
 constexpr double kLongestStepShare = 0.15;  // of the radius
@@ -103,14 +104,15 @@ void Move(const NonlinearShell& shell, double share, const Eigen::VectorXd& step
   }
 }
 
-// Newton's method from a state nearby; `column` is then of where it ends. False: it finds no equilibrium.
-bool Settle(const NonlinearShell& shell, Column& column, ShellState& state) {
+// Newton's method from a state nearby, in at most `left` steps; `column` is then of where it ends. False: it
+// finds no equilibrium.
+bool Settle(const NonlinearShell& shell, Column& column, int& left, ShellState& state) {
   const double modulus_mpa = shell.material().youngs_modulus_mpa, thickness_mm = shell.surface().thickness_mm;
   const double tolerance_n = kToleranceShare * modulus_mpa * thickness_mm * thickness_mm;
   const double longest_mm = kLongestStepShare * shell.surface().mids_mm.front().head<2>().norm();
   double energy_nmm = column.Set(state);
   Eigen::VectorXd step;
-  for (int iteration = 0; iteration < kMostNewtonSteps; ++iteration) {
+  for (int iteration = 0; iteration < kMostNewtonSteps && left > 0; ++iteration, --left) {
     if (column.LargestForce() <= tolerance_n) return true;
     double slope = 0;
     if (!column.FindStep(step, slope)) return false;
@@ -138,13 +140,14 @@ bool Settle(const NonlinearShell& shell, Column& column, ShellState& state) {
 // At once or, where the slack skin would not stand that pressure, in steps.
 std::optional<InflatedSkin> Inflate(const NonlinearShell& shell, double pressure_mpa) {
   assert(RingBlocks::Fit(shell));
-  for (int steps = 1; steps <= kMostInflations; steps *= 4) {
+  int left = kMostStepsOfAll;
+  for (int steps = 1; steps <= kMostInflations && left > 0; steps *= 4) {
     ShellState state = shell.Rest();
     std::optional<Column> column;
     bool stands = true;
     for (int step = 1; step <= steps && stands; ++step) {
       column.emplace(shell, pressure_mpa * step / steps);
-      stands = Settle(shell, *column, state);
+      stands = Settle(shell, *column, left, state);
     }
     if (!stands) continue;
     const int columns = shell.rings()->columns();

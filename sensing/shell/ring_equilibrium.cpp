@@ -1,5 +1,6 @@
 #include "sensing/shell/ring_equilibrium.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,9 +16,9 @@ constexpr size_t kMostPairs = 8;
 constexpr int kMostHalvings = 12;
 constexpr double kMostTurn = 0.5;
 constexpr double kDifferenceShare = 3e-4;  // of the thickness: a node's motion, for differences of gradients
-constexpr int kStabilityIterations = 16, kMostResponseIterations = 60;
-constexpr double kStabilityStep = 1e-3, kResponseStep = 0.05;  // the last one's share of the motion
-constexpr double kLeastCurvature = 1e-10;                      // of a pair, by the product of its lengths
+constexpr int kStabilityIterations = 24, kMostResponseIterations = 60;
+constexpr double kStabilityTolerance = 1e-3;
+constexpr double kLeastCurvature = 1e-10;  // of a pair, by the product of its lengths
 
 }  // namespace
 
@@ -105,12 +106,13 @@ RingEquilibrium::Summary RingEquilibrium::Solve(const RingStiffness& near, Nonli
 }
 
 // Conjugate gradients [golub2013], preconditioned by the pairs of Solve; products with the stiffness are
-// differences to `gradient_`, which is that at `state`. Converged: the next step is a share `least` of the
-// motion.
+// differences to `gradient_`, which is that at `state`. Converged: the next step is a share `tolerance` of
+// the motion.
 RingEquilibrium::Outcome RingEquilibrium::FindResponse(const RingStiffness& near, NonlinearShell::Loads loads,
                                                        const ShellState& state, const Eigen::VectorXd& forces,
-                                                       double least, int most_iterations,
-                                                       Eigen::VectorXd& motion) {
+                                                       double tolerance, int most_iterations,
+                                                       Eigen::VectorXd& motion,
+                                                       std::vector<Coefficients>* coefficients) {
   const double thickness_mm = shell_.surface().thickness_mm;
   const auto times_stiffness = [&](const Eigen::VectorXd& direction, Eigen::VectorXd& product) {
     const double share = kDifferenceShare * thickness_mm / LongestMotion(direction, thickness_mm);
@@ -127,15 +129,17 @@ RingEquilibrium::Outcome RingEquilibrium::FindResponse(const RingStiffness& near
   double last_product = 1;
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
     Respond(near, left, next_step);
-    if (LongestMotion(next_step, thickness_mm) <= least * LongestMotion(motion, thickness_mm)) {
-      motion += next_step;  // its step length is 1 to within `least`
+    if (LongestMotion(next_step, thickness_mm) <= tolerance * LongestMotion(motion, thickness_mm)) {
+      motion += next_step;  // whose step length is about 1
       return motion.allFinite() ? Outcome::kConverged : Outcome::kUnsettled;
     }
     const double product = left.dot(next_step);
-    direction = next_step + product / last_product * direction;
+    const double ratio = iteration > 0 ? product / last_product : 0;
+    direction = next_step + ratio * direction;
     last_product = product;
     times_stiffness(direction, stiff);
     const double length = product / direction.dot(stiff);
+    if (coefficients != nullptr) coefficients->push_back({length, ratio});
     if (!(length > 0) || !std::isfinite(length)) return Outcome::kIndefinite;
     motion += length * direction;
     left -= length * stiff;
@@ -145,12 +149,12 @@ RingEquilibrium::Outcome RingEquilibrium::FindResponse(const RingStiffness& near
 
 bool RingEquilibrium::Response(const RingStiffness& near, NonlinearShell::Loads loads,
                                const ShellState& state, const Eigen::Ref<const Eigen::MatrixXd>& forces,
-                               Eigen::Ref<Eigen::MatrixXd> motions) {
+                               double tolerance, Eigen::Ref<Eigen::MatrixXd> motions) {
   shell_.Gradient(state, loads, gradient_);
   Eigen::VectorXd motion;
   for (Eigen::Index k = 0; k < forces.cols(); ++k) {
     motion = motions.col(k);
-    if (FindResponse(near, loads, state, forces.col(k), kResponseStep, kMostResponseIterations, motion) !=
+    if (FindResponse(near, loads, state, forces.col(k), tolerance, kMostResponseIterations, motion) !=
         Outcome::kConverged)
       return false;
     motions.col(k) = motion;
@@ -158,18 +162,33 @@ bool RingEquilibrium::Response(const RingStiffness& near, NonlinearShell::Loads 
   return true;
 }
 
-// Directions of conjugate gradients have positive curvature as long as the stiffness is positive definite in
-// the space that they span. Started from a random force, that space first contains directions that are soft
-// relative to the preconditioner.
-bool RingEquilibrium::IsStable(const RingStiffness& near, NonlinearShell::Loads loads,
-                               const ShellState& state) {
+// The coefficients of conjugate gradients make up the tridiagonal matrix of Lanczos' method [golub2013,
+// section 11.3], whose eigenvalues are the Ritz values. Started from a random force, which excites all modes.
+double RingEquilibrium::Stability(const RingStiffness& near, NonlinearShell::Loads loads,
+                                  const ShellState& state) {
   std::minstd_rand random(1);
   std::uniform_real_distribution<double> number(-1, 1);
   Eigen::VectorXd forces(shell_.dof_count()), motion = Eigen::VectorXd::Zero(shell_.dof_count());
   for (double& force : forces) force = number(random);
   shell_.Gradient(state, loads, gradient_);
-  return FindResponse(near, loads, state, forces, kStabilityStep, kStabilityIterations, motion) !=
-         Outcome::kIndefinite;
+  std::vector<Coefficients> all;
+  if (FindResponse(near, loads, state, forces, kStabilityTolerance, kStabilityIterations, motion, &all) ==
+      Outcome::kIndefinite)
+    return 0;
+  const auto count = static_cast<Eigen::Index>(all.size());
+  Eigen::VectorXd diagonal(count), beside(std::max<Eigen::Index>(count - 1, 0));
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Coefficients& at = all[static_cast<size_t>(i)];
+    diagonal[i] = 1 / at.length;
+    if (i == 0) continue;
+    const double before = all[static_cast<size_t>(i) - 1].length;
+    diagonal[i] += at.ratio / before;
+    beside[i - 1] = std::sqrt(at.ratio) / before;
+  }
+  if (count == 0) return 1;
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
+  ritz.computeFromTridiagonal(diagonal, beside, Eigen::EigenvaluesOnly);
+  return ritz.eigenvalues().minCoeff();
 }
 
 }  // namespace taclink

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "sensing/model/model_file.h"
 #include "sensing/shell/equilibrium.h"
@@ -131,6 +133,37 @@ TEST_P(SkinMechanicsTest, StandsLittleSuctionUnderItsWeight) {
     EXPECT_LE(skin->loads.pressure_mpa, 0);
     EXPECT_LT(Largest(skin->markers_mm - Solved(skin->loads)), 2e-3 * mechanics_.length_unit());
   }
+}
+
+// Against the inertia and the solutions of the Hessian: suction at which the grid's next point is stable, and
+// sideways loads up to where the skin falls onto its tube.
+TEST_P(SkinMechanicsTest, IsStableWithItsDerivatives) {
+  const double step = mechanics_.pressure_step();
+  std::vector<KnownLoads> all;
+  for (double steps = -1; steps < -0.5; steps += 0.043) all.push_back({steps * step, {0, 0, 9.8}});
+  for (double across_mps2 = 4; across_mps2 < 20; across_mps2 *= 1.15) all.push_back({0, {across_mps2, 0, 1}});
+  Eigen::SparseMatrix<double> hessian = mechanics_.shell().Pattern();
+  Eigen::VectorXd gradient;
+  ByKnownLoads by_loads;
+  MarkerMap::Jacobian jacobian = mechanics_.markers().MakeJacobian(mechanics_.shell());
+  int found = 0;
+  for (const KnownLoads& loads : all) {
+    const UntouchedSkin* skin = mechanics_.Untouched(loads);
+    if (skin == nullptr) continue;
+    ++found;
+    const AppliedLoads applied(mechanics_, skin->loads);
+    mechanics_.shell().Hessian(skin->state, applied.loads(), gradient, hessian);
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(hessian);
+    EXPECT_GT(factor.vectorD().minCoeff(), 0) << loads.Stacked().transpose();
+    mechanics_.GradientByLoads(skin->state, by_loads);
+    mechanics_.markers().WriteJacobian(mechanics_.shell(), skin->state, jacobian);
+    for (int k = 0; k < KnownLoads::kCount; ++k) {
+      const Eigen::VectorXd expected = -(jacobian * factor.solve(by_loads.col(k)));
+      EXPECT_LT((skin->markers_by_loads.col(k) - expected).norm(), 0.08 * expected.norm())
+          << loads.Stacked().transpose() << ", by " << k;
+    }
+  }
+  EXPECT_GE(found, 10);
 }
 
 // A model that does not say how heavy its skin is: as if it were weightless.

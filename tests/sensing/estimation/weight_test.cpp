@@ -78,9 +78,16 @@ TEST_F(WeightTest, LeavesContactsAsTheyAre) {
       if (!is_known) TellNothing(observation.loads);
       estimator_.Estimate(observation, estimate_);
       ASSERT_EQ(estimate_.failure, EstimateFailure::kNone) << is_known;
-      ASSERT_EQ(estimate_.loads.loads.size(), 1u) << is_known << " " << force_n;
-      EXPECT_LT((estimate_.loads.loads[0].force_n - truth).norm(), std::max(0.015, 0.1 * force_n))
-          << is_known << " " << estimate_.loads.loads[0].force_n.transpose();
+      // The weakest one may be told as two neighbors: chi^2 per number is 0.61 to 0.62 with either, so that
+      // rounding decides.
+      ASSERT_GE(estimate_.loads.loads.size(), 1U) << is_known << " " << force_n;
+      EXPECT_LE(estimate_.loads.loads.size(), force_n < 0.1 ? 2U : 1U) << is_known << " " << force_n;
+      Vec3 sum = Vec3::Zero();
+      for (const EstimatedLoad& load : estimate_.loads.loads) {
+        sum += load.force_n;
+        EXPECT_LT((load.center - Vec2(5, 9.6)).norm(), 2.5) << is_known << " " << load.center.transpose();
+      }
+      EXPECT_LT((sum - truth).norm(), std::max(0.015, 0.1 * force_n)) << is_known << " " << sum.transpose();
     }
   }
 }
