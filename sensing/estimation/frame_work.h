@@ -6,13 +6,13 @@ namespace taclink {
 
 /// What a frame has cost so far. Counted and not timed, so that the same frames always get the same answers.
 struct FrameWork {
-  int assimilation_steps = 0;
-  int tangents = 0;  ///< made in the frame's way
+  int evaluations = 0;  ///< of the skin's forces, by Assimilation
+  int tangents = 0;     ///< made in the frame's way
   int steps = 0;
   int trials = 0;  ///< of answers to which contacts there are (LoadEstimate::trials)
 
   /// About how many residuals with a back-substitution, at the default mesh.
-  int Units() const { return 15 * assimilation_steps + 40 * tangents + 10 * steps + trials / 2; }
+  int Units() const { return evaluations / 3 + 40 * tangents + 10 * steps + trials / 2; }
 
   static constexpr int kUnlimited = std::numeric_limits<int>::max();
   /// What a frame of a live link may cost. Of two thousand frames of known truth on the cylinder no right one

@@ -32,7 +32,7 @@ void LoadEstimator::ShareBands(const Eigen::VectorXd& inward_n, const std::vecto
 
 // Hills that have no more than a row between them may be parts of one hug; those further along the link are
 // other bodies'.
-void LoadEstimator::JoinHugs(std::vector<Hill>& hills) {
+void LoadEstimator::JoinHugs(const Linearization& skin, std::vector<Hill>& hills) {
   const int around = mechanics_.columns();
   std::vector<size_t> order(hills.size());
   for (size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -46,7 +46,7 @@ void LoadEstimator::JoinHugs(std::vector<Hill>& hills) {
     groups.back().push_back(i);
     end = std::max(end, last(i));
   }
-  for (const std::vector<size_t>& group : groups) JoinHug(hills, group);
+  for (const std::vector<size_t>& group : groups) JoinHug(skin, hills, group);
   std::erase_if(hills, [](const Hill& hill) { return hill.empty(); });
 }
 
@@ -54,7 +54,8 @@ void LoadEstimator::JoinHugs(std::vector<Hill>& hills) {
 // contacts that differ from frame to frame, for what it does to an inflated skin is little beside what each
 // of its sites would do alone. Several contacts are believed if they explain more than the bands do by what
 // a contact has to explain, each. On solids, bodies that stand around the skin do by ten times as much.
-void LoadEstimator::JoinHug(std::vector<Hill>& hills, const std::vector<size_t>& group) {
+void LoadEstimator::JoinHug(const Linearization& skin, std::vector<Hill>& hills,
+                            const std::vector<size_t>& group) {
   const int sites = mechanics_.site_count(), around = mechanics_.columns();
   std::vector<char> is_loaded(static_cast<size_t>(around), 0);
   int first = mechanics_.site_rows(), last = 0;
@@ -68,6 +69,7 @@ void LoadEstimator::JoinHug(std::vector<Hill>& hills, const std::vector<size_t>&
   if (WidestFree(is_loaded) > kMostFree) return;
   std::vector<Hill> with_hug = {{}};
   for (int row = first; row <= last; ++row) with_hug.front().push_back(sites + row);
+  AddColumns(skin, with_hug.front());
   for (size_t i = 0; i < hills.size(); ++i) {
     if (std::find(group.begin(), group.end(), i) == group.end()) with_hug.push_back(hills[i]);
   }

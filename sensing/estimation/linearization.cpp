@@ -17,11 +17,7 @@ constexpr double kNearClampMm = 30, kOwnNormalShare = 0.35;
 }  // namespace
 
 Linearization::Linearization(const SkinMechanics& mechanics)
-    : mechanics_(mechanics),
-      stiffness_(mechanics),
-      jacobian_(mechanics.markers().MakeJacobian(mechanics.shell())),
-      responses_(mechanics, jacobian_),
-      frames_(static_cast<size_t>(mechanics.site_count())) {}
+    : mechanics_(mechanics), frames_(static_cast<size_t>(mechanics.site_count())) {}
 
 // Directors smoothed over neighbours: a body is smoother than a mesh.
 void Linearization::SetFrames() {
@@ -71,22 +67,23 @@ Vec2 Linearization::Moment(int node, const Vec3& direction) const {
   return Turning(node, mechanics_.model().thickness_mm / 2 * d.cross(direction));
 }
 
-Eigen::MatrixXf Linearization::CoupleColumns(const Eigen::VectorXd& shares) const {
-  Eigen::MatrixXf columns = Eigen::MatrixXf::Zero(jacobian_.rows(), 2);
-  for (int site = 0; site < mechanics_.site_count(); ++site) {
-    if (shares[site] == 0) continue;
-    const int node = mechanics_.NodeOfSite(site);
-    for (int k = 0; k < 2; ++k) {
-      const Vec2 turning = shares[site] * Turning(node, frames_[static_cast<size_t>(site)].col(k + 1));
-      columns.col(k) += responses_.At(site).rightCols<2>().lazyProduct(turning.cast<float>());
-    }
-  }
-  return columns;
+LoadCases::Load Linearization::ForceAt(Direction direction, int site) const {
+  const Vec3 force = frames_[static_cast<size_t>(site)].col(direction);
+  LoadCases::Load load = LoadCases::Load::Zero();
+  load.head<3>() = force;
+  if (direction != kInward) load.tail<2>() = Moment(mechanics_.NodeOfSite(site), force);
+  return load;
+}
+
+LoadCases::Load Linearization::CoupleAt(Direction axis, int site) const {
+  LoadCases::Load load = LoadCases::Load::Zero();
+  load.tail<2>() = Turning(mechanics_.NodeOfSite(site), frames_[static_cast<size_t>(site)].col(axis));
+  return load;
 }
 
 // (J K^-1 B)' = B' K^-1 J'.
 std::array<Eigen::VectorXd, 3> Linearization::PulledAtSites(const Eigen::VectorXd& at_markers) {
-  stiffness_.Solve(jacobian_.transpose() * at_markers, motion_);
+  compliance_->Solve(compliance_->jacobian().transpose() * at_markers, motion_);
   std::array<Eigen::VectorXd, 3> pulled;
   for (auto& part : pulled) part.resize(mechanics_.site_count());
   for (int site = 0; site < mechanics_.site_count(); ++site) {
@@ -102,34 +99,43 @@ std::array<Eigen::VectorXd, 3> Linearization::PulledAtSites(const Eigen::VectorX
 }
 
 bool Linearization::At(const ShellState& state, const KnownLoads& loads) {
-  is_made_ = false;
-  state_ = tangent_state_ = state;
-  return stiffness_.Set(state_, loads, gradient_) && Finish(loads);
+  if (!block_) block_ = std::make_unique<BlockCompliance>(mechanics_);
+  round_.reset();
+  compliance_ = block_.get();
+  return block_->Set(state, loads.pressure_mpa) && Finish(state, loads);
+}
+
+bool Linearization::At(const ShellState& state, const KnownLoads& loads,
+                       std::shared_ptr<const RoundCompliance> round, std::vector<int> patch) {
+  if (!patch_) patch_ = std::make_unique<PatchCompliance>(mechanics_);
+  round_.reset();
+  compliance_ = patch_.get();
+  return patch_->Set(std::move(round), state, loads.pressure_mpa, std::move(patch)) && Finish(state, loads);
 }
 
 bool Linearization::At(const std::shared_ptr<const InflatedSkin>& skin, const KnownLoads& loads) {
-  is_made_ = false;
-  stiffness_.Set(skin);
-  state_ = tangent_state_ = skin->state;
-  mechanics_.shell().Gradient(state_, AppliedLoads(mechanics_, loads).loads(), gradient_);
-  return gradient_.allFinite() && Finish(loads);
+  round_ = std::make_shared<const RoundCompliance>(mechanics_, skin);
+  compliance_ = round_.get();
+  return Finish(skin->state, loads);
 }
 
 // All that does not depend on how the stiffness was factored.
-bool Linearization::Finish(const KnownLoads& loads) {
+bool Linearization::Finish(const ShellState& state, const KnownLoads& loads) {
+  is_made_ = false;
+  state_ = tangent_state_ = state;
   loads_ = loads;
+  mechanics_.Gradient(state_, loads, gradient_);
+  if (!gradient_.allFinite()) return false;
   mechanics_.GradientByLoads(state_, gradient_by_loads_);
-  const MarkerMap& map = mechanics_.markers();
-  map.WriteJacobian(mechanics_.shell(), state_, jacobian_);
-  responses_.Clear();
-  map.Displacements(state_, base_mm_);
-  stiffness_.Solve(gradient_, motion_);
-  base_mm_.noalias() -= jacobian_ * motion_;
-  by_known_loads_.setZero(jacobian_.rows(), KnownLoads::kCount);
+  const MarkerMap::Jacobian& jacobian = compliance_->jacobian();
+  mechanics_.markers().Displacements(state_, base_mm_);
+  compliance_->Solve(gradient_, motion_);
+  base_mm_.noalias() -= jacobian * motion_;
+  by_known_loads_.setZero(jacobian.rows(), KnownLoads::kCount);
   for (int k = 0; k < KnownLoads::kCount; ++k) {
     if (gradient_by_loads_.col(k).isZero(0)) continue;
-    stiffness_.Solve(gradient_by_loads_.col(k), motion_);
-    by_known_loads_.col(k).noalias() = -(jacobian_ * motion_);
+    compliance_->Solve(gradient_by_loads_.col(k), motion_);
+    by_known_loads_.col(k).noalias() = -(jacobian * motion_);
   }
   tangent_loads_ = loads;
   tangent_gradient_ = gradient_;
@@ -137,34 +143,6 @@ bool Linearization::Finish(const KnownLoads& loads) {
   SetFrames();
   is_made_ = base_mm_.allFinite() && by_known_loads_.allFinite();
   return is_made_;
-}
-
-Eigen::MatrixXf Linearization::RingColumns() const {
-  const int around = mechanics_.columns(), rings = mechanics_.site_rows();
-  MarkerResponses::LoadRows rows(mechanics_, rings);
-  for (int ring = 0; ring < rings; ++ring) {
-    for (int i = 0; i < around; ++i) {
-      const int site = ring * around + i;
-      for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics_.spread(), site); it; ++it) {
-        const auto loaded = static_cast<int>(it.row());
-        const int dof = mechanics_.shell().Dof(mechanics_.NodeOfSite(loaded), 0);
-        const Vec3 force = it.value() / around * frames_[static_cast<size_t>(loaded)].col(kInward);
-        rows.loads.block<1, 3>(ring, dof) += force.transpose().cast<float>();
-        rows.Fill(ring, dof);
-      }
-    }
-  }
-  return responses_.Of(stiffness_, std::move(rows));
-}
-
-Eigen::VectorXf Linearization::Column(Direction direction, int site) const {
-  assert(responses_.Has(site));
-  const int node = mechanics_.NodeOfSite(site);
-  const Vec3 force = frames_[static_cast<size_t>(site)].col(direction);
-  const Vec2 moment = direction == kInward ? Vec2::Zero() : Moment(node, force);
-  Eigen::Matrix<float, kNodeDofs, 1> load;
-  load << force.cast<float>(), moment.cast<float>();
-  return responses_.At(site).lazyProduct(load);
 }
 
 void Linearization::SetKnownLoads(const KnownLoads& loads) {
@@ -187,11 +165,11 @@ bool Linearization::Rebase(const ShellState& state, const KnownLoads& loads) {
     SetKnownLoads(loads);
     return base_mm_.allFinite();
   }
-  mechanics_.shell().Gradient(state_, AppliedLoads(mechanics_, loads).loads(), gradient_);
+  mechanics_.Gradient(state_, loads, gradient_);
   if (!gradient_.allFinite()) return false;
-  stiffness_.Solve(gradient_, motion_);
+  compliance_->Solve(gradient_, motion_);
   mechanics_.markers().Displacements(state_, base_mm_);
-  base_mm_.noalias() -= jacobian_ * motion_;
+  base_mm_.noalias() -= compliance_->jacobian() * motion_;
   return base_mm_.allFinite();
 }
 
@@ -208,7 +186,7 @@ double Linearization::Step(const SiteLoads& loads, const Vec4& known_error, doub
     force.segment<3>(dof) += load;
     force.segment<2>(dof + 3) += Moment(node, tangential) + Turning(node, couple);
   }
-  stiffness_.Solve(force, motion_);
+  compliance_->Solve(force, motion_);
   const double longest = LongestTranslation(motion_);
   if (!std::isfinite(longest)) return longest;
   state = state_;
@@ -218,7 +196,7 @@ double Linearization::Step(const SiteLoads& loads, const Vec4& known_error, doub
 
 void Linearization::FirstOrderMarkers(Eigen::VectorXd& stacked_mm) const {
   mechanics_.markers().Displacements(state_, stacked_mm);
-  stacked_mm.noalias() += jacobian_ * motion_;
+  stacked_mm.noalias() += compliance_->jacobian() * motion_;
 }
 
 }  // namespace taclink

@@ -6,9 +6,11 @@
 #include <span>
 #include <vector>
 
-#include "sensing/estimation/marker_responses.h"
+#include "sensing/estimation/block_compliance.h"
+#include "sensing/estimation/load_cases.h"
+#include "sensing/estimation/patch_compliance.h"
+#include "sensing/estimation/round_compliance.h"
 #include "sensing/estimation/skin_mechanics.h"
-#include "sensing/estimation/skin_stiffness.h"
 
 namespace taclink {
 
@@ -23,20 +25,25 @@ class Linearization {
   Linearization(const Linearization&) = delete;
   Linearization& operator=(const Linearization&) = delete;
 
-  /// Makes everything again. False: the stiffness is singular there, or not finite.
+  /// By BlockCompliance. False: the stiffness is singular there, or not finite.
   bool At(const ShellState& state, const KnownLoads& loads);
-  /// Linearizes at an inflated skin, with its factored stiffness. Columns of all sites are rotations of those
-  /// of the first ones.
+  /// At an inflated skin, by RoundCompliance.
   bool At(const std::shared_ptr<const InflatedSkin>& skin, const KnownLoads& loads);
+  /// By PatchCompliance: `patch` has the sites where `state` is not about that of `round`.
+  bool At(const ShellState& state, const KnownLoads& loads, std::shared_ptr<const RoundCompliance> round,
+          std::vector<int> patch);
   /// Moves to a state nearby and keeps stiffness, columns and frames: only what the skin is out of balance by
   /// is that of the new state, exactly. What steps lead to is then the same equilibrium, in more of them.
   /// False: not finite.
   bool Rebase(const ShellState& state, const KnownLoads& loads);
   /// The same state under other known loads, to first order.
   void SetKnownLoads(const KnownLoads& loads);
+  const SkinMechanics& mechanics() const { return mechanics_; }
   bool is_made() const { return is_made_; }
+  /// Null: it was not linearized at an inflated skin.
+  const std::shared_ptr<const RoundCompliance>& round() const { return round_; }
   /// Linearized at an inflated skin: stiffness and columns are invariant under rotation.
-  bool is_of_revolution() const { return stiffness_.is_of_revolution(); }
+  bool is_of_revolution() const { return round_ != nullptr; }
 
   const ShellState& state() const { return state_; }
   /// Where stiffness, columns and frames are from.
@@ -44,22 +51,15 @@ class Linearization {
   const Eigen::VectorXd& base_mm() const { return base_mm_; }
   /// Directions of the load of a site, in its frame.
   enum Direction { kInward, kAround, kAlong };
-  /// Makes the columns of these sites, where they are not made yet: one solution for all.
-  void MakeColumns(std::span<const int> sites) { responses_.Make(stiffness_, sites); }
-  /// Displacement of the stacked markers by a load that acts on a site's node alone, mm/N. The site's columns
-  /// must have been made.
-  Eigen::VectorXf Column(Direction direction, int site) const;
-  /// Likewise, of 1 N inward that a row of sites shares, for all rows; by row. Needs no columns.
-  Eigen::MatrixXf RingColumns() const;
-  /// Gives back the columns' memory.
-  void DropColumns() { responses_.Drop(); }
+  /// Of 1 N that acts on a site's node alone.
+  LoadCases::Load ForceAt(Direction direction, int site) const;
+  /// Of 1 N mm about the around or the along direction.
+  LoadCases::Load CoupleAt(Direction axis, int site) const;
+  /// What these loads displace, stacked markers, mm; by case.
+  Eigen::MatrixXf Displacements(const LoadCases& cases) const { return compliance_->Displacements(cases); }
   const ByKnownLoads& by_known_loads() const { return by_known_loads_; }
   /// By site; columns inward, around, along; unit, perpendicular.
   const std::vector<Mat3>& frames() const { return frames_; }
-
-  /// What couples of 1 N mm about the around and the along direction displace, that act on the sites in these
-  /// shares; mm, stacked. The columns of sites with a share must have been made.
-  Eigen::MatrixXf CoupleColumns(const Eigen::VectorXd& shares) const;
 
   /// The transposes of all columns times forces on the markers (3 each, stacked), in one solution instead of
   /// three large products.
@@ -78,7 +78,7 @@ class Linearization {
   void FirstOrderMarkers(Eigen::VectorXd& stacked_mm) const;
 
  private:
-  bool Finish(const KnownLoads& loads);
+  bool Finish(const ShellState& state, const KnownLoads& loads);
   void SetFrames();
   /// The rotations' part of a couple about an axis; of a force on the outer wall, which has one about the
   /// mid-surface.
@@ -86,9 +86,10 @@ class Linearization {
   Vec2 Moment(int node, const Vec3& direction) const;
 
   const SkinMechanics& mechanics_;
-  SkinStiffness stiffness_;
-  MarkerMap::Jacobian jacobian_;
-  MarkerResponses responses_;
+  std::shared_ptr<const RoundCompliance> round_;
+  std::unique_ptr<PatchCompliance> patch_;  // made when it is asked for, as is block_
+  std::unique_ptr<BlockCompliance> block_;
+  const SkinCompliance* compliance_ = nullptr;  // the one of these two or of round_ that was used last
   ShellState state_, tangent_state_;
   bool is_made_ = false;
   KnownLoads loads_, tangent_loads_;

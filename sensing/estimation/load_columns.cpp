@@ -7,10 +7,10 @@
 
 namespace taclink {
 
-void LoadColumns::Clear(int loads) {
+void LoadColumns::Clear(int loads, Eigen::Index rows) {
   loads_.clear();
   place_.assign(static_cast<size_t>(loads), -1);
-  columns_.resize(0, 0);
+  columns_.resize(rows, 0);
   gram_.resize(0, 0);
 }
 

@@ -10,8 +10,8 @@ namespace taclink {
 /// from 0; those with a column have a place among the columns as well. One thread.
 class LoadColumns {
  public:
-  /// No columns, of `loads` loads.
-  void Clear(int loads);
+  /// No columns, of `loads` loads; those to come have `rows` rows.
+  void Clear(int loads, Eigen::Index rows);
   /// Columns of these loads, which have none yet; `whitened`: one column a load.
   void Append(std::span<const int> loads, const Eigen::MatrixXf& whitened);
   /// The first columns, whose Gram matrix is known.

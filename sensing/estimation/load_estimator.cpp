@@ -22,10 +22,10 @@ constexpr size_t kMostHills = 24;  // no scene that was ever compared with the t
 constexpr double kLeastOfPeak = 0.03;
 constexpr double kRefitSparsity = 0.1, kRefitEndSparsity = 1.0;
 constexpr double kHessianRidge = 1e-9;
-// Columns are made where a tenth as much presses nearby as where most does; and, of loads that explain so
+// Columns are made where a third as much presses nearby as where most does; and, of loads that explain so
 // many standard deviations by themselves (less than a contact has to: kHillGain), of some at once with those
 // about them. After some rounds of it, of all.
-constexpr double kLikelyShare = 0.1, kLetInNorm = 3, kAbout = 0.3;
+constexpr double kLikelyShare = 0.3, kLetInNorm = 3, kAbout = 0.3;
 constexpr size_t kMostLetIn = 8;
 constexpr int kMostRounds = 4;
 constexpr int kMostTrials = 1500;          // of a fit: the most that a right answer ever took is 1,137
@@ -38,7 +38,19 @@ LoadEstimator::LoadEstimator(const SkinMechanics& mechanics, const Neighborhoods
       near_(near),
       covariance_(mechanics, near),
       camera_modes_(mechanics.model()),
-      hills_(mechanics) {}
+      hills_(mechanics) {
+  const LinkModel& model = mechanics.model();
+  const int paths = model.markers.paths, rings = model.markers.rings();
+  for (int marker = 0; marker < model.markers.count(); ++marker) {
+    const int path = model.PathOf(marker), ring = model.RingOf(marker);
+    if (path % 2 != 0) continue;
+    std::vector<int>& region = regions_.emplace_back();
+    for (int r = std::max(0, ring - 1); r <= std::min(rings - 1, ring + 1); ++r) {
+      for (int p = path - 1; p <= path + 1; ++p) region.push_back(model.MarkerIndex((p + paths) % paths, r));
+    }
+    std::ranges::sort(region);
+  }
+}
 
 bool LoadEstimator::Prepare(Linearization& skin, const UntouchedSkin& untouched_skin,
                             const MarkerObservations& observed, const KnownLoadsPrior& prior,
@@ -51,7 +63,8 @@ bool LoadEstimator::Prepare(Linearization& skin, const UntouchedSkin& untouched_
   if (!untouched_) return false;
   known_errors_ = prior.now;
   by_known_loads_ = skin.by_known_loads() * known_errors_;
-  const Eigen::MatrixXf of_loads = covariance_.ColumnsOfLoads(skin, local_n),
+  const Eigen::MatrixXf of_loads = covariance_.ColumnsOfLoads(skin, local_n, untouched_->stray_mm_per_n,
+                                                              untouched_->usual_noise_mm),
                         of_noise = ColumnsOfNoise(observed);
   camera_modes_.Write(observed, camera_modes_mm_);
   const Eigen::MatrixXd& of_baseline = untouched_->by_baseline_mm;
@@ -67,22 +80,21 @@ bool LoadEstimator::Prepare(Linearization& skin, const UntouchedSkin& untouched_
   free_norms_.resize(0);
   limits_.by_site_n.resize(0);
   hidden_projected_ = 0;
-  columns_.Clear(mechanics_.site_count() + mechanics_.site_rows());
+  columns_.Clear(mechanics_.site_count() + mechanics_.site_rows(), whitening_.size());
   if (!is_touched && untouched_->ring)
     MakeRotatedColumns(skin);
   else
     MakeColumns(skin, LikelyLoads(is_touched ? local_n : Eigen::VectorXd()));
-  if (!is_touched) skin.DropColumns();
   return columns_.columns().allFinite();
 }
 
-// By marker and by region, of the model's error and the cameras' motion: once for each Prepare, when the
-// first frame comes to its end.
+// By marker, of the model's error and the cameras' motion: once for each Prepare, when the first frame comes
+// to its end.
 void LoadEstimator::WriteMarkerCovariances() {
   if (!model_covariance_.empty()) return;
   WriteModelCovariances();
   WriteCameraCovariances();
-  WriteRegions();
+  region_factors_.assign(regions_.size(), std::nullopt);
 }
 
 // All markers together tell what is alike in all; one by one they would hide a wrong marker in it: without
@@ -98,38 +110,42 @@ void LoadEstimator::WriteModelCovariances() {
   }
 }
 
-// Where much presses nearby, and all bands; all, without local forces.
+// Where much presses nearby, or all around; all, without local forces.
 std::vector<int> LoadEstimator::LikelyLoads(const Eigen::VectorXd& local_n) const {
+  const double least_n = local_n.size() > 0 ? kLikelyShare * local_n.maxCoeff() : 0;
   std::vector<int> loads;
   for (int load = 0; load < mechanics_.site_count() + mechanics_.site_rows(); ++load) {
-    if (local_n.size() == 0 || IsBand(load) || local_n[load] > kLikelyShare * local_n.maxCoeff())
-      loads.push_back(load);
+    if (local_n.size() == 0 || MeanOver(load, local_n) > least_n) loads.push_back(load);
   }
   return loads;
 }
 
+double LoadEstimator::MeanOver(int column, const Eigen::VectorXd& by_site) const {
+  double sum = 0;
+  ForSites(column, [&](int site, double share) { sum += share * by_site[site]; });
+  return sum;
+}
+
 // Of loads that have none yet: of 1 N at a site, or that a row of sites shares.
-void LoadEstimator::MakeColumns(Linearization& skin, std::vector<int> loads) {
+void LoadEstimator::MakeColumns(const Linearization& skin, std::vector<int> loads) {
   std::sort(loads.begin(), loads.end());
   loads.erase(std::unique(loads.begin(), loads.end()), loads.end());
   std::erase_if(loads, [&](int load) { return columns_.Has(load); });
   if (loads.empty()) return;
-  const auto bands = std::lower_bound(loads.begin(), loads.end(), mechanics_.site_count());
-  const std::span<const int> sites(loads.begin(), bands);
-  Eigen::MatrixXf made(whitening_.size(), static_cast<Eigen::Index>(loads.size()));
-  made.leftCols(static_cast<Eigen::Index>(sites.size())) = SiteColumns(mechanics_, skin, sites);
-  if (bands != loads.end()) {
-    const Eigen::MatrixXf rings = skin.RingColumns();
-    for (size_t i = sites.size(); i < loads.size(); ++i)
-      made.col(static_cast<Eigen::Index>(i)) = rings.col(loads[i] - mechanics_.site_count());
-  }
+  Eigen::MatrixXf made = InwardColumns(mechanics_, skin, loads);
   whitening_.Apply(made);
   columns_.Append(loads, made);
 }
 
+// While a frame is fitted.
+void LoadEstimator::AddColumns(const Linearization& skin, std::vector<int> loads) {
+  MakeColumns(skin, std::move(loads));
+  if (columns_.columns().cols() != target_.size()) WriteFrameGram();
+}
+
 // Those of all loads of a skin of revolution. Whitening::Finish subtracts the low-rank part (camera motion,
 // baseline, known loads), which is not invariant under rotation.
-void LoadEstimator::MakeRotatedColumns(Linearization& skin) {
+void LoadEstimator::MakeRotatedColumns(const Linearization& skin) {
   RotatedColumns all(mechanics_, *untouched_->ring, skin);
   const Eigen::MatrixXf explained = whitening_.Finish(all.whitened);
   if (explained.rows() > 0) dense::AddTransposedProduct(-1, explained, explained, all.gram);
@@ -337,14 +353,18 @@ void LoadEstimator::SolveSparse(const Eigen::VectorXd& near_n) {
 bool LoadEstimator::LetIn(Linearization& skin, bool all) {
   std::vector<std::pair<double, int>> paying;  // standard deviations, site
   const Eigen::VectorXd pulls = mechanics_.spread().transpose() * inward_pulls_;
-  for (int site = 0; site < mechanics_.site_count(); ++site) {
-    const double deviations = pulls[site] / norms_[site];
-    if (!columns_.Has(site) && deviations > kLetInNorm) paying.emplace_back(deviations, site);
+  std::vector<int> loads;
+  for (int load = 0; load < static_cast<int>(norms_.size()); ++load) {
+    const double deviations = MeanOver(load, pulls) / norms_[load];
+    if (columns_.Has(load) || deviations < (IsBand(load) ? kBandSparsity : kLetInNorm)) continue;
+    if (IsBand(load))
+      loads.push_back(load);
+    else
+      paying.emplace_back(deviations, load);
   }
-  if (paying.empty()) return false;
+  if (paying.empty() && loads.empty()) return false;
   std::sort(paying.rbegin(), paying.rend());
   if (paying.size() > kMostLetIn) paying.resize(kMostLetIn);
-  std::vector<int> loads;
   for (int site = 0; site < mechanics_.site_count(); ++site) {
     const auto is_about = [&](const auto& each) { return near_.load_sites(site, each.second) > kAbout; };
     if (all || std::any_of(paying.begin(), paying.end(), is_about)) loads.push_back(site);
@@ -390,8 +410,7 @@ std::vector<LoadEstimator::Hill> LoadEstimator::Select(Linearization& skin,
     std::erase_if(hill, [&](int site) { return loads_[site] <= kLeastOfPeak * peak; });
     in_hills.insert(in_hills.end(), hill.begin(), hill.end());
   }
-  MakeColumns(skin, std::move(in_hills));  // a band's sites may have none yet
-  if (columns_.columns().cols() != target_.size()) WriteFrameGram();
+  AddColumns(skin, std::move(in_hills));  // a band's sites may have none yet
   return hills;
 }
 
@@ -495,13 +514,14 @@ void LoadEstimator::SetData(const Linearization& skin, const MarkerObservations&
 }
 
 void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
-                        const Eigen::VectorXd* untouched_norms, bool may_be_ring, LoadEstimate& estimate) {
+                        const Eigen::VectorXd* untouched_norms, const FitOptions& options,
+                        LoadEstimate& estimate) {
   SetData(skin, observed);
   Hide(observed);
   trials_ = 0;
   for (int round = 0;; ++round) {
     estimate = {};
-    estimate.converged = FitColumnsAtHand(skin, untouched_norms, may_be_ring) && trials_ < kMostTrials;
+    estimate.converged = FitColumnsAtHand(skin, untouched_norms, options) && trials_ < kMostTrials;
     estimate.trials = trials_;
     if (!estimate.converged) {
       fit_.hills.clear();
@@ -514,7 +534,7 @@ void LoadEstimator::Fit(Linearization& skin, const MarkerObservations& observed,
 
 // False: a solver did not come to its end.
 bool LoadEstimator::FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd* untouched_norms,
-                                     bool may_be_ring) {
+                                     const FitOptions& options) {
   fit_.hills.clear();
   fit_.slipping.clear();
   fit_.tangential.resize(data_.size(), 0);
@@ -525,7 +545,7 @@ bool LoadEstimator::FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd*
     std::vector<Hill> found = Select(skin, untouched_norms);
     if (!is_selected_ || found.size() > kMostHills) return false;
     Eliminate(found);
-    if (may_be_ring) JoinHugs(found);
+    if (options.may_be_ring) JoinHugs(skin, found);
     if (found.empty() && stage > 0) {
       // Bodies that hardly press, but drag: what is left beside their pull does not tell where they are.
       loads_ = loads_before;
@@ -538,7 +558,8 @@ bool LoadEstimator::FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd*
       solution_.chi2 = solution_.residual.squaredNorm();
       break;
     }
-    LetSlip(skin);
+    FitWithoutTangential();
+    if (options.has_tangential) LetSlip(skin);
     if (fit_.slipping.empty()) break;
   }
   return solution_.converged;

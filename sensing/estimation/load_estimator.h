@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -66,6 +67,12 @@ struct LoadEstimate {
   int trials = 0;  ///< answers to which contacts there are, and which of them pull along the wall, tried
 };
 
+/// What LoadEstimator::Fit may find.
+struct FitOptions {
+  bool may_be_ring = true;     ///< several contacts all around may be taken for one ring contact
+  bool has_tangential = true;  ///< contacts may have tangential forces
+};
+
 /// The loads that explain the markers, given the linearized skin: non-negative inward loads [lawson1974] at
 /// all sites with a sparsity term that fades inside a hill, grouped into hills, those hills that explain
 /// little left out, and a tangential force for each hill that needs one. See estimation.md. One thread.
@@ -90,10 +97,9 @@ class LoadEstimator {
 
   /// After Prepare. The linearization may have been rebased. Covariances and what is left unexplained are not
   /// written. `untouched_norms`: FreeNorms() of the skin without loads, shown the same observations, which
-  /// stand for the norms of columns that are not made; null where all are. `may_be_ring`: several contacts
-  /// all around may be taken for one ring contact.
+  /// stand for the norms of columns that are not made; null where all are.
   void Fit(Linearization& skin, const MarkerObservations& observed, const Eigen::VectorXd* untouched_norms,
-           bool may_be_ring, LoadEstimate& estimate);
+           const FitOptions& options, LoadEstimate& estimate);
   /// Writes these for what was fitted last.
   void Conclude(Linearization& skin, LoadEstimate& estimate);
 
@@ -148,9 +154,11 @@ class LoadEstimator {
   void WriteMarkerCovariances();
   void WriteModelCovariances();
   void WriteCameraCovariances();
-  void WriteRegions();
-  void MakeColumns(Linearization& skin, std::vector<int> loads);
-  void MakeRotatedColumns(Linearization& skin);
+  Eigen::LLT<Eigen::MatrixXf> FactorOf(const std::vector<int>& markers) const;
+  double NoiseDistance(const std::vector<int>& markers, const Eigen::VectorXf& left_mm) const;
+  void MakeColumns(const Linearization& skin, std::vector<int> loads);
+  void AddColumns(const Linearization& skin, std::vector<int> loads);
+  void MakeRotatedColumns(const Linearization& skin);
   std::vector<int> LikelyLoads(const Eigen::VectorXd& local_n) const;
   /// The sites that a column of the problem loads, and the share of each: one site, or a band's.
   template <typename Visit>
@@ -159,10 +167,11 @@ class LoadEstimator {
     if (column < sites) return visit(column, 1.0);
     for (int i = 0; i < around; ++i) visit((column - sites) * around + i, 1.0 / around);
   }
+  double MeanOver(int column, const Eigen::VectorXd& by_site) const;
   bool IsBand(int column) const { return column >= mechanics_.site_count(); }
   void ShareBands(const Eigen::VectorXd& inward_n, const std::vector<int>& loads);
-  void JoinHugs(std::vector<Hill>& hills);
-  void JoinHug(std::vector<Hill>& hills, const std::vector<size_t>& group);
+  void JoinHugs(const Linearization& skin, std::vector<Hill>& hills);
+  void JoinHug(const Linearization& skin, std::vector<Hill>& hills, const std::vector<size_t>& group);
   Eigen::VectorXd Penalties(const Eigen::VectorXd& near_n) const;  // reweighted l1 [candes2008]
   void WriteNorms(const Eigen::VectorXd* untouched_norms);
   void SolveSparse(const Eigen::VectorXd& near_n);
@@ -179,7 +188,8 @@ class LoadEstimator {
   Explanation Explain(const std::vector<Hill>& hills, size_t without);
 
   void SetData(const Linearization& skin, const MarkerObservations& observed);
-  bool FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd* untouched_norms, bool may_be_ring);
+  bool FitColumnsAtHand(Linearization& skin, const Eigen::VectorXd* untouched_norms,
+                        const FitOptions& options);
   struct Solution {
     Eigen::VectorXd loads, tangential, residual;
     double chi2 = 0;
@@ -187,11 +197,11 @@ class LoadEstimator {
   };
   /// Forces around and along, and couples about both.
   static constexpr Eigen::Index kTangential = 4;
-  void MakeColumnsWhere(Linearization& skin, const std::vector<Eigen::VectorXd>& shares) const;
-  std::vector<Eigen::MatrixXd> TangentialColumns(Linearization& skin, const std::vector<Hill>& hills);
+  std::vector<Eigen::MatrixXd> TangentialColumns(const Linearization& skin, const std::vector<Hill>& hills);
   Eigen::VectorXd TangentialPrior(Eigen::Index columns) const;
   Solution Refit(const std::vector<int>& chosen, const Eigen::MatrixXd& tangential);
-  void LetSlip(Linearization& skin);
+  void FitWithoutTangential();
+  void LetSlip(const Linearization& skin);
   /// What a hill's tangential force would be, and would explain: chi^2.
   struct TangentialGain {
     double chi2 = 0;
@@ -208,8 +218,8 @@ class LoadEstimator {
   };
   FitColumns ColumnsOf(const std::vector<int>& acting, const Eigen::MatrixXd& tangential) const;
   Eigen::MatrixXd InformationBeside(const FitColumns& fit, const Eigen::MatrixXd& own) const;
-  Eigen::MatrixXd ShiftColumns(Linearization& skin, const EstimatedLoad& load) const;
-  void MoveCenters(Linearization& skin, LoadEstimate& estimate) const;
+  Eigen::MatrixXd ShiftColumns(const Linearization& skin, const EstimatedLoad& load) const;
+  void MoveCenters(const Linearization& skin, LoadEstimate& estimate) const;
   void ProjectOut(const Eigen::MatrixXd& tangential);
   void Finish(Linearization& skin, LoadEstimate& estimate);
   void WriteLoad(const Linearization& skin, EstimatedLoad& load) const;
@@ -234,11 +244,8 @@ class LoadEstimator {
   KnownLoadsErrors known_errors_;
   Eigen::MatrixXd by_known_loads_, whitened_known_loads_;  // stacked, by known_errors_
   LoadColumns columns_;
-  struct Region {
-    std::vector<int> rows;
-    Eigen::LLT<Eigen::MatrixXf> factor;
-  };
-  std::vector<Region> regions_;
+  std::vector<std::vector<int>> regions_;                                   // 3 x 3 markers each
+  std::vector<std::optional<Eigen::LLT<Eigen::MatrixXf>>> region_factors_;  // of those asked for
   double usual_norm_ = 0;
 
   // Of the frame. Hidden: an orthonormal basis of what the frame does not show, whitened, and of the

@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "sensing/estimation/load_estimator.h"
@@ -223,37 +224,33 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
   }
 }
 
-// Cholesky factors of the covariance of 3 x 3 markers each, lower half.
-// The cameras' motion is all markers' together: a region must not have one of its own.
-void LoadEstimator::WriteRegions() {
+// Factorizes the block of the covariance that belongs to these markers. The modes of camera motion are left
+// out: they are shared by all markers and must not be fitted to one region.
+Eigen::LLT<Eigen::MatrixXf> LoadEstimator::FactorOf(const std::vector<int>& markers) const {
   const Eigen::MatrixXf& all = whitening_.columns();
   const Eigen::Index known = known_errors_.cols(), others = all.cols() - known - camera_modes_mm_.cols();
-  const LinkModel& model = mechanics_.model();
-  const int paths = model.markers.paths, rings = model.markers.rings();
-  regions_.clear();
-  for (int marker = 0; marker < model.markers.count(); ++marker) {
-    const int path = model.PathOf(marker), ring = model.RingOf(marker);
-    if (path % 2 != 0) continue;
-    std::vector<int> markers;
-    for (int r = std::max(0, ring - 1); r <= std::min(rings - 1, ring + 1); ++r) {
-      for (int p = path - 1; p <= path + 1; ++p) markers.push_back(model.MarkerIndex((p + paths) % paths, r));
-    }
-    std::sort(markers.begin(), markers.end());
-    Region region;
-    for (const int each : markers) {
-      for (int c = 0; c < 3; ++c) region.rows.push_back(3 * each + c);
-    }
-    const Eigen::MatrixXf more = all(region.rows, Eigen::all);
-    Eigen::MatrixXf covariance_mm2 = more.leftCols(others) * more.leftCols(others).transpose();
-    covariance_mm2 += more.rightCols(known) * more.rightCols(known).transpose();
-    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(markers.size()); ++i) {
-      for (Eigen::Index j = 0; j <= i; ++j)
-        covariance_mm2.block<3, 3>(3 * i, 3 * j) +=
-            untouched_->factored->Block(markers[static_cast<size_t>(i)], markers[static_cast<size_t>(j)]);
-    }
-    region.factor.compute(covariance_mm2);
-    regions_.push_back(std::move(region));
+  const auto count = static_cast<Eigen::Index>(markers.size());
+  Eigen::MatrixXf more(3 * count, all.cols());
+  for (Eigen::Index i = 0; i < count; ++i)
+    more.middleRows<3>(3 * i) = all.middleRows<3>(3 * markers[static_cast<size_t>(i)]);
+  Eigen::MatrixXf covariance_mm2 = more.leftCols(others) * more.leftCols(others).transpose();
+  covariance_mm2 += more.rightCols(known) * more.rightCols(known).transpose();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j)
+      covariance_mm2.block<3, 3>(3 * i, 3 * j) +=
+          untouched_->factored->Block(markers[static_cast<size_t>(i)], markers[static_cast<size_t>(j)]);
   }
+  return Eigen::LLT<Eigen::MatrixXf>(covariance_mm2);
+}
+
+// Squared Mahalanobis distance by the cameras' noise alone, which is not below that by the whole covariance.
+double LoadEstimator::NoiseDistance(const std::vector<int>& markers, const Eigen::VectorXf& left_mm) const {
+  double sum = 0;
+  for (const int marker : markers) {
+    const Vec3 left = left_mm.segment<3>(3 * marker).cast<double>();
+    sum += left.dot(noise_mm2_[static_cast<size_t>(marker)].llt().solve(left));
+  }
+  return sum;
 }
 
 // Mahalanobis' distance of the residual over 3 x 3 markers, per number, the largest; of regions that are
@@ -261,12 +258,31 @@ void LoadEstimator::WriteRegions() {
 // more than twice the second, for it may be measured wrong alone.
 double LoadEstimator::WorstRegion(const Eigen::VectorXd& by_cameras_mm) {
   const Eigen::VectorXf left_mm = (whitening_.Covariance(pulls_per_mm_) - by_cameras_mm).cast<float>();
-  double worst = 0;
-  for (const Region& region : regions_) {
+  struct Bound {
+    double most = 0;
+    size_t region = 0;
     int shown = 0;
-    for (const int row : region.rows) shown += is_shown_[static_cast<size_t>(row)];
-    if (shown < static_cast<int>(region.rows.size()) / 3) continue;
-    const Eigen::VectorXf part = region.factor.matrixL().solve(left_mm(region.rows));
+  };
+  std::vector<Bound> bounds;
+  for (size_t i = 0; i < regions_.size(); ++i) {
+    int shown = 0;
+    for (const int marker : regions_[i]) {
+      for (int c = 0; c < 3; ++c) shown += is_shown_[static_cast<size_t>(3 * marker + c)];
+    }
+    if (shown >= static_cast<int>(regions_[i].size()))
+      bounds.push_back({NoiseDistance(regions_[i], left_mm) / shown, i, shown});
+  }
+  std::ranges::sort(bounds, std::greater(), &Bound::most);
+  double worst = 0;
+  for (const auto& [bound, region, shown] : bounds) {
+    if (bound <= worst) break;
+    const std::vector<int>& markers = regions_[region];
+    auto& factor = region_factors_[region];
+    if (!factor) factor = FactorOf(markers);
+    Eigen::VectorXf part(3 * static_cast<Eigen::Index>(markers.size()));
+    for (size_t i = 0; i < markers.size(); ++i)
+      part.segment<3>(3 * static_cast<Eigen::Index>(i)) = left_mm.segment<3>(3 * markers[i]);
+    factor->matrixL().solveInPlace(part);
     double most = 0, second = 0;
     for (Eigen::Index row = 0; row < part.size(); row += 3) {
       const double square = part.segment<3>(row).squaredNorm();

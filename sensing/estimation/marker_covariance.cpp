@@ -18,6 +18,8 @@ constexpr double kStrayN = 1e-3, kNormalShare = 0.01, kTangentialShare = 0.003;
 // Of the stray forces where nothing presses: so little more of them that it is left out, four percent of
 // the variance.
 constexpr double kNegligibleStray = 0.2;
+// And of noise and floor of one marker: what a stray force moves all of them by.
+constexpr double kNegligibleStrayMotion = 0.35;
 constexpr double kNegligibleMotion = 0.25;  // of the floor: an error by motion that is left out
 
 }  // namespace
@@ -58,7 +60,7 @@ void MarkerCovariance::SetState(const Linearization& skin, const UntouchedSkin& 
   grown_mm_ = kByInflation * grown_mm_.cwiseMax(kLeastInflation * grown_mm_.maxCoeff());
 }
 
-void MarkerCovariance::WriteUntouched(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const {
+void MarkerCovariance::WriteUntouched(const Linearization& skin, Eigen::MatrixXd& covariance_mm2) const {
   const int markers = mechanics_.marker_count();
   const double floor_mm = kFloorMm * mechanics_.length_unit();
   covariance_mm2.setZero(3 * markers, 3 * markers);
@@ -79,7 +81,7 @@ void MarkerCovariance::WriteUntouched(Linearization& skin, Eigen::MatrixXd& cova
 }
 
 // Growth and bow are alike all around.
-RingCovarianceParts MarkerCovariance::UntouchedParts(Linearization& skin) const {
+RingCovarianceParts MarkerCovariance::UntouchedParts(const Linearization& skin) const {
   const int paths = mechanics_.model().markers.paths, period = spectrum_->period();
   const double floor_mm = kFloorMm * mechanics_.length_unit();
   RingCovarianceParts parts;
@@ -132,17 +134,15 @@ std::vector<MarkerCovariance::Stray> MarkerCovariance::Strays(const Eigen::Vecto
   return strays;
 }
 
-Eigen::MatrixXf MarkerCovariance::UntouchedStrays(Linearization& skin, int columns) const {
+Eigen::MatrixXf MarkerCovariance::UntouchedStrays(const Linearization& skin, int columns) const {
   std::vector<Stray> strays = Strays(Eigen::VectorXd::Zero(mechanics_.site_count()));
   std::erase_if(strays, [&](const Stray& stray) { return stray.site % mechanics_.columns() >= columns; });
-  std::vector<int> sites;
-  for (const Stray& stray : strays) sites.push_back(stray.site);
-  skin.MakeColumns(sites);
-  Eigen::MatrixXf scaled(bow_mm_.size(), static_cast<Eigen::Index>(strays.size()));
-  Eigen::Index used = 0;
-  for (const Stray& stray : strays)
-    scaled.col(used++) = static_cast<float>(stray.untouched_n) * skin.Column(stray.direction, stray.site);
-  return scaled;
+  LoadCases cases;
+  for (const Stray& stray : strays) {
+    cases.Begin();
+    cases.Add(stray.site, stray.untouched_n * skin.ForceAt(stray.direction, stray.site));
+  }
+  return skin.Displacements(cases);
 }
 
 // Of the markers' covariance in one direction, by Cholesky with pivots: the largest variance that is left
@@ -167,25 +167,45 @@ Eigen::MatrixXd MarkerCovariance::MotionColumns() const {
   return columns;
 }
 
-Eigen::MatrixXf MarkerCovariance::ColumnsOfLoads(Linearization& skin, const Eigen::VectorXd& local_n) {
+// The skin without loads is nearly one of revolution, so that one column of sites stands for all.
+std::array<Eigen::VectorXd, 3> MarkerCovariance::StrayDisplacements(const Linearization& skin) const {
+  constexpr std::array kDirections = {Linearization::kInward, Linearization::kAround, Linearization::kAlong};
+  LoadCases cases;
+  for (int row = 0; row < mechanics_.site_rows(); ++row) {
+    for (const auto direction : kDirections) {
+      cases.Begin();
+      cases.Add(row * mechanics_.columns(), skin.ForceAt(direction, row * mechanics_.columns()));
+    }
+  }
+  const Eigen::RowVectorXf norms = skin.Displacements(cases).colwise().norm();
+  std::array<Eigen::VectorXd, 3> by_direction;
+  for (const auto direction : kDirections)
+    by_direction[direction] = norms(Eigen::seq(direction, Eigen::last, 3)).transpose().cast<double>();
+  return by_direction;
+}
+
+Eigen::MatrixXf MarkerCovariance::ColumnsOfLoads(const Linearization& skin, const Eigen::VectorXd& local_n,
+                                                 const std::array<Eigen::VectorXd, 3>& mm_per_n,
+                                                 double noise_mm) {
   for (auto& sigmas : stray_n_) sigmas.setZero(mechanics_.site_count());
-  std::vector<Stray> strays = Strays(local_n);
-  for (const Stray& stray : strays)
-    stray_n_[stray.direction][stray.site] = std::hypot(stray.local_n, stray.untouched_n);
-  std::erase_if(strays,
-                [](const Stray& stray) { return stray.local_n < kNegligibleStray * stray.untouched_n; });
-  std::vector<int> sites;
-  for (const Stray& stray : strays) sites.push_back(stray.site);
-  skin.MakeColumns(sites);
+  const double least_mm = kNegligibleStrayMotion * std::hypot(noise_mm, kFloorMm * mechanics_.length_unit());
+  LoadCases cases;
+  for (const Stray& stray : Strays(local_n)) {
+    double& sigma_n = stray_n_[stray.direction][stray.site];
+    sigma_n = stray.untouched_n;
+    const double moved_mm = stray.local_n * mm_per_n[stray.direction][stray.site / mechanics_.columns()];
+    if (stray.local_n < kNegligibleStray * stray.untouched_n || moved_mm < least_mm) continue;
+    sigma_n = std::hypot(stray.local_n, stray.untouched_n);
+    cases.Begin();
+    cases.Add(stray.site, stray.local_n * skin.ForceAt(stray.direction, stray.site));
+  }
   const Eigen::MatrixXf motion = MotionColumns().cast<float>();
   const Eigen::Index directions = 3 * motion.cols();
-  Eigen::MatrixXf columns(bow_mm_.size(), directions + static_cast<Eigen::Index>(strays.size()));
+  Eigen::MatrixXf columns(bow_mm_.size(), directions + cases.count());
   columns.leftCols(directions).setZero();
   for (Eigen::Index k = 0; k < directions; ++k)
     columns.col(k)(Eigen::seq(k % 3, Eigen::last, 3)) = motion.col(k / 3);
-  Eigen::Index used = directions;
-  for (const Stray& stray : strays)
-    columns.col(used++) = static_cast<float>(stray.local_n) * skin.Column(stray.direction, stray.site);
+  columns.rightCols(cases.count()) = skin.Displacements(cases);
   return columns;
 }
 

@@ -26,15 +26,20 @@ class MarkerCovariance {
   /// Without loads: a floor, a share of the inflation, the bow and stray forces where nothing presses: inward
   /// at each site, around and along at a quarter of them each, which stand for four. Lower half, stacked
   /// markers. Makes all columns.
-  void WriteUntouched(Linearization& skin, Eigen::MatrixXd& covariance_mm2) const;
+  void WriteUntouched(const Linearization& skin, Eigen::MatrixXd& covariance_mm2) const;
   /// The same where `skin` is of revolution. Makes the columns of one group of sites.
-  RingCovarianceParts UntouchedParts(Linearization& skin) const;
+  RingCovarianceParts UntouchedParts(const Linearization& skin) const;
   /// Null if the pattern of stray forces is not periodic around the axis.
   const std::shared_ptr<const RingSpectrum>& spectrum() const { return spectrum_; }
   /// What loads add, one column for each independent error of unit variance: a share of the motion, and the
   /// stray forces that are more where something presses. `local_n`: force in the neighborhood of each site.
-  /// Sets the stray forces' standard deviations. Makes the columns of the sites where more is.
-  Eigen::MatrixXf ColumnsOfLoads(Linearization& skin, const Eigen::VectorXd& local_n);
+  /// Sets the stray forces' standard deviations. `mm_per_n`: StrayDisplacements of the skin without loads, by
+  /// which those are left out that hide in the cameras' noise, `noise_mm`.
+  Eigen::MatrixXf ColumnsOfLoads(const Linearization& skin, const Eigen::VectorXd& local_n,
+                                 const std::array<Eigen::VectorXd, 3>& mm_per_n, double noise_mm);
+  /// What 1 N of a stray force moves all markers by, mm (root of the sum of squares); by direction and row of
+  /// sites.
+  std::array<Eigen::VectorXd, 3> StrayDisplacements(const Linearization& skin) const;
   /// The product of the covariance that no force explains (floor, motion, inflation and bow) and forces on
   /// the markers, 1/mm; stacked, mm.
   Eigen::VectorXd Direct(const Eigen::VectorXd& pulls_per_mm) const;
@@ -61,7 +66,7 @@ class MarkerCovariance {
   };
   std::vector<Stray> Strays(const Eigen::VectorXd& local_n) const;
   /// Stacked markers, by stray force; of the sites in the first columns of nodes.
-  Eigen::MatrixXf UntouchedStrays(Linearization& skin, int columns) const;
+  Eigen::MatrixXf UntouchedStrays(const Linearization& skin, int columns) const;
   Eigen::MatrixXd MotionColumns() const;  // by pivoted Cholesky decomposition [harbrecht2012]
 
   static constexpr double kUnseenMm = 30;  // in SkinMechanics' units

@@ -97,7 +97,7 @@ const Eigen::VectorXd& NonNegativeSolver::Solve(const Matrix& h, const Eigen::Ve
   for (const int variable : support) {
     if (Append(h, variable)) is_in_[static_cast<size_t>(variable)] = 1;
   }
-  const double tolerance = kTolerance * std::max(1.0, b.cwiseAbs().maxCoeff());
+  const double tolerance = kTolerance * (n > 0 ? std::max(1.0, b.cwiseAbs().maxCoeff()) : 1);
   converged_ = StepToOptimum(h, b);
   refused_.clear();
   while (converged_) {

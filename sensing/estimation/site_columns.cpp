@@ -4,32 +4,36 @@
 
 namespace taclink {
 
-Eigen::MatrixXf SiteColumns(const SkinMechanics& mechanics, Linearization& skin, std::span<const int> sites) {
-  using Shares = Eigen::SparseMatrix<double>::InnerIterator;
-  std::vector<int> loaded;
-  for (const int site : sites) {
-    for (Shares it(mechanics.spread(), site); it; ++it) loaded.push_back(static_cast<int>(it.row()));
+Eigen::MatrixXf InwardColumns(const SkinMechanics& mechanics, const Linearization& skin,
+                              std::span<const int> loads) {
+  const int site_count = mechanics.site_count(), around = mechanics.columns();
+  LoadCases cases;
+  const auto add = [&](int site, double share) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(mechanics.spread(), site); it; ++it) {
+      const auto onto = static_cast<int>(it.row());
+      cases.Add(onto, share * it.value() * skin.ForceAt(Linearization::kInward, onto));
+    }
+  };
+  for (const int load : loads) {
+    cases.Begin();
+    if (load < site_count) {
+      add(load, 1);
+      continue;
+    }
+    for (int i = 0; i < around; ++i) add((load - site_count) * around + i, 1.0 / around);
   }
-  skin.MakeColumns(loaded);
-  Eigen::MatrixXf columns =
-      Eigen::MatrixXf::Zero(3 * mechanics.marker_count(), static_cast<Eigen::Index>(sites.size()));
-  for (Eigen::Index i = 0; i < columns.cols(); ++i) {
-    for (Shares it(mechanics.spread(), sites[static_cast<size_t>(i)]); it; ++it)
-      columns.col(i) +=
-          static_cast<float>(it.value()) * skin.Column(Linearization::kInward, static_cast<int>(it.row()));
-  }
-  return columns;
+  return skin.Displacements(cases);
 }
 
 RotatedColumns::RotatedColumns(const SkinMechanics& mechanics, const RingCovariance& covariance,
-                               Linearization& skin) {
+                               const Linearization& skin) {
   const int groups = covariance.spectrum().groups(), around = mechanics.columns(), wide = around / groups;
   const int rows = mechanics.site_rows();
   std::vector<int> first_sites;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < wide; ++column) first_sites.push_back(row * around + column);
   }
-  Eigen::MatrixXf first = SiteColumns(mechanics, skin, first_sites);
+  Eigen::MatrixXf first = InwardColumns(mechanics, skin, first_sites);
   covariance.Whiten(first);
   const Eigen::Index count = first.cols(), sites = groups * count;
   whitened.resize(first.rows(), sites + rows);

@@ -16,8 +16,6 @@ constexpr double kTangentErrorPerMm =
 constexpr double kNearlySettledMm = 0.3;  // of the last step, when they run out
 constexpr double kUnlimitedMm = 1e9;
 constexpr double kTouchedReachMm = 2.5;  // from where the touched skin's tangent was made: it is good enough
-constexpr int kFramesAhead = 2;          // that making a tangent may take
-constexpr double kAheadShare = 0.75;     // of a tangent's reach: so far ahead of a moving contact it is made
 constexpr double kModelPressureShare = 0.01;  // of the pressure: what the model's inflation is wrong by
 constexpr double kLeastPressureSigma =
     1e-3;  // of the steps in which the skin is inflated: a prior is no certainty
@@ -33,17 +31,6 @@ double LongestOff(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   double longest2 = 0;
   for (size_t i = 0; i < a.size(); ++i) longest2 = std::max(longest2, (a[i] - b[i]).squaredNorm());
   return std::sqrt(longest2);
-}
-
-// To where the way from `before` to `state` leads, so many times as far again.
-void Extrapolate(const ShellState& before, double times, ShellState& state) {
-  for (size_t i = 0; i < state.mids_mm.size(); ++i) {
-    state.mids_mm[i] += times * (state.mids_mm[i] - before.mids_mm[i]);
-    Vec3& director = state.directors[i];
-    director = (director + times * (director - before.directors[i])).normalized();
-    Vec3& tangent = state.tangents[i];
-    tangent = (tangent - tangent.dot(director) * director).normalized();
-  }
 }
 
 // Steps that do not shrink go past their end, where a skin is about to buckle; and where one ring contact and
@@ -85,11 +72,7 @@ SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions&
       touched_(std::make_unique<Tangent>(mechanics_, *near_, kTouchedReachMm)),
       used_(still_.get()),
       radial_pull_(mechanics_.marker_count()),
-      radial_weight_(mechanics_.marker_count()) {
-  if (!IsFirstOrder())
-    maker_ = std::make_unique<TangentMaker>(std::make_unique<Tangent>(mechanics_, *near_, kTouchedReachMm),
-                                            options.background);
-}
+      radial_weight_(mechanics_.marker_count()) {}
 SkinEstimator::~SkinEstimator() = default;
 
 void SkinEstimator::Restart() {
@@ -97,9 +80,6 @@ void SkinEstimator::Restart() {
   is_same_frame_ = false;
   still_->Forget();
   touched_->Forget();
-  if (!maker_) return;
-  maker_->Finish();
-  maker_->spare()->Forget();
 }
 void SkinEstimator::BeginAgain() {
   solved_.reset();
@@ -116,11 +96,11 @@ void SkinEstimator::KeepBefore(const ShellState* reached) {
     past_ = past_before_;
     past_.is_skipped = true;
   }
-  past_.has_next = reached != nullptr;
-  if (past_.has_next) past_.next = *reached;
+  past_.has_reached = reached != nullptr;
+  if (past_.has_reached) past_.reached = *reached;
 }
 void SkinEstimator::Forget() {
-  past_.has_last = past_.has_next = false;
+  past_.has_last = past_.has_reached = false;
   solved_.reset();
 }
 const Linearization& SkinEstimator::linearization() const {
@@ -152,46 +132,7 @@ bool SkinEstimator::Remake(Tangent& tangent, const SkinProblem& problem, const S
                            const Eigen::VectorXd& local_n, SkinEstimate& estimate) {
   ++estimate.work.tangents;
   if (&tangent == still_.get()) return tangent.MakeUntouched(problem, state);
-  return tangent.Make(problem, state, local_n, still_->loads.untouched());
-}
-
-// The touched skin's next tangent, if one made ahead is due and is better than the one at hand. It is due
-// after a number of frames, not when it is ready: so the answer to the same frames is always the same.
-void SkinEstimator::TakeNext(const SkinProblem& problem, const ShellState& state,
-                             const Eigen::VectorXd& local_n) {
-  if (maker_->is_begun() && frames_since_begun_ < kFramesAhead) return;
-  maker_->Finish();
-  const auto is_good = [&](const Tangent& tangent) {
-    return tangent.IsGoodFor(problem, state) && (local_n.size() == 0 || tangent.HasLocal(local_n));
-  };
-  Tangent& next = *maker_->spare();
-  if (is_good(next) && (!is_good(*touched_) || next.DistanceMm(ahead_) < touched_->DistanceMm(ahead_)))
-    std::swap(touched_, maker_->spare());
-}
-
-// After a frame with loads: begins with the tangent that will be asked for when it is due, if the motion goes
-// on.
-void SkinEstimator::MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate,
-                              const Eigen::VectorXd& local_n) {
-  if (maker_->is_begun()) {
-    ++frames_since_begun_;
-    return;
-  }
-  const Past& before = past_before_;
-  if (!before.has_last) return;
-  ahead_ = estimate.state;
-  const double moved_mm = LongestOff(before.last.mids_mm, ahead_.mids_mm);
-  const double share =
-      std::min<double>(kFramesAhead, kAheadShare * touched_->reach_mm / std::max(moved_mm, 1e-9));
-  Extrapolate(before.last, share, ahead_);
-  const Eigen::VectorXd ahead_n =
-      (local_n + share * (local_n - before.local_n)).cwiseMax(0.5 * local_n).cwiseMin(2 * local_n);
-  const auto is_good = [&](const Tangent& tangent) {
-    return tangent.IsGoodFor(problem, ahead_) && tangent.HasLocal(ahead_n);
-  };
-  if (is_good(*touched_) || is_good(*maker_->spare())) return;
-  maker_->Begin(problem, ahead_, ahead_n, still_->loads.untouched());
-  frames_since_begun_ = 1;
+  return tangent.Make(problem, state, local_n, still_.get(), estimate.loads.loads.size());
 }
 
 SkinEstimator::StepLimits SkinEstimator::UsualLimits() const {
@@ -210,7 +151,7 @@ bool SkinEstimator::Step(Tangent& tangent, const SkinProblem& problem, const Ste
   used_ = &tangent;
   ++estimate.work.steps;
   tangent.loads.Fit(tangent.skin, problem.observed,
-                    &tangent == still_.get() ? nullptr : &still_->loads.FreeNorms(), limits.may_be_ring,
+                    &tangent == still_.get() ? nullptr : &still_->loads.FreeNorms(), limits.fit,
                     estimate.loads);
   estimate.work.trials += estimate.loads.trials;
   if (!estimate.loads.converged) return false;
@@ -228,7 +169,7 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const SkinProblem& problem, Ski
     SkinProblem mine = problem;
     if (linear) {
       mine.loads = {};
-      mine.untouched.inflated.reset();
+      mine.untouched.is_stiff_as_weightless = false;
     }
     if (!Remake(tangent, mine, about, {}, estimate)) return false;
   }
@@ -248,10 +189,24 @@ bool SkinEstimator::SolveSmall(Tangent& tangent, const SkinProblem& problem, Ski
   return options_.model != ForceModel::kNonlinear && step_mm < kStillReachMm * unit;
 }
 
+// Where much presses, by one fit about a state with the columns of the untouched skin; empty: nowhere.
+Eigen::VectorXd SkinEstimator::FirstLocal(const SkinProblem& problem, SkinEstimate& estimate) {
+  if (!still_->skin.Rebase(estimate.state, problem.loads)) return {};
+  ++estimate.work.steps;
+  still_->loads.Forget();
+  still_->loads.Fit(still_->skin, problem.observed, nullptr, {.has_tangential = false}, estimate.loads);
+  estimate.work.trials += estimate.loads.trials;
+  if (!estimate.loads.converged || estimate.loads.loads.empty()) return {};
+  return still_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
+}
+
 bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n) {
   estimate.model = ForceModel::kNonlinear;
   const double unit = mechanics_.length_unit();
-  TakeNext(problem, estimate.state, local_n);
+  if (local_n.size() > 0) {
+    const Eigen::VectorXd first_n = FirstLocal(problem, estimate);
+    if (first_n.size() > 0) local_n = first_n;
+  }
   // A first guess: what the loads turn out to be decides whether all is made again.
   if (local_n.size() == 0) {
     if (estimate.loads.contact_sizes_n.size() > 0)
@@ -269,7 +224,8 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
   const int most_tangents = estimate.work.tangents + kMostTangents - (is_remade ? 1 : 0);
   for (int step = 0; step < kMostSteps; ++step) {
     if (IsSpent(estimate)) return false;
-    const StepLimits limits{.longest_mm = damping.longest_mm(), .may_be_ring = damping.may_be_ring()};
+    const StepLimits limits{.longest_mm = damping.longest_mm(),
+                            .fit = {.may_be_ring = damping.may_be_ring()}};
     if (!StepOnce(*touched_, problem, limits, estimate, step_mm)) return false;
     damping.Observe(step_mm, std::ranges::any_of(estimate.loads.loads, &EstimatedLoad::is_ring_contact));
     const Eigen::VectorXd local_before_n = local_n;
@@ -286,7 +242,6 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
     if (step + kStepsOfTangent < kMostSteps && (is_off || is_slow) &&
         estimate.work.tangents < most_tangents) {
       if (is_slow) touched_->is_prepared = false;
-      TakeNext(problem, estimate.state, local_n);
       const bool is_good = touched_->IsGoodFor(problem, estimate.state) && touched_->HasLocal(local_n);
       if (!is_good && !Remake(*touched_, problem, estimate.state, local_n, estimate)) return false;
       before_mm = 1e9;
@@ -311,10 +266,10 @@ void SkinEstimator::AddWeightError(const UntouchedSkin& untouched, SkinEstimate&
 
 void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& estimate) {
   const bool is_new_frame = !std::exchange(is_same_frame_, false);
-  if (is_new_frame && (past_.has_last || past_.has_next))
+  if (is_new_frame && (past_.has_last || past_.has_reached))
     past_before_ = past_;
   else if (is_new_frame)
-    past_before_.has_last = past_before_.has_next = false;
+    past_before_.has_last = past_before_.has_reached = false;
   estimate.failure = EstimateFailure::kNoEquilibrium;
   if (is_new_frame) estimate.work = {};
   estimate.first_order_mm = estimate.unsettled_mm = 0;
@@ -367,17 +322,10 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
                                                 : EstimateFailure::kNotConverged;
   if (estimate.failure != EstimateFailure::kNone) return KeepBefore(nullptr);
   if (estimate.loads.loads.empty()) return Forget();
-  const Eigen::VectorXd local_n = used_->loads.covariance().LocalOfSites(estimate.loads.contact_sizes_n);
-  if (maker_ && is_new_frame) MakeAhead(problem, estimate, local_n);
-  past_.has_next = past_before_.has_last;
-  if (past_.has_next) {
-    past_.next = estimate.state;
-    Extrapolate(past_before_.last, 1, past_.next);
-  }
+  past_.has_reached = false;
   past_.last = estimate.state;
   past_.has_last = true;
   past_.is_skipped = false;
-  past_.local_n = local_n;
   if (stands) return;
   solved_.reset();
   if (!is_settled_) return;

@@ -10,7 +10,7 @@
 #include "sensing/estimation/frame_work.h"
 #include "sensing/estimation/load_estimator.h"
 #include "sensing/estimation/skin_mechanics.h"
-#include "sensing/estimation/tangent_maker.h"
+#include "sensing/estimation/tangent.h"
 
 namespace taclink {
 
@@ -60,9 +60,6 @@ struct SkinEstimatorOptions {
   /// A frame that has cost so many FrameWork::Units ends without an answer; the next one may begin where it
   /// has come to.
   int most_work = FrameWork::kUnlimited;
-  /// Where tangents are made ahead, so that a moving contact's frames need not wait for them. None: in the
-  /// caller's thread, when they are due. The answers are the same.
-  BackgroundRunner background = {};
 };
 
 /// From labeled markers and known loads to loads, known loads and the nonlinear equilibrium shape together;
@@ -118,11 +115,9 @@ class SkinEstimator {
               const Eigen::VectorXd& local_n, SkinEstimate& estimate);
   void KeepBefore(const ShellState* reached);
   bool IsSpent(const SkinEstimate& estimate) const { return estimate.work.Units() > options_.most_work; }
-  void TakeNext(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local_n);
-  void MakeAhead(const SkinProblem& problem, const SkinEstimate& estimate, const Eigen::VectorXd& local_n);
   struct StepLimits {
     double longest_mm = 0;  // a longer step is shortened to it
-    bool may_be_ring = true;
+    FitOptions fit = {};
   };
   StepLimits UsualLimits() const;
   bool StepOnce(Tangent& tangent, const SkinProblem& problem, const StepLimits& limits,
@@ -130,6 +125,7 @@ class SkinEstimator {
   bool Step(Tangent& tangent, const SkinProblem& problem, const StepLimits& limits, SkinEstimate& estimate,
             double& step_mm);
   bool SolveSmall(Tangent& tangent, const SkinProblem& problem, SkinEstimate& estimate);
+  Eigen::VectorXd FirstLocal(const SkinProblem& problem, SkinEstimate& estimate);
   bool SolveLarge(const SkinProblem& problem, SkinEstimate& estimate, Eigen::VectorXd local_n);
   SkinProblem MakeProblem(const SkinObservation& observation, const UntouchedSkin& untouched,
                           const KnownLoads& measured, KnownLoadsPrior prior,
@@ -147,16 +143,12 @@ class SkinEstimator {
   Assimilation assimilation_;
   std::unique_ptr<Tangent> still_, touched_;  // of the skin without loads, and of the touched one
   Tangent* used_ = nullptr;
-  std::unique_ptr<TangentMaker> maker_;  // of the touched skin's next one; null: first order asks for none
-  ShellState ahead_;                     // where that one is thought to be asked for
-  int frames_since_begun_ = 0;           // by the next frame with loads
-  ShellState start_;                     // that this frame's loads were sought from
-  // Where a frame may begin: the state of the frame before and, after two, where their motion leads to.
+  ShellState start_;  // that this frame's loads were sought from
+  // Where a frame may begin: the state of the last frame with an answer, and where one without had come to.
   struct Past {
-    bool has_last = false, has_next = false;
+    bool has_last = false, has_reached = false;
     bool is_skipped = false;  // a frame without an answer lies between
-    ShellState last, next;
-    Eigen::VectorXd local_n;  // of `last`
+    ShellState last, reached;
   };
   Past past_, past_before_;  // past_before_: when the frame began
   // The last frame whose contacts were looked for, to a settled end. None since Forget.

@@ -98,6 +98,22 @@ void SkinMechanics::SetUpWeight() {
   }
 }
 
+// The weight is a dead load of the nodes.
+double SkinMechanics::Gradient(const ShellState& state, const KnownLoads& loads,
+                               Eigen::VectorXd& gradient) const {
+  const PressureLoads pressure(loads.pressure_mpa);
+  double energy_nmm = shell_.Gradient(state, pressure.loads(), gradient);
+  const Eigen::VectorXd weight = Weight(loads);
+  if (weight.size() == 0) return energy_nmm;
+  gradient -= weight;
+  for (int site = 0; site < site_count(); ++site) {
+    const auto node = static_cast<size_t>(NodeOfSite(site));
+    energy_nmm -=
+        weight.segment<3>(shell_.Dof(NodeOfSite(site), 0)).dot(state.mids_mm[node] - mesh_.mid_mm[node]);
+  }
+  return energy_nmm;
+}
+
 void SkinMechanics::GradientByLoads(const ShellState& state, ByKnownLoads& out) const {
   const FollowerPressure unit(1);
   const ElementLoad* one[] = {&unit};

@@ -26,10 +26,15 @@ class UntouchedSkins;
 struct UntouchedSkin {
   KnownLoads loads;
   ShellState state;
-  /// The skin without weight at nearly the same pressure; null if the weight changes the stiffness too much.
-  std::shared_ptr<const InflatedSkin> inflated = nullptr;
+  /// The skin without weight at nearly the same pressure; not null.
+  std::shared_ptr<const InflatedSkin> weightless = nullptr;
+  bool is_stiff_as_weightless = false;  ///< about: its weight changes the stiffness by little
+  /// The skin whose stiffness is about its own, known by harmonics; null: there is none.
+  std::shared_ptr<const InflatedSkin> inflated() const {
+    return is_stiff_as_weightless ? weightless : nullptr;
+  }
   /// Where to linearize it.
-  const ShellState& about() const { return inflated ? inflated->state : state; }
+  const ShellState& about() const { return is_stiff_as_weightless ? weightless->state : state; }
   Eigen::VectorXd markers_mm;     ///< displacements from the slack skin without weight, stacked
   ByKnownLoads markers_by_loads;  ///< their derivatives, mm/MPa and mm/(m/s^2)
 };
@@ -75,6 +80,8 @@ class SkinMechanics {
   const std::vector<Eigen::Vector4d>& corner_areas_mm2() const { return corner_areas_mm2_; }
   /// The skin's own specific force as loads of its degrees of freedom, N; empty: it has no weight.
   Eigen::VectorXd Weight(const KnownLoads& loads) const;
+  /// Energy of a state under known loads, N mm; sets its gradient.
+  double Gradient(const ShellState& state, const KnownLoads& loads, Eigen::VectorXd& gradient) const;
   /// Derivatives of the shell's gradient by the known loads at a state.
   void GradientByLoads(const ShellState& state, ByKnownLoads& out) const;
 

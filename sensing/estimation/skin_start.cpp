@@ -44,20 +44,15 @@ bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Ei
     estimate.state = state;
   };
   consider(past_.has_last, past_.last);
-  consider(past_.has_next, past_.next);
+  consider(past_.has_reached, past_.reached);
   local_n.resize(0);
   if (off_mm < kAssimilateMm * unit) return true;
+  // From the untouched skin, not from the nearer state: where no marker is seen, a dent of the last frame
+  // would stay.
+  estimate.state = problem.untouched.state;
   Eigen::VectorXd pulls;
-  const auto assimilate = [&] {
-    const AssimilationSummary done =
-        assimilation_.Run(problem.observed, problem.untouched.loads, estimate.state, pulls);
-    estimate.work.assimilation_steps += done.iterations;
-    return done.converged;
-  };
-  if (!assimilate() && (past_.has_last || past_.has_next)) {
-    estimate.state = problem.untouched.state;
-    assimilate();
-  }
+  estimate.work.evaluations +=
+      assimilation_.Run(problem.observed, problem.untouched, estimate.state, pulls).evaluations;
   const int markers = mechanics_.marker_count();
   Eigen::VectorXd sizes(markers);
   for (int m = 0; m < markers; ++m) {

@@ -9,6 +9,10 @@ namespace {
 
 constexpr double kSameLocal = 0.5;  // of the local forces: the model's errors are still the same
 constexpr double kLittleLocalN = 0.05;
+constexpr size_t kPatchSites = 37, kMostPatchSites = 3 * kPatchSites;  // for each body, and for all
+// By so much a skin may change, in SkinMechanics' units, before it is stiffer than without loads; slack, and
+// more for each of SkinMechanics::pressure_step.
+constexpr double kAsStiffMm = 0.8, kAsStiffMmPerStep = 1;
 
 }  // namespace
 
@@ -41,17 +45,34 @@ bool Tangent::IsGoodFor(const SkinProblem& problem, const ShellState& state) con
 }
 
 bool Tangent::Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local,
-                   const std::shared_ptr<const UntouchedCovariance>& untouched) {
+                   Tangent* untouched, size_t bodies) {
   const bool is_kept = is_prepared && IsNear(state);
   local_n = local;
   // The model's errors are those at `state`, whichever state the last step was from.
-  is_prepared = (is_kept ? skin.Rebase(state, problem.loads) : skin.At(state, problem.loads)) &&
-                loads.Prepare(skin, problem.untouched, problem.observed, problem.prior, local, untouched);
+  is_prepared =
+      (is_kept ? skin.Rebase(state, problem.loads) : Linearize(problem, state, untouched, bodies)) &&
+      loads.Prepare(skin, problem.untouched, problem.observed, problem.prior, local,
+                    untouched ? untouched->loads.untouched() : nullptr);
   return is_prepared;
 }
 
+// By a patch where all else is about as stiff as where nothing touches: the more the skin is inflated, the
+// more it may have moved.
+bool Tangent::Linearize(const SkinProblem& problem, const ShellState& state, const Tangent* untouched,
+                        size_t bodies) {
+  const auto round = untouched != nullptr ? untouched->skin.round() : nullptr;
+  const size_t patch_sites = kPatchSites * std::max<size_t>(1, bodies);
+  if (!round || patch_sites > kMostPatchSites) return skin.At(state, problem.loads);
+  const SkinMechanics& mechanics = skin.mechanics();
+  StatePatch patch = PatchBetween(mechanics, round->skin().state, state, patch_sites);
+  const double most_mm =
+      kAsStiffMm + kAsStiffMmPerStep * round->skin().pressure_mpa / mechanics.pressure_step();
+  if (patch.outside_mm > most_mm * mechanics.length_unit()) return skin.At(state, problem.loads);
+  return skin.At(state, problem.loads, round, std::move(patch.sites));
+}
+
 bool Tangent::MakeUntouched(const SkinProblem& problem, const ShellState& state) {
-  const std::shared_ptr<const InflatedSkin>& inflated = problem.untouched.inflated;
+  const std::shared_ptr<const InflatedSkin> inflated = problem.untouched.inflated();
   const bool is_kept = is_prepared && IsNear(inflated ? inflated->state : state);
   local_n = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(skin.frames().size()));
   const bool is_made =

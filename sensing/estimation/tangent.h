@@ -32,9 +32,10 @@ struct Tangent {
   /// Both, and the cameras see as much.
   bool IsGoodFor(const SkinProblem& problem, const ShellState& state) const;
   /// What is near keeps its columns: only what the loads are weighed with is made again.
-  /// `untouched`: of the skin without loads; null: this is that skin's tangent.
+  /// `untouched`: the tangent of the skin without loads; null: this is that.
+  /// `bodies`: about how many press.
   bool Make(const SkinProblem& problem, const ShellState& state, const Eigen::VectorXd& local,
-            const std::shared_ptr<const UntouchedCovariance>& untouched);
+            Tangent* untouched, size_t bodies = 1);
   /// Of the skin without loads, at `state`: that of the problem or the slack one. Made of its inflated skin,
   /// where it has one, so that it is good for any attitude.
   bool MakeUntouched(const SkinProblem& problem, const ShellState& state);
@@ -45,6 +46,10 @@ struct Tangent {
   LoadEstimator loads;
   bool is_prepared = false;
   Eigen::VectorXd local_n;
+
+ private:
+  bool Linearize(const SkinProblem& problem, const ShellState& state, const Tangent* untouched,
+                 size_t bodies);
 };
 
 }  // namespace taclink

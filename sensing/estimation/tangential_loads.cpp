@@ -15,43 +15,33 @@ constexpr double kShiftSites = 2;  // standard deviation of where a tangential f
 
 }  // namespace
 
-// The skin's columns, of all sites that have a share in one of these.
-void LoadEstimator::MakeColumnsWhere(Linearization& skin, const std::vector<Eigen::VectorXd>& shares) const {
-  std::vector<int> sites;
-  for (const Eigen::VectorXd& each : shares) {
-    for (int site = 0; site < mechanics_.site_count(); ++site) {
-      if (each[site] != 0) sites.push_back(site);
-    }
-  }
-  skin.MakeColumns(sites);
-}
-
 // By hill: of a force of 1 N that the hill's sites share as they share the load, around and along, and of
 // couples.
-std::vector<Eigen::MatrixXd> LoadEstimator::TangentialColumns(Linearization& skin,
+std::vector<Eigen::MatrixXd> LoadEstimator::TangentialColumns(const Linearization& skin,
                                                               const std::vector<Hill>& hills) {
-  std::vector<Eigen::VectorXd> spreads;
+  LoadCases cases;
   for (const Hill& hill : hills) {
     Eigen::VectorXd shares = Eigen::VectorXd::Zero(mechanics_.site_count());
     for (const int column : hill) ForSites(column, [&](int site, double) { shares[site] = loads_[site]; });
-    spreads.push_back(mechanics_.spread() * (shares / shares.sum()));
+    const Eigen::VectorXd spread = mechanics_.spread() * (shares / shares.sum());
+    const auto add = [&](const auto& load_at) {
+      cases.Begin();
+      for (int site = 0; site < mechanics_.site_count(); ++site) {
+        if (spread[site] != 0) cases.Add(site, spread[site] * load_at(site));
+      }
+    };
+    for (const auto direction : {Linearization::kAround, Linearization::kAlong})
+      add([&](int site) { return skin.ForceAt(direction, site); });
+    for (const auto axis : {Linearization::kAround, Linearization::kAlong})
+      add([&](int site) { return skin.CoupleAt(axis, site); });
   }
-  MakeColumnsWhere(skin, spreads);
+  Eigen::MatrixXf single = skin.Displacements(cases);
+  whitening_.Apply(single);
+  Eigen::MatrixXd columns = single.cast<double>();
+  if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
   std::vector<Eigen::MatrixXd> all;
-  for (const Eigen::VectorXd& spread : spreads) {
-    Eigen::MatrixXf single = Eigen::MatrixXf::Zero(whitening_.size(), kTangential);
-    single.rightCols<2>() = skin.CoupleColumns(spread);
-    for (int site = 0; site < mechanics_.site_count(); ++site) {
-      if (spread[site] == 0) continue;
-      const auto share = static_cast<float>(spread[site]);
-      single.col(0) += share * skin.Column(Linearization::kAround, site);
-      single.col(1) += share * skin.Column(Linearization::kAlong, site);
-    }
-    whitening_.Apply(single);
-    Eigen::MatrixXd columns = single.cast<double>();
-    if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
-    all.push_back(std::move(columns));
-  }
+  for (Eigen::Index i = 0; i < columns.cols(); i += kTangential)
+    all.emplace_back(columns.middleCols<kTangential>(i));
   return all;
 }
 
@@ -111,17 +101,20 @@ std::vector<LoadEstimator::TangentialGain> LoadEstimator::TangentialGains(
   return gains;
 }
 
-// One after the other, the hill first whose tangential force explains most; none that explains little: what a
-// shell gets wrong of a solid looks like a tangential force of the normal one's size.
-void LoadEstimator::LetSlip(Linearization& skin) {
-  const std::vector<Hill>& hills = fit_.hills;
-  const std::vector<int> sites = HillFinder::AllOf(hills);
+void LoadEstimator::FitWithoutTangential() {
   fit_.slipping.clear();
   fit_.tangential.resize(data_.size(), 0);
-  solution_ = Refit(sites, fit_.tangential);
+  left_out_.assign(fit_.hills.size(), {});
+  solution_ = Refit(HillFinder::AllOf(fit_.hills), fit_.tangential);
+}
+
+// One after the other, the hill first whose tangential force explains most; none that explains little: what a
+// shell gets wrong of a solid looks like a tangential force of the normal one's size.
+void LoadEstimator::LetSlip(const Linearization& skin) {
+  const std::vector<Hill>& hills = fit_.hills;
+  const std::vector<int> sites = HillFinder::AllOf(hills);
   std::vector<Eigen::MatrixXd>& columns = tangential_columns_;
   columns = TangentialColumns(skin, hills);
-  left_out_.assign(hills.size(), {});
   while (fit_.slipping.size() < hills.size()) {
     left_out_ = TangentialGains(sites, columns, fit_.tangential, solution_);
     trials_ += static_cast<int>(hills.size());
@@ -143,9 +136,9 @@ void LoadEstimator::LetSlip(Linearization& skin) {
 
 // What a tangential force moves by, if it acts a site farther around, or along: columns are linear in the
 // shares.
-Eigen::MatrixXd LoadEstimator::ShiftColumns(Linearization& skin, const EstimatedLoad& load) const {
+Eigen::MatrixXd LoadEstimator::ShiftColumns(const Linearization& skin, const EstimatedLoad& load) const {
   const int columns = mechanics_.columns(), rows = mechanics_.site_rows();
-  Eigen::MatrixXd shift = Eigen::MatrixXd::Zero(data_.size(), 2);
+  LoadCases cases;
   for (int axis = 0; axis < 2; ++axis) {
     Eigen::VectorXd change = Eigen::VectorXd::Zero(mechanics_.site_count());
     for (size_t k = 0; k < load.sites.size(); ++k) {
@@ -157,16 +150,14 @@ Eigen::MatrixXd LoadEstimator::ShiftColumns(Linearization& skin, const Estimated
       }
     }
     const Eigen::VectorXd spread = mechanics_.spread() * change;
-    MakeColumnsWhere(skin, {spread});
+    cases.Begin();
     for (int site = 0; site < mechanics_.site_count(); ++site) {
       if (spread[site] == 0) continue;
-      const Eigen::VectorXf by_force =
-          skin.Column(Linearization::kAround, site) * static_cast<float>(load.tangential_n.x()) +
-          skin.Column(Linearization::kAlong, site) * static_cast<float>(load.tangential_n.y());
-      shift.col(axis) += spread[site] * by_force.cast<double>();
+      cases.Add(site, spread[site] * (load.tangential_n.x() * skin.ForceAt(Linearization::kAround, site) +
+                                      load.tangential_n.y() * skin.ForceAt(Linearization::kAlong, site)));
     }
   }
-  shift = whitening_.Applied(shift);
+  Eigen::MatrixXd shift = whitening_.Applied(Eigen::MatrixXd(skin.Displacements(cases).cast<double>()));
   if (hidden_.cols() > 0) shift -= hidden_ * (hidden_.transpose() * shift);
   return shift;
 }
@@ -174,7 +165,7 @@ Eigen::MatrixXd LoadEstimator::ShiftColumns(Linearization& skin, const Estimated
 // A body that drags the skin presses its front and lifts its rear: inward loads tell little of where it is,
 // and the first guess of where the tangential force acts was made from them. To first order the data tell
 // where it does; the center is that of all forces.
-void LoadEstimator::MoveCenters(Linearization& skin, LoadEstimate& estimate) const {
+void LoadEstimator::MoveCenters(const Linearization& skin, LoadEstimate& estimate) const {
   std::vector<int> acting;
   Eigen::MatrixXd tangential(data_.size(), 0);
   for (size_t i = 0; i < estimate.loads.size(); ++i) {

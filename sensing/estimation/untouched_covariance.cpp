@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <optional>
 
@@ -124,7 +125,7 @@ bool KnownLoadsPrior::IsAbout(const KnownLoadsErrors& errors) const {
          (others.array() <= kSameNoise * mine.array()).all();
 }
 
-std::shared_ptr<const UntouchedCovariance> UntouchedCovariance::Make(Linearization& skin,
+std::shared_ptr<const UntouchedCovariance> UntouchedCovariance::Make(const Linearization& skin,
                                                                      const MarkerCovariance& model,
                                                                      const MarkerObservations& observed,
                                                                      const KnownLoadsPrior& prior) {
@@ -132,6 +133,10 @@ std::shared_ptr<const UntouchedCovariance> UntouchedCovariance::Make(Linearizati
   const size_t markers = observed.information.size();
   made->unseen_mm = model.unseen_mm();
   made->noise_mm2 = NoiseOfAll(observed, made->unseen_mm);
+  std::vector<double> best_mm2;
+  for (const Mat3& noise : made->noise_mm2) best_mm2.push_back(noise.diagonal().minCoeff());
+  made->usual_noise_mm = std::sqrt(Median(best_mm2));
+  made->stray_mm_per_n = model.StrayDisplacements(skin);
   made->baseline_errors = prior.baseline;
   made->by_baseline_mm = prior.baseline_mm;
   made->by_baseline_mm.conservativeResize(3 * static_cast<Eigen::Index>(markers), prior.baseline_mm.cols());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -36,7 +37,8 @@ struct UntouchedCovariance {
   /// Returns nullptr if the covariance is not positive definite. If `skin` is of revolution and the cameras
   /// see few markers much better or worse than others of the same ring, their noise is averaged over the
   /// ring, so that the covariance is invariant under rotation; what is worse is left to the tangents.
-  static std::shared_ptr<const UntouchedCovariance> Make(Linearization& skin, const MarkerCovariance& model,
+  static std::shared_ptr<const UntouchedCovariance> Make(const Linearization& skin,
+                                                         const MarkerCovariance& model,
                                                          const MarkerObservations& observed,
                                                          const KnownLoadsPrior& prior);
 
@@ -44,9 +46,12 @@ struct UntouchedCovariance {
   /// worse or missing, or they count from another baseline.
   bool IsGoodFor(const MarkerObservations& observed, const KnownLoadsPrior& prior) const;
 
-  double unseen_mm = 0;            ///< standard deviation of a direction in which a marker is not seen
-  std::vector<Mat3> noise_mm2;     ///< by marker, of the cameras; the median where they do not see it
-  std::vector<Mat3> marker_mm2;    ///< by marker, without noise, baseline and bow
+  double unseen_mm = 0;          ///< standard deviation of a direction in which a marker is not seen
+  std::vector<Mat3> noise_mm2;   ///< by marker, of the cameras; the median where they do not see it
+  std::vector<Mat3> marker_mm2;  ///< by marker, without noise, baseline and bow
+  /// What 1 N of a stray force moves the markers by, all together, mm; by direction and row of sites.
+  std::array<Eigen::VectorXd, 3> stray_mm_per_n;
+  double usual_noise_mm = 0;       ///< median over the markers of the coordinate that is known best
   Eigen::MatrixXd by_baseline_mm;  ///< stacked, by the baseline's errors of known loads
   KnownLoadsErrors baseline_errors;
   bool HasBaseline(const KnownLoadsPrior& prior) const;

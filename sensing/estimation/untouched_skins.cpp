@@ -22,7 +22,7 @@ constexpr double kAboutAsStiff = 0.25;
 
 // The mid-surface lies half the wall's thickness outside of what touches the tube, so that the search may
 // pass a little beyond what is accepted.
-RingEquilibriumOptions SearchOptions(const SkinMechanics& mechanics) {
+EnergySearchOptions SearchOptions(const SkinMechanics& mechanics) {
   const double tube_mm = mechanics.model().tube_outer_radius_mm;
   return {.tolerance_mm = kToleranceMm * mechanics.length_unit(),
           .longest_step_mm = kLongestStepMm * mechanics.length_unit(),
@@ -206,7 +206,8 @@ bool UntouchedSkins::WriteDerivatives(const Inflation& base, Answer& answer) {
   const ByKnownLoads off = skin.markers_by_loads - jacobian_ * by_base_;
   const bool is_stiff_as_base =
       (off.colwise().norm().array() <= kAboutAsStiff * skin.markers_by_loads.colwise().norm().array()).all();
-  skin.inflated = is_stiff_as_base ? base : nullptr;
+  skin.weightless = base;
+  skin.is_stiff_as_weightless = is_stiff_as_base;
   return true;
 }
 

@@ -31,7 +31,6 @@ SkinEstimatorOptions SkinOptions(const ForceOptions& options) {
   if (options.model != ForceModel::kLiteral) skin.model = options.model;
   skin.refinement = options.refinement;
   skin.most_work = options.most_work;
-  if (options.model != ForceModel::kLiteral) skin.background = options.background;
   return skin;
 }
 

@@ -20,8 +20,6 @@ struct ForceOptions {
   /// Elements per interval of the marker grid; 0: as many as the skin's dents ask for.
   int refinement = 0;
   int most_work = FrameWork::kUnlimited;  ///< of a frame (SkinEstimatorOptions)
-  /// Where to work ahead while a contact moves (SkinEstimatorOptions).
-  BackgroundRunner background = {};
 };
 
 /// Known loads: of the moment, and under which the baseline was taken.

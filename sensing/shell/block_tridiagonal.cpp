@@ -4,9 +4,77 @@
 #include <cassert>
 
 #include "sensing/shell/dense.h"
+#include "sensing/shell/instructions.h"
 
 namespace taclink {
 namespace {
+
+// The few entries of a block beside the diagonal, by row: an element couples a node to three of the next row.
+class SparseBlock {
+ public:
+  explicit SparseBlock(Eigen::Index size) : size_(size), rows_(static_cast<size_t>(size)) {}
+
+  // The block at (row, column), neighbors, of a matrix of which the lower triangle is there.
+  void Set(const Eigen::SparseMatrix<double>& lower, Eigen::Index row, Eigen::Index column) {
+    for (auto& entries : rows_) entries.clear();
+    const Eigen::Index first = std::max(row, column) * size_;
+    for (Eigen::Index c = 0; c < size_; ++c) {
+      for (Eigen::SparseMatrix<double>::InnerIterator it(lower, std::min(row, column) * size_ + c); it;
+           ++it) {
+        const Eigen::Index r = it.row() - first;
+        if (r < 0 || r >= size_) continue;
+        rows_[static_cast<size_t>(row < column ? c : r)].push_back({row < column ? r : c, it.value()});
+      }
+    }
+  }
+  // sum := sum + scale a B'.
+  void AddTimesTransposed(double scale, const Eigen::MatrixXd& a, Eigen::MatrixXd& sum) const {
+    static void (*const kKernel)(const SparseBlock&, double, const Eigen::MatrixXd&, Eigen::MatrixXd&) =
+        BestOf(AddPlain, AddAvx2, AddAvx2);
+    kKernel(*this, scale, a, sum);
+  }
+
+ private:
+  struct Entry {
+    Eigen::Index column = 0;
+    double value = 0;
+  };
+
+  static TACLINK_IN_KERNEL void Add(const SparseBlock& block, double scale, const Eigen::MatrixXd& a,
+                                    Eigen::MatrixXd& sum) {
+    for (Eigen::Index row = 0; row < block.size_; ++row) {
+      double* to = sum.data() + row * sum.rows();
+      const std::vector<Entry>& entries = block.rows_[static_cast<size_t>(row)];
+      size_t k = 0;
+      for (; k + 3 < entries.size(); k += 4) {
+        const double *a0 = a.data() + entries[k].column * a.rows(),
+                     *a1 = a.data() + entries[k + 1].column * a.rows(),
+                     *a2 = a.data() + entries[k + 2].column * a.rows(),
+                     *a3 = a.data() + entries[k + 3].column * a.rows();
+        const double by0 = scale * entries[k].value, by1 = scale * entries[k + 1].value,
+                     by2 = scale * entries[k + 2].value, by3 = scale * entries[k + 3].value;
+        for (Eigen::Index i = 0; i < sum.rows(); ++i)
+          to[i] += by0 * a0[i] + by1 * a1[i] + by2 * a2[i] + by3 * a3[i];
+      }
+      for (; k < entries.size(); ++k) {
+        const double* from = a.data() + entries[k].column * a.rows();
+        const double by = scale * entries[k].value;
+        for (Eigen::Index i = 0; i < sum.rows(); ++i) to[i] += by * from[i];
+      }
+    }
+  }
+  static void AddPlain(const SparseBlock& block, double scale, const Eigen::MatrixXd& a,
+                       Eigen::MatrixXd& sum) {
+    Add(block, scale, a, sum);
+  }
+  TACLINK_FOR_AVX2 static void AddAvx2(const SparseBlock& block, double scale, const Eigen::MatrixXd& a,
+                                       Eigen::MatrixXd& sum) {
+    Add(block, scale, a, sum);
+  }
+
+  Eigen::Index size_;
+  std::vector<std::vector<Entry>> rows_;
+};
 
 // A block of a matrix of which the lower triangle is there.
 void WriteBlock(const Eigen::SparseMatrix<double>& lower, Eigen::Index row, Eigen::Index column,
@@ -61,8 +129,9 @@ void BlockTridiagonal::ForEachOutward(Visit visit) const {
 bool BlockTridiagonal::Factorise(const Eigen::SparseMatrix<double>& lower) {
   const auto last = static_cast<Eigen::Index>(inverse_.size()) - 1;
   assert(lower.cols() == block_ * (last + 1) && IsBlockTridiagonal(lower, block_));
-  Eigen::MatrixXd schur(block_, block_), beside(block_, block_),
-      carried(block_, block_);  // S_i, B(j, i), C_i
+  Eigen::MatrixXd schur(block_, block_), carried(block_, block_);  // S_i, C_i, and C_i'
+  Eigen::MatrixXd carried_transposed(block_, block_);
+  SparseBlock beside(block_);  // B(j, i)
   Eigen::MatrixXd middle(block_, block_);
   WriteBlock(lower, middle_, middle_, middle);
   bool is_regular = true;
@@ -70,13 +139,14 @@ bool BlockTridiagonal::Factorise(const Eigen::SparseMatrix<double>& lower) {
     if (i == 0 || i == last) WriteBlock(lower, i, i, schur);
     is_regular = is_regular && dense::InvertSymmetric(schur);
     if (!is_regular) return;
-    WriteBlock(lower, j, i, beside);
-    carried.setZero();
-    dense::AddProduct(1, beside, schur, false, carried);
+    beside.Set(lower, j, i);
+    carried_transposed.setZero();
+    beside.AddTimesTransposed(1, schur, carried_transposed);
+    carried = carried_transposed.transpose();
     inverse_[static_cast<size_t>(i)] = schur.cast<float>();
     carried_[static_cast<size_t>(i)] = carried.cast<float>();
     if (j != middle_) WriteBlock(lower, j, j, schur);
-    dense::AddProduct(-1, carried, beside, true, j == middle_ ? middle : schur);
+    beside.AddTimesTransposed(-1, carried, j == middle_ ? middle : schur);
   });
   if (!is_regular || !dense::InvertSymmetric(middle)) return false;
   inverse_[static_cast<size_t>(middle_)] = middle.cast<float>();

@@ -40,4 +40,17 @@ void AddTransposedProduct(float scale, const Eigen::MatrixXf& a, const Eigen::Ma
 /// Lower half of c := a^T a.
 void Gram(const Eigen::MatrixXf& a, Eigen::MatrixXf& c);
 
+/// Triangular factors of a square matrix with row pivots [golub2013].
+class LuFactor {
+ public:
+  /// False: singular, or not finite.
+  bool Set(Eigen::MatrixXf a);
+  /// b := A^-1 b.
+  void Solve(Eigen::Ref<Eigen::MatrixXf> b) const;
+
+ private:
+  Eigen::MatrixXf factors_;
+  Eigen::VectorXi pivots_;
+};
+
 }  // namespace taclink::dense

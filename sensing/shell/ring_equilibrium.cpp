@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <random>
 #include <utility>
@@ -12,20 +11,18 @@
 namespace taclink {
 namespace {
 
-constexpr size_t kMostPairs = 8;
-constexpr int kMostHalvings = 12;
-constexpr double kMostTurn = 0.5;
 constexpr double kDifferenceShare = 3e-4;  // of the thickness: a node's motion, for differences of gradients
 constexpr int kStabilityIterations = 24, kMostResponseIterations = 60;
 constexpr double kStabilityTolerance = 1e-3;
-constexpr double kLeastCurvature = 1e-10;  // of a pair, by the product of its lengths
+
+EnergySearch::Response ResponseOf(const RingStiffness& near) {
+  return [&near](const Eigen::VectorXd& forces, Eigen::VectorXd& motion) { near.Solve(forces, motion); };
+}
 
 }  // namespace
 
-RingEquilibrium::RingEquilibrium(const NonlinearShell& shell, const RingEquilibriumOptions& options)
-    : shell_(shell),
-      options_(options),
-      noise_nmm_(0.01 * shell.material().youngs_modulus_mpa * std::pow(shell.surface().thickness_mm, 3)) {}
+RingEquilibrium::RingEquilibrium(const NonlinearShell& shell, const EnergySearchOptions& options)
+    : shell_(shell), search_(shell, options) {}
 
 double RingEquilibrium::Evaluate(NonlinearShell::Loads loads, const Eigen::VectorXd& dead_load,
                                  const ShellState& state, Eigen::VectorXd& gradient) const {
@@ -40,72 +37,15 @@ double RingEquilibrium::Evaluate(NonlinearShell::Loads loads, const Eigen::Vecto
   return energy_nmm;
 }
 
-bool RingEquilibrium::IsTooFarIn(const ShellState& state) const {
-  if (options_.least_radius_mm < 0) return false;
-  const double least2 = options_.least_radius_mm * options_.least_radius_mm;
-  return std::ranges::any_of(state.mids_mm,
-                             [least2](const Vec3& mid) { return mid.head<2>().squaredNorm() < least2; });
-}
-
-void RingEquilibrium::Remember(const Eigen::VectorXd& step, const Eigen::VectorXd& change) {
-  const double product = step.dot(change);
-  if (!(product > kLeastCurvature * step.norm() * change.norm())) return;
-  if (pairs_.size() == kMostPairs) pairs_.pop_front();
-  pairs_.push_back({step, change, 1 / product});
-}
-
-// The two loops of [nocedal2006, algorithm 7.4].
-void RingEquilibrium::Respond(const RingStiffness& near, const Eigen::VectorXd& forces,
-                              Eigen::VectorXd& motion) const {
-  std::array<double, kMostPairs> shares{};
-  Eigen::VectorXd left = forces;
-  for (size_t i = pairs_.size(); i-- > 0;) {
-    shares[i] = pairs_[i].scale * pairs_[i].step.dot(left);
-    left -= shares[i] * pairs_[i].change;
-  }
-  near.Solve(left, motion);
-  for (size_t i = 0; i < pairs_.size(); ++i)
-    motion += (shares[i] - pairs_[i].scale * pairs_[i].change.dot(motion)) * pairs_[i].step;
-}
-
 RingEquilibrium::Summary RingEquilibrium::Solve(const RingStiffness& near, NonlinearShell::Loads loads,
                                                 const Eigen::VectorXd& dead_load, ShellState& state) {
-  pairs_.clear();
-  Summary summary;
-  double energy_nmm = Evaluate(loads, dead_load, state, gradient_);
-  ++summary.evaluations;
-  if (!std::isfinite(energy_nmm) || !gradient_.allFinite()) return summary;
-  for (;;) {
-    Respond(near, -gradient_, step_);
-    if (!step_.allFinite()) return summary;
-    const double share_in_bounds = ShareWithin(step_, options_.longest_step_mm, kMostTurn);
-    step_ *= share_in_bounds;
-    if (share_in_bounds == 1 && LongestTranslation(step_) < options_.tolerance_mm) {
-      shell_.Step(step_, state);
-      summary.converged = true;
-      return summary;
-    }
-    const double slope = gradient_.dot(step_);
-    double share = 1, trial_nmm = 0;
-    for (int halving = 0;; ++halving, share /= 2) {
-      if (summary.evaluations >= options_.most_evaluations || halving > kMostHalvings) return summary;
-      trial_ = state;
-      shell_.Step(share * step_, trial_);
-      trial_nmm = Evaluate(loads, dead_load, trial_, next_gradient_);
-      ++summary.evaluations;
-      // Below what the energy resolves, a step is taken on trust.
-      const double noise = 1e-11 * std::max(noise_nmm_, std::abs(energy_nmm));
-      if (next_gradient_.allFinite() && trial_nmm <= energy_nmm + 1e-4 * share * slope + noise) break;
-    }
-    Remember(share * step_, next_gradient_ - gradient_);
-    std::swap(state, trial_);
-    std::swap(gradient_, next_gradient_);
-    energy_nmm = trial_nmm;
-    if (IsTooFarIn(state)) return summary;
-  }
+  const auto energy = [&](const ShellState& at, Eigen::VectorXd& gradient) {
+    return Evaluate(loads, dead_load, at, gradient);
+  };
+  return search_.Minimize(energy, ResponseOf(near), state);
 }
 
-// Conjugate gradients [golub2013], preconditioned by the pairs of Solve; products with the stiffness are
+// Conjugate gradients [golub2013], preconditioned by what Solve came to; products with the stiffness are
 // differences to `gradient_`, which is that at `state`. Converged: the next step is a share `tolerance` of
 // the motion.
 RingEquilibrium::Outcome RingEquilibrium::FindResponse(const RingStiffness& near, NonlinearShell::Loads loads,
@@ -121,6 +61,7 @@ RingEquilibrium::Outcome RingEquilibrium::FindResponse(const RingStiffness& near
     shell_.Gradient(trial_, loads, next_gradient_);
     product = (next_gradient_ - gradient_) / share;
   };
+  const EnergySearch::Response initial = ResponseOf(near);
   Eigen::VectorXd left = forces, direction = Eigen::VectorXd::Zero(forces.size()), next_step, stiff;
   if (!motion.isZero(0)) {
     times_stiffness(motion, stiff);
@@ -128,7 +69,7 @@ RingEquilibrium::Outcome RingEquilibrium::FindResponse(const RingStiffness& near
   }
   double last_product = 1;
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
-    Respond(near, left, next_step);
+    search_.Respond(initial, left, next_step);
     if (LongestMotion(next_step, thickness_mm) <= tolerance * LongestMotion(motion, thickness_mm)) {
       motion += next_step;  // whose step length is about 1
       return motion.allFinite() ? Outcome::kConverged : Outcome::kUnsettled;

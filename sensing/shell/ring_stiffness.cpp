@@ -305,18 +305,40 @@ void RingStiffness::Store(const std::vector<float>& by_column, Eigen::VectorXd& 
   }
 }
 
-void RingStiffness::Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const {
-  assert(rhs.size() == dofs_ * columns_);
+// Loads, then the solution.
+void RingStiffness::SolveByColumn(std::vector<float>& by_column) const {
   // Eight lanes of single precision fill the registers of AVX2.
   static void (*const kKernel)(const SolveArguments&) = BestOf(SolvePlain, SolveAvx2, SolveAvx2);
-  thread_local std::vector<float> by_column, harmonic, spectrum;
-  Load(rhs, by_column);
+  thread_local std::vector<float> harmonic, spectrum;
   harmonic.resize(static_cast<size_t>(2 * dofs_ * kLanes));
   spectrum.resize(static_cast<size_t>(2 * dofs_ * blocks_ * kLanes));
   kKernel({columns_, padded_columns_, dofs_, harmonics_, blocks_, cosine_.data(), sine_.data(),
            cosine_back_.data(), sine_back_.data(), factor_.data(), inverse_diagonal_.data(), by_column.data(),
            harmonic.data(), spectrum.data()});
+}
+
+void RingStiffness::Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const {
+  assert(rhs.size() == dofs_ * columns_);
+  thread_local std::vector<float> by_column;
+  Load(rhs, by_column);
+  SolveByColumn(by_column);
   Store(by_column, x);
+}
+
+Eigen::MatrixXf RingStiffness::Inverse() const {
+  Eigen::MatrixXf inverse((columns_ / 2 + 1) * dofs_, dofs_);
+  std::vector<float> by_column;
+  for (int load = 0; load < dofs_; ++load) {
+    by_column.assign(static_cast<size_t>(dofs_ * padded_columns_), 0);
+    by_column[static_cast<size_t>(load * padded_columns_)] = 1;
+    SolveByColumn(by_column);
+    for (int difference = 0; difference <= columns_ / 2; ++difference) {
+      for (int i = 0; i < dofs_; ++i)
+        inverse(difference * dofs_ + i, load) =
+            by_column[static_cast<size_t>(i * padded_columns_ + difference)];
+    }
+  }
+  return inverse;
 }
 
 }  // namespace taclink

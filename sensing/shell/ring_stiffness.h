@@ -50,11 +50,18 @@ class RingStiffness {
   /// By the shell's degrees of freedom.
   void Solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const;
 
+  /// The inverse, in cylindrical coordinates: its block between two columns of nodes depends on their
+  /// difference alone. Blocks of the differences from 0 to columns / 2, below each other: what unit loads on
+  /// a column (by column) move in the column that is so much farther around. Those of the opposite difference
+  /// have the other sign where one unknown is odd and the other is not.
+  Eigen::MatrixXf Inverse() const;
+
  private:
   static constexpr int kLanes = 8;
 
   void Load(const Eigen::VectorXd& rhs, std::vector<float>& by_column) const;
   void Store(const std::vector<float>& by_column, Eigen::VectorXd& x) const;
+  void SolveByColumn(std::vector<float>& by_column) const;
 
   int columns_, rows_;      // rows of nodes that move
   int dofs_;                // of a column

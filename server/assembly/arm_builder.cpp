@@ -18,7 +18,6 @@
 #include "server/assembly/processor_factory.h"
 #include "server/assembly/source_factory.h"
 #include "server/hub/encoder.h"
-#include "server/process/background_thread.h"
 #include "server/process/system_limits.h"
 
 namespace taclink::server {
@@ -89,7 +88,7 @@ Result<void> CheckSceneJoint(const LinkConfig& link, const ArmKinematics& kinema
 // SourceKind names the alternatives of SourceConfig in their order.
 static_assert(std::variant_size_v<SourceConfig> == static_cast<size_t>(SourceKind::kLog));
 
-Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock, const BackgroundRunner& background) {
+Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
   auto model = LoadLinkModel(link.model);
   if (!model) return model.error();
   if (const auto good = CheckRules(link.rules, model->markers); !good) return good.error();
@@ -104,17 +103,14 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock, const Backgrou
   if (*desk != nullptr) handling = [shared = *desk] { return shared->Now(); };
   const LinkFactories factories = {
       .source = [link, model = *model, &clock, handling] { return MakeSource(link, model, clock, handling); },
-      .processor = [link, model = *model, chosen,
-                    background] { return MakeProcessor(chosen->In(link), model, background); },
-      .estimator = [link, model = *model, background, is_inflated = *inflated](
+      .processor = [link, model = *model, chosen] { return MakeProcessor(chosen->In(link), model); },
+      .estimator = [link, model = *model, is_inflated = *inflated](
                        std::optional<ForceModel> force_model) -> Result<std::shared_ptr<StateEstimator>> {
         LinkConfig changed = link;
         changed.force_model = force_model;
         if (auto good = CheckForceModel(changed, is_inflated); !good)
           return Error{good.error().code, "the force model " + good.error().message};
-        ForceOptions options = ToPipelineOptions(changed).force;
-        options.background = background;
-        return std::shared_ptr<StateEstimator>(MakeStateEstimator(model, options));
+        return std::shared_ptr<StateEstimator>(MakeStateEstimator(model, ToPipelineOptions(changed).force));
       },
       .choose = [chosen](std::optional<ForceModel> force_model) { chosen->Set(force_model); }};
   auto source = factories.source();
@@ -171,9 +167,6 @@ Result<std::unique_ptr<ArmPoses>> MakePoses(const Config& config,
 }
 
 std::vector<Result<LinkParts>> BuildLinks(const Config& config, Clock& clock) {
-  // One for all links: on a machine that is too slow for all of them, frames only wait as without it.
-  const auto shared = std::make_shared<BackgroundThread>();
-  const BackgroundRunner background = [shared](std::function<void()> job) { shared->Post(std::move(job)); };
   // Simulated links solve their scenes first.
   std::vector<Result<LinkParts>> links;
   for (const LinkConfig& link : config.links) links.emplace_back(Error{ErrorCode::kInternal, link.name});
@@ -181,7 +174,7 @@ std::vector<Result<LinkParts>> BuildLinks(const Config& config, Clock& clock) {
     std::vector<std::jthread> threads;
     for (size_t i = 0; i < links.size(); ++i) {
       auto thread = StartThread("build:" + config.links[i].name, [&, i] {
-        links[i] = Guarded([&] { return BuildLink(config.links[i], clock, background); });
+        links[i] = Guarded([&] { return BuildLink(config.links[i], clock); });
       });
       if (thread) {
         threads.push_back(*std::move(thread));

@@ -112,10 +112,8 @@ PipelineOptions ToPipelineOptions(const LinkConfig& link) {
   return options;
 }
 
-Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model,
-                                                     const BackgroundRunner& background) {
+Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model) {
   PipelineOptions options = ToPipelineOptions(link);
-  options.force.background = background;
   if (link.calibration && IsMissing(*link.calibration)) {
     SPDLOG_WARN(
         "link {}: {} does not exist yet; the first pictures calibrate the cameras instead. "

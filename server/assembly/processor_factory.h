@@ -15,7 +15,6 @@ PipelineOptions ToPipelineOptions(const LinkConfig& link);
 /// The link's pipeline, ready for its first frame. A calibration file that does not exist yet is what
 /// Calibrate will write; until then the first pictures calibrate. Errors: a calibration file that can't be
 /// read.
-Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model,
-                                                     const BackgroundRunner& background);
+Result<std::unique_ptr<LinkProcessor>> MakeProcessor(const LinkConfig& link, const LinkModel& model);
 
 }  // namespace taclink::server

@@ -8,8 +8,9 @@ namespace {
 TEST(LoadColumns, AreThoseThatWereAskedForInAnyOrder) {
   const Eigen::MatrixXf all = Eigen::MatrixXf::Random(30, 6);
   LoadColumns columns;
-  columns.Clear(6);
+  columns.Clear(6, 30);
   EXPECT_FALSE(columns.Has(3));
+  EXPECT_EQ(columns.columns().rows(), 30);
   columns.Append(std::vector{4, 1}, all(Eigen::all, {4, 1}));
   columns.Append(std::vector{5}, all.col(5));
   EXPECT_TRUE(columns.Has(1));
@@ -24,7 +25,7 @@ TEST(LoadColumns, AreThoseThatWereAskedForInAnyOrder) {
     for (int j = 0; j < 6; ++j)
       EXPECT_NEAR(columns.gram()(columns.Place(i), columns.Place(j)), expected(i, j), 1e-4);
   }
-  columns.Clear(6);
+  columns.Clear(6, 30);
   EXPECT_FALSE(columns.Has(4));
 }
 

@@ -38,11 +38,11 @@ class RingCovarianceTest : public ::testing::TestWithParam<const char*> {
     std::srand(3);  // of Eigen's Random
     const UntouchedSkin* found =
         mechanics_.Untouched({.pressure_mpa = 8e-4, .specific_force_mps2 = {1, 2, -3}});
-    EXPECT_TRUE(found != nullptr && found->inflated != nullptr);
+    EXPECT_TRUE(found != nullptr && found->inflated() != nullptr);
     skin_ = *found;
-    const KnownLoads at{skin_.inflated->pressure_mpa, skin_.loads.specific_force_mps2};
-    EXPECT_TRUE(round_.At(skin_.inflated, at));
-    EXPECT_TRUE(general_.At(skin_.inflated->state, at));
+    const KnownLoads at{skin_.inflated()->pressure_mpa, skin_.loads.specific_force_mps2};
+    EXPECT_TRUE(round_.At(skin_.inflated(), at));
+    EXPECT_TRUE(general_.At(skin_.inflated()->state, at));
     const auto markers = static_cast<size_t>(mechanics_.marker_count());
     observed_.displacement_mm.assign(markers, Vec3::Zero());
     observed_.information.assign(markers,
@@ -137,14 +137,16 @@ TEST_P(RingCovarianceTest, ColumnsAreThoseOfTheDenseOne) {
   EXPECT_LT((by_ring.FreeNorms() - norms).cwiseAbs().maxCoeff(), 2e-3 * norms.maxCoeff());
 
   Eigen::VectorXf pushed = general_.base_mm().cast<float>();
-  general_.MakeColumns(std::vector{200, 205});
-  pushed += 0.5F * general_.Column(Linearization::kInward, 200);
+  LoadCases push;
+  push.Begin();
+  push.Add(200, 0.5 * general_.ForceAt(Linearization::kInward, 200));
+  pushed += general_.Displacements(push);
   for (size_t m = 0; m < observed_.displacement_mm.size(); ++m)
     observed_.displacement_mm[m] = pushed.segment<3>(3 * static_cast<Eigen::Index>(m)).cast<double>();
   LoadEstimate found, expected;
-  by_ring.Fit(round_, observed_, nullptr, true, found);
+  by_ring.Fit(round_, observed_, nullptr, {}, found);
   by_ring.Conclude(round_, found);
-  by_dense.Fit(general_, observed_, nullptr, true, expected);
+  by_dense.Fit(general_, observed_, nullptr, {}, expected);
   by_dense.Conclude(general_, expected);
   ASSERT_EQ(expected.loads.size(), 1U);
   ASSERT_EQ(found.loads.size(), 1U);

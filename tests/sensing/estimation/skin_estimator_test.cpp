@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <thread>
 
 #include "sensing/contact/contact_finder.h"
 #include "sensing/model/model_file.h"
@@ -272,7 +271,7 @@ TEST_F(SkinEstimatorTest, ABadFrameCostsLittleAndOnlyItself) {
     EXPECT_LE(estimate_.work.Units(), FrameWork::kLiveUnits + kLastStepUnits);
     estimator.Estimate(good, estimate_);
     ASSERT_EQ(estimate_.failure, EstimateFailure::kNone);
-    EXPECT_EQ(estimate_.work.assimilation_steps, 0);
+    EXPECT_EQ(estimate_.work.evaluations, 0);
     SkinEstimator fresh(model_);
     SkinEstimate cold;
     fresh.Estimate(good, cold);
@@ -437,23 +436,20 @@ TEST_F(SkinEstimatorTest, AnotherCameraIsAsGoodAsTheFirst) {
   EXPECT_NEAR(std::sqrt(estimate_.loads.loads[0].force_covariance_n2.trace()) / sigma_n, 1, 0.1);
 }
 
-TEST_F(SkinEstimatorTest, WhatIsMadeAheadChangesNoAnswer) {
+// A contact that moves by a few millimeters a frame: cold and warm.
+TEST_F(SkinEstimatorTest, FramesBeforeChangeNoAnswer) {
   std::vector<SkinObservation> stages;
   for (const double force_n : {0.1, 0.25, 0.4, 0.5, 0.6}) {
     const Pushed pushed = Push(model_, 1.0, 1.3, 95, force_n, 4);
     ASSERT_TRUE(pushed.ok);
     stages.push_back(Observe(pushed.markers_mm, 1.0, 0.02));
   }
-  SkinEstimatorOptions options;
-  options.background = [](const std::function<void()>& job) { std::thread(job).detach(); };
-  SkinEstimator live(model_, options), alone(model_);
+  SkinEstimator live(model_);
   for (int frame = 0; frame < 24; ++frame) {
     const int back = frame % 8;
     const SkinObservation& seen = stages[static_cast<size_t>(back < 5 ? back : 8 - back)];
-    SkinEstimate with, without;
+    SkinEstimate with;
     live.Estimate(seen, with);
-    alone.Estimate(seen, without);
-    EXPECT_TRUE(with.displacements_mm == without.displacements_mm) << frame;
     estimator_.Restart();
     estimator_.Estimate(seen, estimate_);
     ASSERT_EQ(with.failure, EstimateFailure::kNone);

@@ -2,19 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <thread>
-
-#include "sensing/estimation/tangent_maker.h"
 #include "sensing/model/model_file.h"
 
 namespace taclink {
 namespace {
 
 constexpr double kReach = 2.5, kSigmaMm = 0.05;
-
-void InAThread(const std::function<void()>& job) {
-  std::thread(job).detach();
-}
 
 class TangentTest : public ::testing::Test {
  protected:
@@ -71,64 +64,13 @@ TEST_F(TangentTest, OfATouchedSkinWeighsAsIfItHadMadeAll) {
   Eigen::VectorXd local = none_;
   local[300] = 0.5;
   ASSERT_TRUE(whole.Make(problem_, Dented(1), local, nullptr));
-  ASSERT_TRUE(touched.Make(problem_, Dented(1), local, still.loads.untouched()));
+  ASSERT_TRUE(touched.Make(problem_, Dented(1), local, &still));
   EXPECT_EQ(touched.loads.untouched(), still.loads.untouched());
   for (Tangent* tangent : {&whole, &touched}) tangent->loads.ConcludeUntouched(problem_.observed);
   for (int m = 0; m < mechanics_.marker_count(); ++m) {
     const Mat3 expected = whole.loads.ModelCovariance(m);
     EXPECT_LT((touched.loads.ModelCovariance(m) - expected).norm(), 0.05 * expected.norm()) << m;
   }
-}
-
-TEST_F(TangentTest, TheMakersIsTheSame) {
-  Tangent own(mechanics_, near_, kReach);
-  ASSERT_TRUE(own.Make(problem_, Dented(1), none_, nullptr));
-  for (const BackgroundRunner& background : {BackgroundRunner{}, BackgroundRunner{InAThread}}) {
-    TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach), background);
-    EXPECT_FALSE(maker.is_begun());
-    for (const double mm : {4.0, 1.0}) {
-      maker.Begin(problem_, Dented(mm), none_, nullptr);
-      EXPECT_TRUE(maker.is_begun());
-      maker.Finish();
-      EXPECT_FALSE(maker.is_begun());
-    }
-    Tangent& made = *maker.spare();
-    EXPECT_TRUE(made.IsGoodFor(problem_, Dented(1)));
-    EXPECT_EQ(made.DistanceMm(Dented(1)), 0);
-    const std::vector<int> sites = {3, 200};
-    made.skin.MakeColumns(sites);
-    own.skin.MakeColumns(sites);
-    for (const auto direction : {Linearization::kInward, Linearization::kAround, Linearization::kAlong}) {
-      for (const int site : sites)
-        EXPECT_EQ(made.skin.Column(direction, site), own.skin.Column(direction, site)) << site;
-    }
-  }
-}
-
-// A background that is too busy: who needs the tangent makes it, and the job that comes later does nothing,
-// even when the maker is gone.
-TEST_F(TangentTest, AMakerDoesNotWaitForWhatHasNotBegun) {
-  std::vector<std::function<void()>> jobs;
-  {
-    TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach),
-                       [&](std::function<void()> job) { jobs.push_back(std::move(job)); });
-    maker.Begin(problem_, Dented(1), none_, nullptr);
-    maker.Finish();
-    EXPECT_TRUE(maker.spare()->IsGoodFor(problem_, Dented(1)));
-    maker.spare()->Forget();
-    ASSERT_EQ(jobs.size(), 1u);
-    jobs[0]();
-    EXPECT_FALSE(maker.spare()->IsGoodFor(problem_, Dented(1)));
-    maker.Begin(problem_, Dented(1), none_, nullptr);
-  }
-  ASSERT_EQ(jobs.size(), 2u);
-  jobs[1]();
-}
-
-// Destroyed at work: it ends first.
-TEST_F(TangentTest, AMakerEndsAtWork) {
-  TangentMaker maker(std::make_unique<Tangent>(mechanics_, near_, kReach), InAThread);
-  maker.Begin(problem_, Dented(0), none_, nullptr);
 }
 
 }  // namespace
