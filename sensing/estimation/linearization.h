@@ -89,7 +89,7 @@ class Linearization {
   std::shared_ptr<const RoundCompliance> round_;
   std::unique_ptr<PatchCompliance> patch_;  // made when it is asked for, as is block_
   std::unique_ptr<BlockCompliance> block_;
-  const SkinCompliance* compliance_ = nullptr;  // the one of these two or of round_ that was used last
+  const SkinCompliance* compliance_ = nullptr;  // selected by the last At: round_, patch_ or block_
   ShellState state_, tangent_state_;
   bool is_made_ = false;
   KnownLoads loads_, tangent_loads_;

@@ -48,7 +48,7 @@ void RoundCompliance::MakeResponses() const {
   }
 }
 
-// What stacked markers do, turned by so many paths; added.
+// Adds the stacked displacements `from`, rotated about the axis by `by` paths, to `to`.
 void RoundCompliance::AddTurned(const float* from, int by, float* to) const {
   const double angle = 2 * kPi * by / paths_;
   const auto c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));

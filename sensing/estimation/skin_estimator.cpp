@@ -68,6 +68,7 @@ SkinEstimator::SkinEstimator(const LinkModel& model, const SkinEstimatorOptions&
       near_(Neighborhoods::SharedFor(mechanics_)),
       options_(options),
       assimilation_(mechanics_),
+      gross_errors_(mechanics_),
       still_(std::make_unique<Tangent>(mechanics_, *near_, kStillReachMm)),
       touched_(std::make_unique<Tangent>(mechanics_, *near_, kTouchedReachMm)),
       used_(still_.get()),
@@ -306,7 +307,7 @@ void SkinEstimator::Estimate(const SkinObservation& observation, SkinEstimate& e
     KeepBefore(IsSpent(estimate) ? &estimate.state : nullptr);
     estimate.state = start_;
     mechanics_.markers().Displacements(start_, estimate.displacements_mm);
-    estimate.has_shape = IsPossible(estimate);
+    estimate.has_shape = estimate.failure != EstimateFailure::kGrossErrors && IsPossible(estimate);
     return;
   }
   used_->loads.Conclude(used_->skin, estimate.loads);
@@ -356,6 +357,7 @@ bool SkinEstimator::PrepareUntouched(const SkinProblem& problem, SkinEstimate& e
 
 bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   estimate.loads = {};
+  estimate.failure = EstimateFailure::kNotConverged;
   estimate.unsettled_mm = 0;
   is_settled_ = true;
   start_ = problem.untouched.state;
@@ -364,12 +366,13 @@ bool SkinEstimator::Solve(const SkinProblem& problem, SkinEstimate& estimate) {
   if (is_small && SolveSmall(*still_, problem, estimate)) return true;
   if (IsFirstOrder()) return false;
   const SkinEstimate small = estimate;
+  if (!PrepareUntouched(problem, estimate)) return false;
   Eigen::VectorXd local_n;
   if (!Start(problem, estimate, local_n)) return false;
   // A small dent is nearer to where its first step has led.
   if (is_small && local_n.size() == 0 && !small.loads.loads.empty()) estimate.state = small.state;
   start_ = estimate.state;
-  return PrepareUntouched(problem, estimate) && SolveLarge(problem, estimate, local_n);
+  return SolveLarge(problem, estimate, local_n);
 }
 
 }  // namespace taclink

@@ -8,6 +8,7 @@
 #include "sensing/core/known_loads.h"
 #include "sensing/estimation/assimilation.h"
 #include "sensing/estimation/frame_work.h"
+#include "sensing/estimation/gross_error_test.h"
 #include "sensing/estimation/load_estimator.h"
 #include "sensing/estimation/skin_mechanics.h"
 #include "sensing/estimation/tangent.h"
@@ -25,6 +26,7 @@ enum class EstimateFailure : uint8_t {
   kNone,
   kNoEquilibrium,  ///< no stable skin under these known loads
   kNotConverged,   ///< no equilibrium that fits the markers was reached, or not by the work of a frame
+  kGrossErrors,    ///< no loads move the markers so (GrossErrorTest)
   kImpossible,     ///< a marker beyond twice the radius, or a number that is none
 };
 
@@ -141,6 +143,7 @@ class SkinEstimator {
   const std::shared_ptr<const Neighborhoods> near_;
   const SkinEstimatorOptions options_;
   Assimilation assimilation_;
+  GrossErrorTest gross_errors_;
   std::unique_ptr<Tangent> still_, touched_;  // of the skin without loads, and of the touched one
   Tangent* used_ = nullptr;
   ShellState start_;  // that this frame's loads were sought from

@@ -9,7 +9,9 @@
 namespace taclink {
 namespace {
 
+constexpr double kUntestedMm = 1.2;     // markers that are nearer to a state at hand are not tested first
 constexpr double kAssimilateMm = 2.5;   // farther off, a marker is pulled to its place first
+constexpr double kMostIsolated = 0.1;   // of the markers; if more are, it is not they that are wrong
 constexpr double kNoiseDeviations = 2;  // of a spring's pull, that noise alone makes
 
 }  // namespace
@@ -46,6 +48,10 @@ bool SkinEstimator::Start(const SkinProblem& problem, SkinEstimate& estimate, Ei
   consider(past_.has_last, past_.last);
   consider(past_.has_reached, past_.reached);
   local_n.resize(0);
+  if (off_mm > kUntestedMm * unit && gross_errors_.Fails(problem, *still_)) {
+    estimate.failure = EstimateFailure::kGrossErrors;
+    return false;
+  }
   if (off_mm < kAssimilateMm * unit) return true;
   // From the untouched skin, not from the nearer state: where no marker is seen, a dent of the last frame
   // would stay.
@@ -76,6 +82,7 @@ bool SkinEstimator::SolveWithoutIsolated(SkinProblem& problem, SkinEstimate& est
     const int hidden = HideIsolated(mechanics_.model(), problem.untouched.markers_mm, most,
                                     mechanics_.length_unit(), without.observed);
     if (hidden == 0) continue;
+    if (hidden > kMostIsolated * mechanics_.marker_count()) return is_solved;
     const bool was_solved = is_solved;
     is_solved = Solve(without, estimate);
     if (was_solved && !is_solved) {

@@ -50,6 +50,11 @@ std::optional<Reason> FailureReason(EstimateFailure failure) {
     case EstimateFailure::kImpossible:
       return Reason{ReasonId::kImpossible,
                     "what was found is not physically possible; check that the calibration is this link's"};
+    case EstimateFailure::kGrossErrors:
+      return Reason{
+          ReasonId::kNotConverged,
+          "no forces on the skin move its markers so: the images are damaged or of two moments, one "
+          "camera has moved, or markers are labeled wrongly; check images and cameras"};
     case EstimateFailure::kNotConverged:
       break;
   }

@@ -261,7 +261,7 @@ TEST_F(SkinEstimatorTest, ABadFrameCostsLittleAndOnlyItself) {
     bad[2](part) = -2 * first.markers_mm(part);
     bad[3](part) = Vec3(8, 5, -7) * std::sin(0.37 * m);
   }
-  constexpr int kLastStepUnits = 15 * 40 + 2 * 40 + 10 + 750;  // assimilation, tangents and a fit
+  constexpr int kLastStepUnits = 24 / 2 + 2 * 20 + 5 + 750;  // assimilation, tangents and a fit
   SkinEstimator estimator(model_, {.most_work = FrameWork::kLiveUnits});
   for (const Eigen::VectorXd& markers_mm : bad) {
     for (int frame = 0; frame < 3; ++frame) estimator.Estimate(good, estimate_);
@@ -286,7 +286,7 @@ TEST_F(SkinEstimatorTest, ADearFrameIsAnsweredByTheNextOnes) {
   const Pushed pushed = Push(model_, 1, 1.3, 95, 0.8, 4);
   ASSERT_TRUE(pushed.ok);
   const SkinObservation seen = Observe(pushed.markers_mm, 1, 0.05);
-  SkinEstimator thrifty(model_, {.most_work = 100});
+  SkinEstimator thrifty(model_, {.most_work = 25});
   int frames = 0;
   do {
     thrifty.Estimate(seen, estimate_);
