@@ -97,9 +97,12 @@ std::optional<double> GrossErrorTest::Chi2PerDof(const SkinProblem& problem, con
   Eigen::MatrixXd modes;
   camera_modes_.Write(problem.observed, modes);
   const Eigen::MatrixXd known = untouched.skin.by_known_loads() * problem.prior.now;
-  Eigen::MatrixXf columns(untouched_mm.size(),
-                          worse.cols() + modes.cols() + known.cols() + problem.prior.baseline_mm.cols());
-  columns << worse, modes.cast<float>(), known.cast<float>(), problem.prior.baseline_mm.cast<float>();
+  const Eigen::MatrixXd& baseline = problem.prior.baseline_mm;  // without rows, if it is known
+  Eigen::MatrixXf columns(untouched_mm.size(), worse.cols() + modes.cols() + known.cols() + baseline.cols());
+  columns.leftCols(worse.cols()) = worse;
+  columns.middleCols(worse.cols(), modes.cols()) = modes.cast<float>();
+  columns.middleCols(worse.cols() + modes.cols(), known.cols()) = known.cast<float>();
+  if (baseline.cols() > 0) columns.rightCols(baseline.cols()) = baseline.cast<float>();
   if (!whitening_.Set(covariance_, std::move(columns))) return std::nullopt;
   Eigen::VectorXd off_mm = Eigen::VectorXd::Zero(untouched_mm.size());
   Eigen::Index seen = 0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -28,6 +29,26 @@ class LoadCases {
     const auto i = static_cast<size_t>(index);
     const size_t end = i + 1 < first_.size() ? first_[i + 1] : all_.size();
     return std::span(all_).subspan(first_[i], end - first_[i]);
+  }
+
+  /// What several cases load one site with.
+  struct OnSite {
+    std::vector<Eigen::Index> cases;
+    Eigen::Matrix<float, kNodeDofs, Eigen::Dynamic> loads;  ///< by `cases`
+  };
+  /// By site, of the cases that have at most `most` loads.
+  std::map<int, OnSite> BySite(size_t most) const {
+    std::map<int, OnSite> sites;
+    for (Eigen::Index i = 0; i < count(); ++i) {
+      if ((*this)[i].size() > most) continue;
+      for (const auto& [site, load] : (*this)[i]) {
+        OnSite& on = sites[site];
+        on.cases.push_back(i);
+        on.loads.conservativeResize(Eigen::NoChange, on.loads.cols() + 1);
+        on.loads.rightCols<1>() = load.cast<float>();
+      }
+    }
+    return sites;
   }
 
  private:

@@ -79,6 +79,7 @@ bool LoadEstimator::Prepare(Linearization& skin, const UntouchedSkin& untouched_
   hidden_.resize(0, 0);
   free_norms_.resize(0);
   limits_.by_site_n.resize(0);
+  tangential_ = {};
   hidden_projected_ = 0;
   columns_.Clear(mechanics_.site_count() + mechanics_.site_rows(), whitening_.size());
   if (!is_touched && untouched_->ring)
@@ -242,6 +243,7 @@ void LoadEstimator::Hide(const MarkerObservations& observed) {
   if (hidden_.rows() == whitening_.size() && AreSame(missing, missing_)) return;
   missing_ = missing;
   limits_.by_site_n.resize(0);
+  tangential_ = {};
   free_norms_.resize(0);
   hidden_projected_ = 0;
   hidden_.setZero(whitening_.size(), static_cast<Eigen::Index>(missing.size()));

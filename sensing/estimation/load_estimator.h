@@ -197,7 +197,15 @@ class LoadEstimator {
   };
   /// Forces around and along, and couples about both.
   static constexpr Eigen::Index kTangential = 4;
-  std::vector<Eigen::MatrixXd> TangentialColumns(const Linearization& skin, const std::vector<Hill>& hills);
+  /// Those of the hills' tangential forces, and the shares by site that they were made for.
+  struct TangentialColumns {
+    Eigen::MatrixXd shares;                // by site, of each hill
+    std::vector<Eigen::MatrixXd> columns;  // by hill, whitened, beside what is hidden
+
+    bool AreAbout(const Eigen::MatrixXd& now) const;
+  };
+  Eigen::MatrixXd SharesOf(const std::vector<Hill>& hills) const;
+  void MakeTangentialColumns(const Linearization& skin, Eigen::MatrixXd shares);
   Eigen::VectorXd TangentialPrior(Eigen::Index columns) const;
   Solution Refit(const std::vector<int>& chosen, const Eigen::MatrixXd& tangential);
   void FitWithoutTangential();
@@ -208,7 +216,6 @@ class LoadEstimator {
     Vec2 force_n = Vec2::Zero();
   };
   std::vector<TangentialGain> TangentialGains(const std::vector<int>& sites,
-                                              const std::vector<Eigen::MatrixXd>& columns,
                                               const Eigen::MatrixXd& tangential,
                                               const Solution& solution) const;
   /// Columns with what they say of themselves.
@@ -277,8 +284,8 @@ class LoadEstimator {
   Eigen::VectorXd inward_pulls_;          // by site, of the residual
   Eigen::VectorXd pulls_per_mm_;          // of the residual, on each marker: covariance^-1 times it
   std::vector<TangentialGain> left_out_;  // by hill: of those that were not let in
-  std::vector<Eigen::MatrixXd> tangential_columns_;  // by hill
-  std::vector<size_t> hill_of_load_;                 // by load of the estimate
+  TangentialColumns tangential_;          // none: not made since Prepare, or since other markers are hidden
+  std::vector<size_t> hill_of_load_;      // by load of the estimate
 };
 
 }  // namespace taclink

@@ -178,7 +178,7 @@ void LoadEstimator::WriteCovariances(Linearization& skin, LoadEstimate& estimate
         design.col(column) -= hidden_ * (hidden_.transpose() * design.col(column));
     }
     design.middleCols<2>(5 * i + 1) =
-        tangential_columns_[hill_of_load_[static_cast<size_t>(i)]].leftCols<2>();
+        tangential_.columns[hill_of_load_[static_cast<size_t>(i)]].leftCols<2>();
     const double sigma =
         load.has_tangential ? kTangentialN * mechanics_.force_unit() : kStillTangential * load.normal_force_n;
     prior.segment<2>(5 * i + 1).setConstant(1 / (sigma * sigma));

@@ -1,5 +1,6 @@
 #include "sensing/estimation/patch_compliance.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,8 +12,7 @@
 namespace taclink {
 namespace {
 
-constexpr size_t kFewLoads = 10;  // of a case, for which a solution is more work than their blocks
-constexpr double kTurnMm = 10;    // of a director, a radian
+constexpr double kTurnMm = 10;  // of a director, a radian
 
 using Hessian = Eigen::Matrix<double, NonlinearShell::kElementDofs, NonlinearShell::kElementDofs>;
 
@@ -221,24 +221,25 @@ Eigen::MatrixXf PatchCompliance::Displacements(const LoadCases& cases) const {
 // E' K0^-1 B.
 Eigen::MatrixXf PatchCompliance::PatchMotions(const LoadCases& cases) const {
   Eigen::MatrixXf motions = Eigen::MatrixXf::Zero(change_.rows(), cases.count());
+  for (const auto& [site, on] : cases.BySite(RoundCompliance::kFewLoads)) {
+    const Vec2 turn = TurnOf(mechanics_.NodeOfSite(site));
+    Eigen::Matrix<float, kNodeDofs, Eigen::Dynamic> turned = on.loads;
+    const Eigen::Rotation2Df to_cylindrical(static_cast<float>(-std::atan2(turn.y(), turn.x())));
+    turned.topRows<2>() = (to_cylindrical.toRotationMatrix() * turned.topRows<2>()).eval();
+    for (size_t k = 0; k < sites_.size(); ++k) {
+      const RoundCompliance::NodeBlock block = round_->BlockOf(sites_[k], site);
+      for (Eigen::Index i = 0; i < turned.cols(); ++i)
+        motions.col(on.cases[static_cast<size_t>(i)])
+            .segment<kNodeDofs>(kNodeDofs * static_cast<Eigen::Index>(k)) += block.lazyProduct(turned.col(i));
+    }
+  }
   Eigen::VectorXd forces, motion;
   for (Eigen::Index i = 0; i < cases.count(); ++i) {
-    if (cases[i].size() > kFewLoads) {
-      forces.setZero(jacobian_.cols());
-      for (const auto& [site, load] : cases[i]) forces.segment<kNodeDofs>(kNodeDofs * site) += load;
-      round_->Solve(forces, motion);
-      Gather(motion, motions.col(i));
-      continue;
-    }
-    for (const auto& [site, load] : cases[i]) {
-      const Vec2 turn = TurnOf(mechanics_.NodeOfSite(site));
-      Eigen::Matrix<float, kNodeDofs, 1> turned = load.cast<float>();
-      turned[0] = static_cast<float>(turn.x() * load[0] + turn.y() * load[1]);
-      turned[1] = static_cast<float>(turn.x() * load[1] - turn.y() * load[0]);
-      for (size_t k = 0; k < sites_.size(); ++k)
-        motions.col(i).segment<kNodeDofs>(kNodeDofs * static_cast<Eigen::Index>(k)) +=
-            round_->BlockOf(sites_[k], site).lazyProduct(turned);
-    }
+    if (cases[i].size() <= RoundCompliance::kFewLoads) continue;
+    forces.setZero(jacobian_.cols());
+    for (const auto& [site, load] : cases[i]) forces.segment<kNodeDofs>(kNodeDofs * site) += load;
+    round_->Solve(forces, motion);
+    Gather(motion, motions.col(i));
   }
   return motions;
 }

@@ -6,11 +6,6 @@
 #include <utility>
 
 namespace taclink {
-namespace {
-
-constexpr size_t kFewLoads = 10;  // of a case: turning what each does is less work than a solution
-
-}  // namespace
 
 RoundCompliance::RoundCompliance(const SkinMechanics& mechanics, std::shared_ptr<const InflatedSkin> skin)
     : mechanics_(mechanics),
@@ -63,15 +58,17 @@ void RoundCompliance::AddTurned(const float* from, int by, float* to) const {
   }
 }
 
-void RoundCompliance::AddDisplacements(int site, const LoadCases::Load& load,
-                                       Eigen::Ref<Eigen::VectorXf> column) const {
+// Of all cases at once: the responses of a site are read once.
+void RoundCompliance::AddDisplacements(int site, const LoadCases::OnSite& on,
+                                       Eigen::MatrixXf& displacements) const {
   const int row = site / mechanics_.columns(), around = site % mechanics_.columns(), by = around / parts_;
   const Eigen::Rotation2Df back(static_cast<float>(-2 * kPi * by / paths_));
-  Eigen::Matrix<float, kNodeDofs, 1> turned = load.cast<float>();
-  turned.head<2>() = (back * turned.head<2>()).eval();
-  thread_local Eigen::VectorXf first;
+  Eigen::Matrix<float, kNodeDofs, Eigen::Dynamic> turned = on.loads;
+  turned.topRows<2>() = (back.toRotationMatrix() * turned.topRows<2>()).eval();
+  thread_local Eigen::MatrixXf first;
   first = responses_.middleCols<kNodeDofs>(kNodeDofs * (row * parts_ + around % parts_)).lazyProduct(turned);
-  AddTurned(first.data(), by, column.data());
+  for (Eigen::Index k = 0; k < first.cols(); ++k)
+    AddTurned(first.col(k).data(), by, displacements.col(on.cases[static_cast<size_t>(k)]).data());
 }
 
 void RoundCompliance::AddResponses(int site, Eigen::Ref<Eigen::MatrixXf> responses) const {
@@ -87,20 +84,13 @@ void RoundCompliance::AddResponses(int site, Eigen::Ref<Eigen::MatrixXf> respons
   for (Eigen::Index k = 0; k < kNodeDofs; ++k) AddTurned(first.col(k).data(), by, responses.col(k).data());
 }
 
-void RoundCompliance::AddDisplacements(std::span<const LoadCases::SiteLoad> loads,
-                                       Eigen::Ref<Eigen::VectorXf> column) const {
-  if (responses_.size() == 0) MakeResponses();
-  for (const auto& [site, load] : loads) AddDisplacements(site, load, column);
-}
-
 Eigen::MatrixXf RoundCompliance::Displacements(const LoadCases& cases) const {
   Eigen::MatrixXf displacements = Eigen::MatrixXf::Zero(jacobian_.rows(), cases.count());
+  if (responses_.size() == 0) MakeResponses();
+  for (const auto& [site, on] : cases.BySite(kFewLoads)) AddDisplacements(site, on, displacements);
   Eigen::VectorXd forces, motion;
   for (Eigen::Index i = 0; i < cases.count(); ++i) {
-    if (cases[i].size() <= kFewLoads) {
-      AddDisplacements(cases[i], displacements.col(i));
-      continue;
-    }
+    if (cases[i].size() <= kFewLoads) continue;
     forces.setZero(jacobian_.cols());
     for (const auto& [site, load] : cases[i]) forces.segment<kNodeDofs>(kNodeDofs * site) += load;
     Solve(forces, motion);

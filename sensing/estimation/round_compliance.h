@@ -22,8 +22,8 @@ class RoundCompliance final : public SkinCompliance {
   const MarkerMap::Jacobian& jacobian() const override { return jacobian_; }
   Eigen::MatrixXf Displacements(const LoadCases& cases) const override;
 
-  /// Adds what one case does.
-  void AddDisplacements(std::span<const LoadCases::SiteLoad> loads, Eigen::Ref<Eigen::VectorXf> column) const;
+  /// Of a case of so many loads, adding up the responses to each is less work than Solve.
+  static constexpr size_t kFewLoads = 48;
   /// Adds J K^-1 by the unknowns of a site's node in cylindrical coordinates: 3 markers x 5.
   void AddResponses(int site, Eigen::Ref<Eigen::MatrixXf> responses) const;
 
@@ -34,7 +34,7 @@ class RoundCompliance final : public SkinCompliance {
 
  private:
   void MakeResponses() const;
-  void AddDisplacements(int site, const LoadCases::Load& load, Eigen::Ref<Eigen::VectorXf> column) const;
+  void AddDisplacements(int site, const LoadCases::OnSite& on, Eigen::MatrixXf& displacements) const;
   void AddTurned(const float* from, int by, float* to) const;
 
   const SkinMechanics& mechanics_;

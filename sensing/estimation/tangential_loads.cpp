@@ -10,20 +10,34 @@ namespace taclink {
 namespace {
 
 constexpr double kTangentialGain = 60;  // of chi^2
+constexpr double kSurelyLittle = 0.5;   // of that, by columns of about the same shares
+constexpr double kSameShares = 0.3;     // the sum of their changes
 constexpr double kInformationRidge = 1e-9;
 constexpr double kShiftSites = 2;  // standard deviation of where a tangential force acts about its hill
 
 }  // namespace
 
-// By hill: of a force of 1 N that the hill's sites share as they share the load, around and along, and of
-// couples.
-std::vector<Eigen::MatrixXd> LoadEstimator::TangentialColumns(const Linearization& skin,
-                                                              const std::vector<Hill>& hills) {
+bool LoadEstimator::TangentialColumns::AreAbout(const Eigen::MatrixXd& now) const {
+  return shares.rows() == now.rows() && shares.cols() == now.cols() &&
+         ((shares - now).cwiseAbs().colwise().sum().array() < kSameShares).all();
+}
+
+// By site, of each hill, how it shares its load: what its tangential force acts on.
+Eigen::MatrixXd LoadEstimator::SharesOf(const std::vector<Hill>& hills) const {
+  Eigen::MatrixXd shares = Eigen::MatrixXd::Zero(mechanics_.site_count(), std::ssize(hills));
+  for (Eigen::Index i = 0; i < shares.cols(); ++i) {
+    for (const int column : hills[static_cast<size_t>(i)])
+      ForSites(column, [&](int site, double) { shares(site, i) = loads_[site]; });
+    shares.col(i) /= shares.col(i).sum();
+  }
+  return shares;
+}
+
+// By hill, of forces of 1 N around and along, and of couples.
+void LoadEstimator::MakeTangentialColumns(const Linearization& skin, Eigen::MatrixXd shares) {
   LoadCases cases;
-  for (const Hill& hill : hills) {
-    Eigen::VectorXd shares = Eigen::VectorXd::Zero(mechanics_.site_count());
-    for (const int column : hill) ForSites(column, [&](int site, double) { shares[site] = loads_[site]; });
-    const Eigen::VectorXd spread = mechanics_.spread() * (shares / shares.sum());
+  for (const auto& of_hill : shares.colwise()) {
+    const Eigen::VectorXd spread = mechanics_.spread() * of_hill;
     const auto add = [&](const auto& load_at) {
       cases.Begin();
       for (int site = 0; site < mechanics_.site_count(); ++site) {
@@ -39,10 +53,9 @@ std::vector<Eigen::MatrixXd> LoadEstimator::TangentialColumns(const Linearizatio
   whitening_.Apply(single);
   Eigen::MatrixXd columns = single.cast<double>();
   if (hidden_.cols() > 0) columns -= hidden_ * (hidden_.transpose() * columns);
-  std::vector<Eigen::MatrixXd> all;
+  tangential_ = {.shares = std::move(shares), .columns = {}};
   for (Eigen::Index i = 0; i < columns.cols(); i += kTangential)
-    all.emplace_back(columns.middleCols<kTangential>(i));
-  return all;
+    tangential_.columns.emplace_back(columns.middleCols<kTangential>(i));
 }
 
 // Information that is there before the data, by column.
@@ -82,16 +95,16 @@ Eigen::MatrixXd LoadEstimator::InformationBeside(const FitColumns& fit, const Ei
 
 // What each hill's tangential force would explain beside the loads that act and the tangential forces that
 // were let in, if no load had to stay above zero.
-std::vector<LoadEstimator::TangentialGain> LoadEstimator::TangentialGains(
-    const std::vector<int>& sites, const std::vector<Eigen::MatrixXd>& columns,
-    const Eigen::MatrixXd& tangential, const Solution& solution) const {
+std::vector<LoadEstimator::TangentialGain> LoadEstimator::TangentialGains(const std::vector<int>& sites,
+                                                                          const Eigen::MatrixXd& tangential,
+                                                                          const Solution& solution) const {
   std::vector<int> acting;
   for (size_t i = 0; i < sites.size(); ++i) {
     if (solution.loads[static_cast<Eigen::Index>(i)] > 0) acting.push_back(sites[i]);
   }
   const FitColumns fit = ColumnsOf(acting, tangential);
   std::vector<TangentialGain> gains;
-  for (const Eigen::MatrixXd& own : columns) {
+  for (const Eigen::MatrixXd& own : tangential_.columns) {
     Eigen::MatrixXd left = InformationBeside(fit, own);
     left.diagonal() += TangentialPrior(own.cols());
     const Eigen::VectorXd pull = own.transpose() * solution.residual;
@@ -109,22 +122,29 @@ void LoadEstimator::FitWithoutTangential() {
 }
 
 // One after the other, the hill first whose tangential force explains most; none that explains little: what a
-// shell gets wrong of a solid looks like a tangential force of the normal one's size.
+// shell gets wrong of a solid looks like a tangential force of the normal one's size. Columns of shares that
+// were about the same do to tell that a force explains little, not to estimate one.
 void LoadEstimator::LetSlip(const Linearization& skin) {
   const std::vector<Hill>& hills = fit_.hills;
   const std::vector<int> sites = HillFinder::AllOf(hills);
-  std::vector<Eigen::MatrixXd>& columns = tangential_columns_;
-  columns = TangentialColumns(skin, hills);
+  Eigen::MatrixXd shares = SharesOf(hills);
+  bool are_about = tangential_.AreAbout(shares);
+  if (!are_about) MakeTangentialColumns(skin, shares);
   while (fit_.slipping.size() < hills.size()) {
-    left_out_ = TangentialGains(sites, columns, fit_.tangential, solution_);
+    left_out_ = TangentialGains(sites, fit_.tangential, solution_);
     trials_ += static_cast<int>(hills.size());
     for (const int hill : fit_.slipping) left_out_[static_cast<size_t>(hill)] = {};
     const auto best = std::max_element(left_out_.begin(), left_out_.end(),
                                        [](const auto& a, const auto& b) { return a.chi2 < b.chi2; }) -
                       left_out_.begin();
-    if (!(left_out_[static_cast<size_t>(best)].chi2 > kTangentialGain)) return;
+    const double gain = left_out_[static_cast<size_t>(best)].chi2;
+    if (std::exchange(are_about, false) && !(gain < kSurelyLittle * kTangentialGain)) {
+      MakeTangentialColumns(skin, shares);
+      continue;
+    }
+    if (!(gain > kTangentialGain)) return;
     Eigen::MatrixXd more(data_.size(), fit_.tangential.cols() + kTangential);
-    more << fit_.tangential, columns[static_cast<size_t>(best)];
+    more << fit_.tangential, tangential_.columns[static_cast<size_t>(best)];
     Solution with = Refit(sites, more);
     if (!(solution_.chi2 - with.chi2 > kTangentialGain)) return;
     fit_.slipping.push_back(static_cast<int>(best));
@@ -175,7 +195,7 @@ void LoadEstimator::MoveCenters(const Linearization& skin, LoadEstimate& estimat
     }
     if (!load.has_tangential) continue;
     tangential.conservativeResize(Eigen::NoChange, tangential.cols() + kTangential);
-    tangential.rightCols(kTangential) = tangential_columns_[hill_of_load_[i]];
+    tangential.rightCols(kTangential) = tangential_.columns[hill_of_load_[i]];
   }
   if (tangential.cols() == 0) return;
   const FitColumns fit = ColumnsOf(acting, tangential);

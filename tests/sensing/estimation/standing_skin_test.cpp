@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "sensing/shell/pressed_skin.h"
 #include "tests/sensing/estimation/pushed_skin.h"
 
 namespace taclink {
@@ -92,6 +93,34 @@ TEST_F(StandingSkinTest, FindsAWeakBodyBesideIt) {
     estimator_.Estimate(seen, estimate_);
     ExpectColdAnswer(seen);
   }
+}
+
+// What was enough to tell that nothing drags is not what a drag is estimated with.
+TEST_F(StandingSkinTest, BeginsToDrag) {
+  PressedSkin skin(model_, {});
+  ASSERT_TRUE(skin.Inflate(1e-3 * kStandingKpa).ok());
+  const auto node = static_cast<size_t>(skin.mesh().NodeOfMarker(model_, model_.MarkerIndex(6, 4)));
+  const Vec3 outward = skin.mesh().normals[node];
+  skin.AddBody(RigidStamp{skin.state().mids_mm[node] + model_.thickness_mm / 2 * outward, -outward, 2.75},
+               true);
+  const auto see = [&] {
+    Eigen::VectorXd markers_mm(3 * model_.markers.count());
+    for (int m = 0; m < model_.markers.count(); ++m)
+      markers_mm.segment<3>(3 * m) = skin.Marker(m) - model_.RestMarker(m);
+    return Noisy(markers_mm);
+  };
+  const Vec3 in = -5 * outward, along = 0.4 * Vec3::UnitZ();
+  ASSERT_TRUE(skin.Move({&in, 1}).ok());
+  for (int frame = 0; frame < 4; ++frame) estimator_.Estimate(see(), estimate_);
+  ASSERT_EQ(estimate_.loads.loads.size(), 1U);
+  EXPECT_FALSE(estimate_.loads.loads[0].has_tangential);
+  for (int frame = 0; frame < 8; ++frame) {
+    ASSERT_TRUE(skin.Move({&along, 1}).ok());
+    const SkinObservation seen = see();
+    estimator_.Estimate(seen, estimate_);
+    ExpectColdAnswer(seen);
+  }
+  EXPECT_TRUE(estimate_.loads.loads.at(0).has_tangential);
 }
 
 // It was left out in the first frame, and must not come back because it stays where it is.
