@@ -23,6 +23,7 @@ constexpr int kMostSteps = 16, kMostTangents = 5;
 constexpr double kLeastStepMm = 0.3;
 constexpr int kStepsOfTangent = 3;  // the least: a new one is a disturbance where a skin may buckle
 constexpr double kShrinks = 0.5;    // steps by less: the tangent is too old
+constexpr double kArrivingMm = 1;   // of a step: a tangent that is made where it leads will be near the end
 // Between the last two steps, of the loads in any neighborhood by the largest, and of a seen marker: settled.
 constexpr double kSameLoads = 0.1, kSeenSettledMm = 0.2;
 
@@ -240,8 +241,8 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
         step_mm * std::min(1.0, kTangentErrorPerMm * distance_mm / unit) < kNextStepMm * unit;
     if (is_settled && !is_off) return true;
     before_mm = step_mm;
-    if (step + kStepsOfTangent < kMostSteps && (is_off || is_slow) &&
-        estimate.work.tangents < most_tangents) {
+    const bool is_old = is_slow || (is_off && step_mm < kArrivingMm * unit);
+    if (step + kStepsOfTangent < kMostSteps && is_old && estimate.work.tangents < most_tangents) {
       if (is_slow) touched_->is_prepared = false;
       const bool is_good = touched_->IsGoodFor(problem, estimate.state) && touched_->HasLocal(local_n);
       if (!is_good && !Remake(*touched_, problem, estimate.state, local_n, estimate)) return false;
