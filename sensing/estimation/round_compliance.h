@@ -22,7 +22,7 @@ class RoundCompliance final : public SkinCompliance {
   const MarkerMap::Jacobian& jacobian() const override { return jacobian_; }
   Eigen::MatrixXf Displacements(const LoadCases& cases) const override;
 
-  /// Of a case of so many loads, adding up the responses to each is less work than Solve.
+  /// Up to this many loads per case, superposing the responses of their sites costs less than Solve.
   static constexpr size_t kFewLoads = 48;
   /// Adds J K^-1 by the unknowns of a site's node in cylindrical coordinates: 3 markers x 5.
   void AddResponses(int site, Eigen::Ref<Eigen::MatrixXf> responses) const;

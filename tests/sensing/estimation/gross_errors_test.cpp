@@ -4,6 +4,7 @@
 #include <random>
 #include <vector>
 
+#include "sensing/shell/pressed_skin.h"
 #include "tests/sensing/estimation/pushed_skin.h"
 
 namespace taclink {
@@ -80,6 +81,36 @@ TEST_F(GrossErrorsTest, AreNotWhatForcesDo) {
       estimator_.Estimate(*observation, estimate_);
       EXPECT_EQ(estimate_.failure, EstimateFailure::kNone) << kpa;
     }
+  }
+}
+
+// A stamp that sticks, pressed in deeply and moved far along the wall.
+TEST_F(GrossErrorsTest, AreNotStrongDrags) {
+  struct Drag {
+    double kpa, radius_mm, depth_mm, by_mm;
+    bool is_along;
+  };
+  for (const Drag& drag : {Drag{0, 2.75, 9, 16, false}, Drag{1.5, 8, 14, 12, true}}) {
+    const LinkModel model = LoadLinkModel("cylinder").value();
+    PressedSkin skin(model, {});
+    ASSERT_TRUE(skin.Inflate(1e-3 * drag.kpa).ok());
+    const auto node = static_cast<size_t>(skin.mesh().NodeOfMarker(model, model.MarkerIndex(6, 4)));
+    const Vec3 outward = skin.mesh().normals[node];
+    const Vec3 top = skin.state().mids_mm[node] + (model.thickness_mm / 2 + 0.01) * outward;
+    skin.AddBody(RigidStamp{top, -outward, drag.radius_mm}, true);
+    const Vec3 in = -drag.depth_mm * outward,
+               by = drag.by_mm *
+                    (drag.is_along ? Vec3::UnitZ() : Vec3(-outward.y(), outward.x(), 0).normalized());
+    ASSERT_TRUE(skin.Move({&in, 1}).ok() && skin.Move({&by, 1}).ok());
+    Eigen::VectorXd markers_mm(3 * model.markers.count());
+    for (int m = 0; m < model.markers.count(); ++m)
+      markers_mm.segment<3>(3 * m) = skin.Marker(m) - model.RestMarker(m);
+    SkinEstimator estimator(model);
+    estimator.Estimate(Observe(markers_mm, drag.kpa, kNoiseMm), estimate_);
+    EXPECT_EQ(estimate_.failure, EstimateFailure::kNone) << drag.kpa;
+    ASSERT_EQ(estimate_.loads.loads.size(), 1U);
+    const double force_n = skin.ContactOf(0).force_n.norm();
+    EXPECT_NEAR(estimate_.loads.loads[0].force_n.norm(), force_n, 0.05 * force_n);
   }
 }
 
