@@ -124,11 +124,11 @@ CalibrationSummary ResidualsOf(const RestShape& shape, const StereoRig& rig, con
 }
 
 std::string Describe(const LinkModel& model, const Dent& dent) {
-  char text[200];
+  char text[256];
   std::snprintf(
       text, sizeof text,
-      "the skin is touched near path %d, ring %d: %d markers lie up to %.1f mm %s their rest places; "
-      "take the rest pictures again with nothing at the skin",
+      "near path %d, ring %d %d markers lie up to %.1f mm %s the model's rest shape; take the rest images "
+      "again with nothing at the skin; if nothing is there, check that the model is this link's",
       model.PathOf(dent.marker) + 1, model.RingOf(dent.marker) + 1, dent.markers, std::abs(dent.depth_mm),
       dent.depth_mm > 0 ? "inside" : "outside");
   return text;

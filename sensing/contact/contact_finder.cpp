@@ -5,16 +5,17 @@
 #include <cmath>
 
 #include "sensing/contact/contact_writer.h"
+#include "sensing/core/similar_skin.h"
 
 namespace taclink {
 
 ContactFinder::ContactFinder(const LinkModel& model, const ContactOptions& options)
-    : model_(model), options_(options) {}
+    : model_(model),
+      min_force_n_(options.min_force_n * ForceUnit(model)),
+      same_contact_mm_(options.same_contact_mm * LengthUnit(model)) {}
 
 void ContactFinder::Find(SkinEstimator& estimator, const SkinEstimate& estimate,
                          std::vector<Contact>& contacts) {
-  min_force_n_ = options_.min_force_n * estimator.mechanics().force_unit();
-  same_contact_mm_ = options_.same_contact_mm * estimator.mechanics().length_unit();
   contacts.clear();
   ContactWriter writer(estimator, estimate);
   for (const EstimatedLoad& load : estimate.loads.loads) {
@@ -76,10 +77,9 @@ void ContactFinder::FindIslands(const std::vector<Vec3>& positions_mm, const Nod
 }
 
 void ContactFinder::AssignIds(std::vector<Contact>& contacts) {
-  const double same_mm = same_contact_mm_ > 0 ? same_contact_mm_ : options_.same_contact_mm;
   for (Contact& contact : contacts) {
     Known* nearest = nullptr;
-    double best = same_mm;
+    double best = same_contact_mm_;
     for (Known& old : previous_) {
       const double distance = (old.center_mm - contact.center_mm).norm();
       if (old.id != 0 && distance < best) {

@@ -13,7 +13,7 @@ struct ContactOptions {
   /// Weaker contacts are not reported; times E t^2 over that of the shipped cylinder.
   double min_force_n = 0.02;
   /// A contact keeps its id if its center moved less between frames; times sqrt(R t), likewise.
-  double same_contact_mm = 30;
+  double same_contact_mm = kSameContactMm;
 };
 
 /// Describes an estimate's loads as contacts, and gives them ids that last: remembers the last frame's. One
@@ -32,12 +32,11 @@ class ContactFinder {
   void AssignIds(std::vector<Contact>& contacts);
 
   LinkModel model_;
-  ContactOptions options_;
+  double min_force_n_, same_contact_mm_;
   struct Known {
     uint64_t id;
     Vec3 center_mm;
   };
-  double min_force_n_ = 0, same_contact_mm_ = 0;
   std::vector<Known> previous_;
   uint64_t next_id_ = 1;
 };

@@ -52,6 +52,10 @@ struct NodalForces {
   bool converged = true;  ///< false: there is no estimate, the forces are none
 };
 
+/// A contact keeps its identity while its center moves less than this from one frame to the next, mm; times
+/// LengthUnit of the skin.
+inline constexpr double kSameContactMm = 30;
+
 /// A connected region of the skin that something pushes on. Link frame.
 struct Contact {
   uint64_t id = 0;                          ///< lasts while the contact does; unique within a link's run

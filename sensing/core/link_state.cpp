@@ -45,6 +45,7 @@ constexpr ReasonTraits kReasonTraits[] = {
     {.name = "frame_rate", .unit = ReasonUnit::kHertz},
     {.name = "image_contrast", .doubts_contacts = false},
     {.name = "late_frame", .unit = ReasonUnit::kSeconds},
+    {.name = "temporal_smoothing"},
 };
 static_assert(std::size(kReasonTraits) == kReasonCount);
 

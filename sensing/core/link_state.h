@@ -24,37 +24,38 @@ enum class LinkStatus : uint8_t {
 
 /// Why a state is worse than it could be. The names (Name) are stable.
 enum class ReasonId : uint8_t {
-  kFewMarkers,        ///< too few markers are seen
-  kCamera,            ///< a camera gives no picture, or none that can be read
-  kFrozen,            ///< a camera gives the same picture again and again
-  kLate,              ///< a camera shows the skin's motion later than the other
-  kCamerasDisagree,   ///< the two pictures are not of one skin at one moment
-  kNotConverged,      ///< no loads and pressure were found that explain the markers
-  kImpossible,        ///< what was found is not physically possible
-  kNoEquilibrium,     ///< no skin of this model is stable under the pressure
-  kPressureUnknown,   ///< nobody tells the pressure; the skin's shape does
-  kPressureMismatch,  ///< the pressure that is told does not fit the skin's shape
-  kResidual,          ///< a region of markers contradicts the estimate
-  kLabels,            ///< markers of one region were left out as contradicting
-  kTooDeep,           ///< pressed in deeper than forces were compared with the truth
-  kBeyondMarkers,     ///< a load that may lie between a clamp and the ring beside it, where it hardly shows
-  kEncircled,         ///< bodies all around bend the skin in waves that are hardly resolved
-  kSparseMarkers,     ///< a load on this skin may hide between the markers that are in sight
-  kUnsettled,         ///< where no camera sees the skin its shape did not settle
-  kForceModel,        ///< the force model that was asked for does not hold here
-  kCamerasMoved,      ///< what they make of markers is taken off, but calibrate
-  kDrift,             ///< the baseline has drifted
-  kNoFrames,          ///< none come from the source, or from the log that is replayed
-  kWorker,            ///< what reads or computes the frames is late, has failed or is being started again
-  kForcedBaseline,    ///< beside another reason: a baseline that was taken by force may explain it
-  kAttitudeUnknown,   ///< the specific force is not known well enough for accurate forces
-  kAttitudeMismatch,  ///< the measured specific force does not fit the skin's shape
-  kCamerasSwapped,    ///< the top camera's images are those of the bottom camera, and the other way round
-  kFrameRate,         ///< a camera gives fewer new images than the link gives frames
-  kImageContrast,     ///< markers stand out less in a camera's images than when the rest shape was taken
-  kLateFrame,         ///< too much time passed from the exposure to the publication
+  kFewMarkers,         ///< too few markers are seen
+  kCamera,             ///< a camera gives no picture, or none that can be read
+  kFrozen,             ///< a camera gives the same picture again and again
+  kLate,               ///< a camera shows the skin's motion later than the other
+  kCamerasDisagree,    ///< the two pictures are not of one skin at one moment
+  kNotConverged,       ///< no loads and pressure were found that explain the markers
+  kImpossible,         ///< what was found is not physically possible
+  kNoEquilibrium,      ///< no skin of this model is stable under the pressure
+  kPressureUnknown,    ///< nobody tells the pressure; the skin's shape does
+  kPressureMismatch,   ///< the pressure that is told does not fit the skin's shape
+  kResidual,           ///< a region of markers contradicts the estimate
+  kLabels,             ///< markers of one region were left out as contradicting
+  kTooDeep,            ///< pressed in deeper than forces were compared with the truth
+  kBeyondMarkers,      ///< a load that may lie between a clamp and the ring beside it, where it hardly shows
+  kEncircled,          ///< bodies all around bend the skin in waves that are hardly resolved
+  kSparseMarkers,      ///< a load on this skin may hide between the markers that are in sight
+  kUnsettled,          ///< where no camera sees the skin its shape did not settle
+  kForceModel,         ///< the force model that was asked for does not hold here
+  kCamerasMoved,       ///< what they make of markers is taken off, but calibrate
+  kDrift,              ///< the baseline has drifted
+  kNoFrames,           ///< none come from the source, or from the log that is replayed
+  kWorker,             ///< what reads or computes the frames is late, has failed or is being started again
+  kForcedBaseline,     ///< beside another reason: a baseline that was taken by force may explain it
+  kAttitudeUnknown,    ///< the specific force is not known well enough for accurate forces
+  kAttitudeMismatch,   ///< the measured specific force does not fit the skin's shape
+  kCamerasSwapped,     ///< the top camera's images are those of the bottom camera, and the other way round
+  kFrameRate,          ///< a camera gives fewer new images than the link gives frames
+  kImageContrast,      ///< markers stand out less in a camera's images than when the rest shape was taken
+  kLateFrame,          ///< too much time passed from the exposure to the publication
+  kTemporalSmoothing,  ///< a camera blends each image with those before it
 };
-inline constexpr int kReasonCount = static_cast<int>(ReasonId::kLateFrame) + 1;
+inline constexpr int kReasonCount = static_cast<int>(ReasonId::kTemporalSmoothing) + 1;
 
 /// What a reason's number is in. kNone: a number of markers, or a ratio.
 enum class ReasonUnit : uint8_t { kNone, kMillimeters, kMegapascals, kSeconds, kHertz };

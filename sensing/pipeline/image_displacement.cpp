@@ -20,9 +20,9 @@ constexpr double kExplainedPx = 3;   // a spot lies within this of its marker
 constexpr double kLeastShare = 0.6;  // of spots and of markers, that must be explained
 // What is told of it.
 constexpr double kLeastShiftPx = 0.5, kLeastTurnRad = 0.005, kLeastScale = 0.005;
-// A displacement is found only if without it that share of its spots at most lies so near to a marker: what
-// is less, the estimate takes off, and a skin that is pressed is not to be taken for it.
-constexpr double kNearPx = 2.5, kMostNearShare = 0.5;
+// Of the RMS residual without the displacement, that it may leave. A pressed skin leaves more: it is no
+// similarity of the image.
+constexpr double kMostLeft = 0.5;
 // Of displacements that explain the spots, the one is preferred that has the fewest parts, then the smallest
 // shift: px of RMS that a part costs (shift, turn, scale, mirror), and a px of shift.
 constexpr double kPerPart = 0.4, kPerShift = 0.05;
@@ -181,17 +181,19 @@ class DisplacementSearch {
                             .turn_rad = std::atan2(fit->sine, fit->cosine),
                             .scale = std::hypot(fit->cosine, fit->sine),
                             .is_mirrored = is_mirrored};
-    double squares = 0;
+    double squares = 0, squares_without = 0;
     for (const Pair& pair : pairs) {
       const auto& from = Expected(pair.marker, path, is_mirrored);
       if (!from) continue;
       const double off_px2 = ((*fit)(*from) - pair.spot_px).squaredNorm();
       if (off_px2 > kExplainedPx * kExplainedPx) continue;
       squares += off_px2;
+      squares_without += (*from - pair.spot_px).squaredNorm();
       ++found.spots;
     }
     if (!IsEnough(static_cast<size_t>(found.spots))) return std::nullopt;
     found.rms_px = std::sqrt(squares / (2.0 * found.spots));
+    found.rms_without_px = std::sqrt(squares_without / (2.0 * found.spots));
     return found;
   }
 
@@ -223,7 +225,17 @@ int Explained(const Pixels& expected_px, const Detections& spots, double within_
   }));
 }
 
-std::string Text(const ImageDisplacement& found) {
+// Of the image of the skin's middle marker.
+double PixelsPerMm(const LinkModel& model, const CameraModel& camera) {
+  std::vector<double> all;
+  const Projector projector(camera);
+  for (int m = 0; m < model.markers.count(); ++m)
+    if (const auto seen = projector.ProjectWithJacobian(model.RestMarker(m)))
+      all.push_back(std::sqrt(seen->jacobian.squaredNorm() / 2));
+  return all.empty() ? 1 : Median(all);
+}
+
+std::string Text(const ImageDisplacement& found, double px_per_mm) {
   std::string text;
   const auto add = [&](const std::string& what) { text += (text.empty() ? "" : " and ") + what; };
   if (found.is_mirrored) add("mirrored");
@@ -232,7 +244,8 @@ std::string Text(const ImageDisplacement& found) {
   if (std::abs(found.scale - 1) > kLeastScale)
     add(ReasonText("%.1f %% %s", 100 * std::abs(found.scale - 1), found.scale > 1 ? "larger" : "smaller"));
   if (found.shift_px.norm() > kLeastShiftPx)
-    add(ReasonText("shifted by %.1f, %.1f px", found.shift_px.x(), found.shift_px.y()));
+    add(ReasonText("shifted by %.1f, %.1f px (%.1f mm of the skin)", found.shift_px.x(), found.shift_px.y(),
+                   found.shift_px.norm() / px_per_mm));
   return text;
 }
 
@@ -266,11 +279,9 @@ std::optional<Reason> DiagnoseImages(const LinkModel& model, const StereoRig& ri
     const auto found =
         FindDisplacement(model, camera.width_px, camera.height_px, expected[Index(id)], spots[Index(id)]);
     if (!found || Parts(*found) == 0) continue;
-    if (!found->is_mirrored &&
-        Explained(expected[Index(id)], spots[Index(id)], kNearPx) > kMostNearShare * found->spots)
-      continue;
-    text += (text.empty() ? "" : "; ") +
-            ReasonText("the %s camera's image is %s", Name(id), Text(*found).c_str());
+    if (found->rms_px > kMostLeft * found->rms_without_px) continue;
+    text += (text.empty() ? "" : "; ") + ReasonText("the %s camera's image is %s", Name(id),
+                                                    Text(*found, PixelsPerMm(model, camera)).c_str());
   }
   if (text.empty()) return std::nullopt;
   return Reason{

@@ -21,8 +21,9 @@ struct ImageDisplacement {
   double turn_rad = 0;  ///< from x (right) towards y (down)
   double scale = 1;
   bool is_mirrored = false;
-  int spots = 0;      ///< that it explains
-  double rms_px = 0;  ///< of these, each axis
+  int spots = 0;              ///< that it explains
+  double rms_px = 0;          ///< of these, each axis
+  double rms_without_px = 0;  ///< of the same, if the image were not displaced
 };
 
 /// Finds the displacement that takes `expected_px` (by marker; none: not in the image) to the spots of an

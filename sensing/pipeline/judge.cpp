@@ -250,7 +250,7 @@ void Judge(const Evidence& evidence, LinkState& state) {
   }
   AddBaselineReason(evidence, state);
   if (!lost)
-    std::stable_partition(state.reasons.begin(), state.reasons.end(),
+    std::stable_partition(state.reasons.begin() + (evidence.diagnosis ? 1 : 0), state.reasons.end(),
                           [](const Reason& reason) { return IsGrave(reason.id); });
   const bool grave = std::any_of(state.reasons.begin(), state.reasons.end(),
                                  [](const Reason& reason) { return IsGrave(reason.id); });

@@ -168,7 +168,7 @@ struct LinkPipeline::Stages {
     rest_origin = origin;
     rest.emplace(model, rig, pairs);
     rest_loads.Clear();
-    rest_progress = {.taken = 0, .wanted = pairs, .refusal = {}};
+    rest_progress = {.taken = 0, .wanted = pairs, .refusal = {}, .waiting_for = {}};
     last_refusal.clear();
     calibrates = !rig;
     refusals = 0;
@@ -201,28 +201,31 @@ struct LinkPipeline::Stages {
               camera_pictures.trouble() ? camera_pictures.trouble()->text : last_refusal);
   }
 
-  // A baseline under a pressure that is not known would be wrong for good.
+  // No baseline while the pressure is unknown: the error would persist until the next tare.
   void WaitForPressure(LinkState& state) {
     Forget(state);
-    SetStatus(state, LinkStatus::kCalibrating,
-              "the rest shape waits for the pressure sensor: " + state.pressure.trouble);
+    PostponeRest("the rest shape waits for the pressure sensor: " + state.pressure.trouble, state);
+  }
+
+  void PostponeRest(std::string why, LinkState& state) {
+    rest_progress.waiting_for = why;
+    SetStatus(state, LinkStatus::kCalibrating, std::move(why));
   }
 
   // A pair before the baseline is known.
   void TakeRest(const StereoFrame& frame, const MeasuredLoads& loads, LinkState& state) {
     Forget(state);
-    if (const auto& trouble = camera_pictures.trouble())
-      return SetStatus(state, LinkStatus::kCalibrating, trouble->text);
+    if (const auto& trouble = camera_pictures.trouble()) return PostponeRest(trouble->text, state);
     rest_loads.Add(loads);
-    if (const std::string trouble = rest_loads.Trouble(); !trouble.empty()) {
+    if (std::string trouble = rest_loads.Trouble(); !trouble.empty()) {
       rest->StartAgain();
       rest_loads.Clear();
       rest_progress.taken = 0;
-      return SetStatus(state, LinkStatus::kCalibrating, trouble);
+      return PostponeRest(std::move(trouble), state);
     }
-    const auto complete =
-        rest->Add(detections, pictures, RestAlternatives(rest_loads.mean(), NeverMoves(frame)),
-                  [this](const MeasuredLoads& at) { return estimator->RestShapeUnder(at); });
+    rest_progress.waiting_for.clear();
+    const auto complete = rest->Add(
+        detections, pictures, RestAlternatives(rest_loads.mean(), NeverMoves(frame)), estimator->AtRest());
     rest_progress.taken = rest->taken();
     rest_progress.refusal = complete ? std::nullopt : std::optional(complete.error());
     if (!complete) {
@@ -378,7 +381,11 @@ void LinkPipeline::BeginRest(int pairs) {
   stages_->BeginRest(std::nullopt, pairs, BaselineOrigin::kCalibration);
 }
 void LinkPipeline::CancelRest() {
-  if (stages_->skin) stages_->rest.reset();
+  if (!stages_->rest) return;
+  if (stages_->skin)
+    stages_->rest.reset();
+  else
+    stages_->BeginRest(stages_->options.rig, stages_->options.rest_frames, BaselineOrigin::kStart);
 }
 const RestProgress& LinkPipeline::rest_progress() const {
   return stages_->rest_progress;
@@ -422,7 +429,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
     const ImageRepeats repeats = s.options.pictures_may_repeat ? ImageRepeats::kAllowed
                                  : s.rest                      ? ImageRepeats::kAtRest
                                                                : ImageRepeats::kFault;
-    s.camera_pictures.Take(frame, s.CurrentRig(), repeats, state);
+    s.camera_pictures.Take(frame, s.CurrentRig(), repeats, s.rest.has_value(), state);
   });
   if (s.WaitsForRest(frame.times)) return s.SkipRest(state);
   timed(state.stage_ms.detect, [&] { s.Find(frame.sequence, state); });

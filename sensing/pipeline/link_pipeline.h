@@ -46,6 +46,9 @@ double PressureSigma(PressureOrigin origin);
 struct RestProgress {
   int taken = 0, wanted = 0;
   std::optional<Error> refusal;  ///< of the newest pair: collecting has started again
+  /// Why the newest frame cannot be a rest pair (a camera is lost, the pressure is stale or changes); empty:
+  /// it is one.
+  std::string waiting_for = {};
 };
 
 /// The whole way from two pictures to contacts, for one link: the list of its stages is `Process`. One
@@ -69,7 +72,8 @@ class LinkPipeline {
   /// Takes the next pairs as rest pictures: finds the cameras and the baseline again. Until they are complete
   /// nothing is measured (status kCalibrating).
   void BeginRest(int pairs);
-  /// Gives that up, if it was not complete: goes on as before, where there is a baseline.
+  /// Gives that up, if it was not complete: measures on with the baseline of before. Without one, rest pairs
+  /// are taken with the configured cameras, as after construction.
   void CancelRest();
   const RestProgress& rest_progress() const;
 

@@ -10,6 +10,7 @@
 #include "sensing/pipeline/image_noise.h"
 #include "sensing/pipeline/rest_match.h"
 #include "sensing/pipeline/rest_pose.h"
+#include "sensing/pipeline/state_estimator.h"
 
 namespace taclink {
 namespace {
@@ -50,7 +51,7 @@ Result<RestResult> Calibrate(const LinkModel& model, const std::vector<Detection
   const std::vector<MeasuredLoads> guesses = RestGuesses(rest.loads);
   Result<bool> complete = false;
   for (const DetectionPair& pair : pairs) {
-    complete = pose.Add(pair, first_pair, guesses, rest.shape_at);
+    complete = pose.Add(pair, first_pair, guesses, rest.skin);
     if (complete) continue;
     const std::string& message = complete.error().message;
     return message.starts_with(kRefused) ? complete.error() : Refusal(message);
@@ -103,9 +104,8 @@ Result<RestResult> CalibrateFromPictures(const LinkModel& model, std::span<const
 
 Result<CalibrationSummary> CalibrateFromPictures(const LinkModel& model, std::span<const RestPictures> pairs,
                                                  const CalibrationOptions& options) {
-  const RestConditions weightless{.loads = {},
-                                  .shape_at = [&](const MeasuredLoads&) { return RestShape(model); }};
-  auto result = CalibrateFromPictures(model, pairs, weightless, options);
+  const auto estimator = MakeStateEstimator(model, {});
+  auto result = CalibrateFromPictures(model, pairs, {.loads = {}, .skin = estimator->AtRest()}, options);
   if (!result) return result.error();
   return std::move(result->calibration);
 }

@@ -14,10 +14,10 @@ namespace taclink {
 /// By camera; CV_8UC1, of the size that the model's nominal camera has.
 using RestPictures = std::array<cv::Mat, kCameraCount>;
 
-/// Under which rest images are taken, and the skin's shape there.
+/// Under which rest images are taken, and what the skin does there.
 struct RestConditions {
   MeasuredLoads loads;
-  RestShapeAt shape_at;
+  RestSkin skin;
 };
 
 /// Calibrates both cameras from pictures of the untouched skin: finds and labels the markers of each pair,

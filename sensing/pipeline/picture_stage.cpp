@@ -44,7 +44,21 @@ std::optional<Reason> PictureStage::RateReason(CameraId id) const {
       rates->new_hz, rates->all_hz};
 }
 
-void PictureStage::Take(const StereoFrame& frame, const StereoRig& rig, ImageRepeats repeats,
+std::optional<Reason> PictureStage::SmoothingReason(CameraId id) const {
+  const auto share = smoothing_[Index(id)].share();
+  if (!share) return std::nullopt;
+  return Reason{
+      ReasonId::kTemporalSmoothing,
+      ReasonText("the %s camera blends each image with at least %.0f %% of the one before (temporal noise "
+                 "reduction): "
+                 "a moving skin is shown between two moments; switch it off: look for 3DNR, TNR, temporal or "
+                 "noise reduction among the controls of v4l2-ctl --list-ctrls-menus; then take the rest "
+                 "shape again",
+                 Name(id), 100 * *share),
+      *share, TemporalSmoothing::kLeastShare};
+}
+
+void PictureStage::Take(const StereoFrame& frame, const StereoRig& rig, ImageRepeats repeats, bool is_rest,
                         LinkState& state) {
   trouble_.reset();
   warning_.reset();
@@ -53,7 +67,9 @@ void PictureStage::Take(const StereoFrame& frame, const StereoRig& rig, ImageRep
     const auto trouble = TroubleOf(id, image, rig[id], repeats, frame.times.exposure_monotonic_ns);
     has_[Index(id)] = !trouble;
     if (trouble && trouble->id == ReasonId::kCamera) repetitions_[Index(id)].Miss();
+    if (!trouble) smoothing_[Index(id)].Take(gray_[Index(id)], is_rest);
     if (!trouble && repeats == ImageRepeats::kFault && !warning_) warning_ = RateReason(id);
+    if (!trouble && !is_rest && !warning_) warning_ = SmoothingReason(id);
     state.cameras[Index(id)].bad_picture = trouble && image.valid && trouble->id == ReasonId::kCamera;
     if (trouble && trouble_)
       trouble_->text += "; " + trouble->text;

@@ -9,6 +9,7 @@
 #include "sensing/core/frame.h"
 #include "sensing/core/link_state.h"
 #include "sensing/pipeline/image_noise.h"
+#include "sensing/pipeline/temporal_smoothing.h"
 
 namespace taclink {
 
@@ -23,7 +24,9 @@ enum class ImageRepeats : uint8_t {
 class PictureStage {
  public:
   /// `rig`: what the pictures should be of. Writes the cameras' bad_picture.
-  void Take(const StereoFrame& frame, const StereoRig& rig, ImageRepeats repeats, LinkState& state);
+  /// `is_rest`: the skin is at rest, as rest pairs are taken.
+  void Take(const StereoFrame& frame, const StereoRig& rig, ImageRepeats repeats, bool is_rest,
+            LinkState& state);
 
   /// Of the last frame; 8 bits. What is not there is not to be used.
   bool has(size_t camera) const { return has_[camera]; }
@@ -37,9 +40,11 @@ class PictureStage {
   std::optional<Reason> TroubleOf(CameraId id, const RawImage& image, const CameraModel& expected,
                                   ImageRepeats repeats, int64_t exposure_ns);
   std::optional<Reason> RateReason(CameraId id) const;
+  std::optional<Reason> SmoothingReason(CameraId id) const;
 
   std::array<GrayDecoder, kCameraCount> decoders_;
   std::array<ImageRepetition, kCameraCount> repetitions_;
+  std::array<TemporalSmoothing, kCameraCount> smoothing_;
   std::array<cv::Mat, kCameraCount> gray_;
   std::array<bool, kCameraCount> has_{};
   std::optional<Reason> trouble_, warning_;

@@ -66,6 +66,14 @@ void FillIn(const std::vector<MarkerObservation>& others, std::vector<MarkerObse
   }
 }
 
+// The fit of images that may show something else than an untouched skin.
+CalibrationOptions WithoutLimits(CalibrationOptions options) {
+  options.max_departure = options.max_rms_px = options.max_dent_mm = 1e9;
+  options.max_outliers = 1;
+  options.progress = nullptr;
+  return options;
+}
+
 double NoiseOf(const MarkerMean& mean, double rms_px) {
   return mean.variances_px2().empty() ? rms_px : mean.noise_px();
 }
@@ -90,16 +98,18 @@ Result<void> CheckMarkerCount(const LinkModel& model, const std::array<int, kCam
 }
 
 RestFit::RestFit(const LinkModel& model, const std::optional<StereoRig>& rig,
-                 const CalibrationOptions& options, const RestPairs& pairs, RestShapeAt shape_at)
+                 const CalibrationOptions& options, const RestPairs& pairs, RestSkin skin)
     : model_(model),
       rig_(rig),
       options_(options),
       pairs_(pairs),
-      shape_at_(std::move(shape_at)),
+      skin_(std::move(skin)),
       steady_(Steady(pairs.detections)) {}
 
 Result<RestResult> RestFit::Explain(const MeasuredLoads& loads) const {
   auto result = rig_ ? ExplainByRig(*rig_, loads) : Calibrate(loads);
+  if (const auto touch = FindTouch(result, loads))
+    return Error{ErrorCode::kFailedPrecondition, Describe(model_, *touch)};
   if (const std::string trouble = CameraTrouble(result, loads); !trouble.empty())
     return Error{ErrorCode::kInvalidArgument, trouble};
   if (!result) return result;
@@ -112,6 +122,38 @@ Result<RestResult> RestFit::Calibrate(const MeasuredLoads& loads) const {
   if (!shape) return shape.error();
   if (!IsRestUncertain(*shape)) return CalibrateAt(*shape, loads, options_);
   return Refine(loads);
+}
+
+// Where the skin is touched; none: nothing presses, or no touch explains the images.
+std::optional<RestTouch> RestFit::FindTouch(const Result<RestResult>& result,
+                                            const MeasuredLoads& loads) const {
+  const MeasuredLoads& under = result ? result->loads : loads;
+  const auto shape = skin_.shape_at(under);
+  const auto responses = skin_.touch_responses_at(under);
+  if (!shape || !responses) return std::nullopt;
+  const double mould_mm = options_.tolerance.marker_mm;
+  if (result && rig_) return FindRestTouch(*shape, *responses, *rig_, result->markers, mould_mm);
+  const auto rough = CalibrateRoughly(*shape);
+  if (!rough) return std::nullopt;
+  return FindRestTouch(*shape, *responses, rough->rig, rough->labels, mould_mm);
+}
+
+// By labels that a touch does not disturb: those that SettleCamera corrects by projections are wrong where
+// the skin is pressed in.
+Result<RestFit::RoughCameras> RestFit::CalibrateRoughly(const RestShape& shape) const {
+  DetectionPair detections = steady_;
+  RoughCameras rough;
+  for (const CameraId id : kBothCameras) {
+    auto labels = LabelDisplacedRest(shape, id, detections[Index(id)], pairs_.first[Index(id)]);
+    if (!labels) return labels.error();
+    rough.labels.cameras[Index(id)] = *std::move(labels);
+  }
+  CalibrationOptions lenient = WithoutLimits(options_);
+  lenient.min_seen = kLeastSeenFraction / 2;
+  const auto calibrated = CalibrateFromRest(shape, rough.labels, lenient);
+  if (!calibrated) return calibrated.error();
+  rough.rig = calibrated->rig;
+  return rough;
 }
 
 // What is wrong with the cameras, or with which of their images is which.
@@ -129,7 +171,7 @@ std::string RestFit::CameraTrouble(const Result<RestResult>& result, const Measu
 }
 
 Result<RestShape> RestFit::ShapeAt(const MeasuredLoads& loads) const {
-  auto shape = shape_at_(loads);
+  auto shape = skin_.shape_at(loads);
   if (!shape)
     return Error{
         ErrorCode::kFailedPrecondition,
@@ -202,7 +244,7 @@ Result<RestResult> RestFit::ExplainByRig(const StereoRig& rig, const MeasuredLoa
   CalibrationSummary seen = ResidualsOf(*shape, rig, mean->markers());
   const auto dent = FindDent(*shape, seen, most_dent_mm);
   if (IsRestUncertain(*shape)) {
-    if (const auto fitted = FitRestLoads(loads, shape_at_, rig, mean->markers())) result.loads = *fitted;
+    if (const auto fitted = FitRestLoads(loads, skin_.shape_at, rig, mean->markers())) result.loads = *fitted;
     shape = ShapeAt(result.loads);
     if (!shape) return shape.error();
     const double before_px = seen.rms_px;
@@ -241,10 +283,7 @@ Result<RestResult> RestFit::CalibrateAt(const RestShape& shape, const MeasuredLo
 // The specific force that the bundle adjustment finds near `loads`, from step to step until it stays, and
 // what the images show there.
 Result<RestResult> RestFit::Refine(MeasuredLoads loads) const {
-  CalibrationOptions lenient = options_;
-  lenient.max_departure = lenient.max_rms_px = lenient.max_dent_mm = 1e9;
-  lenient.max_outliers = 1;
-  lenient.progress = nullptr;
+  const CalibrationOptions lenient = WithoutLimits(options_);
   for (int step = 0; step < kMostSteps; ++step) {
     const auto shape = ShapeAt(loads);
     if (!shape) return shape.error();

@@ -15,6 +15,7 @@
 #include "sensing/pipeline/marker_mean.h"
 #include "sensing/pipeline/rest_loads.h"
 #include "sensing/pipeline/rest_match.h"
+#include "sensing/pipeline/rest_touch.h"
 
 namespace taclink {
 
@@ -42,7 +43,7 @@ class RestFit {
   /// `rig`: the cameras, if known; none: they are calibrated, so. `pairs`: at least one; the caller keeps
   /// them.
   RestFit(const LinkModel& model, const std::optional<StereoRig>& rig, const CalibrationOptions& options,
-          const RestPairs& pairs, RestShapeAt shape_at);
+          const RestPairs& pairs, RestSkin skin);
 
   /// `loads`: as measured. A specific force that is not known well is estimated, but of cameras that are not
   /// known the labels must be right at its mean. Takes a second or two. Errors: kInvalidArgument,
@@ -55,12 +56,18 @@ class RestFit {
     std::array<RestMatch, kCameraCount> matches;
     double score = 0;  // of SettledCamera, both cameras
   };
+  std::optional<RestTouch> FindTouch(const Result<RestResult>& result, const MeasuredLoads& loads) const;
   std::string CameraTrouble(const Result<RestResult>& result, const MeasuredLoads& loads) const;
   Result<RestShape> ShapeAt(const MeasuredLoads& loads) const;
   Result<FoundCameras> FindCameras(const RestShape& shape) const;
   Result<MarkerMean> Mean(const RestShape& shape, const StereoRig& rig, bool is_fitted) const;
   Result<RestResult> ExplainByRig(const StereoRig& rig, const MeasuredLoads& loads) const;
   Result<RestResult> Calibrate(const MeasuredLoads& loads) const;
+  struct RoughCameras {
+    StereoRig rig;
+    LabelledMarkers labels;
+  };
+  Result<RoughCameras> CalibrateRoughly(const RestShape& shape) const;
   Result<RestResult> CalibrateAt(const RestShape& shape, const MeasuredLoads& loads,
                                  const CalibrationOptions& options) const;
   Result<RestResult> Refine(MeasuredLoads loads) const;
@@ -69,7 +76,7 @@ class RestFit {
   const std::optional<StereoRig> rig_;
   const CalibrationOptions options_;
   const RestPairs& pairs_;
-  const RestShapeAt shape_at_;
+  const RestSkin skin_;
   DetectionPair steady_;  // of what stands still in the pairs
 };
 

@@ -15,6 +15,13 @@ namespace taclink {
 /// it; none: no skin is stable under them.
 using RestShapeAt = std::function<std::optional<RestShape>(const MeasuredLoads& loads)>;
 
+/// What a link's mechanics say of its rest images.
+struct RestSkin {
+  RestShapeAt shape_at;
+  /// TouchResponses under these loads; none: no skin is stable under them.
+  std::function<std::optional<Eigen::MatrixXf>(const MeasuredLoads& loads)> touch_responses_at;
+};
+
 /// Independent errors of the specific force of one standard deviation each, in columns, m/s^2.
 Mat3 SpecificForceErrors(const MeasuredLoads& loads);
 

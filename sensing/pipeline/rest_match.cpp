@@ -117,7 +117,10 @@ std::optional<SettledCamera> SettleFrom(const RestShape& shape, CameraId id,
     if (CountUsable(labels) < model.markers.count() / 4) return std::nullopt;
     const auto fit = FitCamera(shape, id, labels, options);
     if (!fit) return settled;
-    settled = {fit->camera, MatchRestPicture(shape, fit->camera, detections, domes)};
+    settled = {.camera = fit->camera,
+               .match = MatchRestPicture(shape, fit->camera, detections, domes),
+               .score = 0,
+               .misfit = fit->misfit};
     settled->score = CountUsable(settled->match.markers) - kMarkersPerDeparture * fit->bundle.tolerance_cost;
     if (SameLabels(labels, settled->match.markers)) break;
     labels = settled->match.markers;

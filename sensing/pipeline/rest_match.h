@@ -31,7 +31,8 @@ RestMatch MatchRestPicture(const RestShape& shape, const CameraModel& camera, co
 struct SettledCamera {
   CameraModel camera;
   RestMatch match;
-  double score = 0;  ///< how many markers the image shows, less for a camera far off the nominal one
+  double score = 0;   ///< how many markers the image shows, less for a camera far off the nominal one
+  double misfit = 1;  ///< of the last fit (CameraFit::misfit)
 };
 std::optional<SettledCamera> SettleCamera(const RestShape& shape, CameraId id,
                                           std::span<const MarkerObservation> labels,

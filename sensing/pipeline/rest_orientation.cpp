@@ -13,6 +13,8 @@ namespace {
 // By so much the alternative must be better, in markers (SettledCamera::score): four for each unit of half
 // the squared distance from the nominal cameras, in tolerances.
 constexpr double kSwapMargin = 24, kTurnMargin = 4 * kLeastDeparture;
+// Residuals of an orientation that fits, over what noise and mould explain: 1 in the simulation.
+constexpr double kMostMisfit = 3;
 // What as many markers as that count for, where the images as given show no camera at all.
 constexpr double kNoCameraShare = 0.5;
 
@@ -23,10 +25,15 @@ struct Flip {
 constexpr std::array<Flip, 3> kFlips = {Flip{1, "mirrored, left and right exchanged"},
                                         Flip{0, "mirrored, upside down"}, Flip{-1, "turned by 180 degrees"}};
 
-double Score(const RestShape& shape, CameraId id, Detections spots, const cv::Mat& image, bool domes) {
+std::optional<SettledCamera> Settle(const RestShape& shape, CameraId id, Detections spots,
+                                    const cv::Mat& image, bool domes) {
   const auto labels = LabelDisplacedRest(shape, id, spots, image);
-  const auto settled = labels ? SettleCamera(shape, id, *labels, spots, domes) : std::nullopt;
-  return settled ? settled->score : kNoCameraShare * shape.model().markers.count();
+  return labels ? SettleCamera(shape, id, *labels, spots, domes) : std::nullopt;
+}
+
+// Of an alternative, which must fit by itself: nothing, where it does not.
+double Score(const std::optional<SettledCamera>& settled) {
+  return settled && settled->misfit < kMostMisfit ? settled->score : 0;
 }
 
 double TurnedScore(const RestShape& shape, CameraId id, Detections spots, const cv::Mat& image, int flip,
@@ -38,7 +45,7 @@ double TurnedScore(const RestShape& shape, CameraId id, Detections spots, const 
     if (flip <= 0) spot.center_px.y() = image.rows - 1 - spot.center_px.y();
     if (flip >= 0) spot.covariance_px2(0, 1) = spot.covariance_px2(1, 0) = -spot.covariance_px2(0, 1);
   }
-  return Score(shape, id, std::move(spots), turned, domes);
+  return Score(Settle(shape, id, std::move(spots), turned, domes));
 }
 
 }  // namespace
@@ -48,13 +55,13 @@ std::string OrientationTrouble(const RestShape& shape, const std::array<Detectio
   std::array<double, kCameraCount> as_given{}, exchanged{};
   for (const CameraId id : kBothCameras) {
     const size_t i = Index(id);
-    as_given[i] = Score(shape, id, spots[i], images[i], domes);
-    exchanged[i] = Score(shape, id, spots[1 - i], images[1 - i], domes);
+    const auto settled = Settle(shape, id, spots[i], images[i], domes);
+    as_given[i] = settled ? settled->score : kNoCameraShare * shape.model().markers.count();
+    exchanged[i] = Score(Settle(shape, id, spots[1 - i], images[1 - i], domes));
   }
   if (exchanged[0] + exchanged[1] > as_given[0] + as_given[1] + kSwapMargin)
     return "the pictures look swapped: they fit the model with top as bottom and bottom as top; give them "
-           "the "
-           "other way round";
+           "the other way round";
   for (const CameraId id : kBothCameras) {
     const size_t i = Index(id);
     double best = as_given[i] + kTurnMargin;
@@ -68,8 +75,7 @@ std::string OrientationTrouble(const RestShape& shape, const std::array<Detectio
     if (found != nullptr)
       return std::string("the ") + Name(id) + " picture looks " + found->text +
              ": so it fits the model's camera; take the pictures as the camera sends them, or correct the "
-             "model's "
-             "principal point";
+             "model's principal point";
   }
   return {};
 }

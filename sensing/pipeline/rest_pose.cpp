@@ -21,7 +21,7 @@ void RestPose::StartAgain() {
 }
 
 Result<bool> RestPose::Add(const DetectionPair& detections, const std::array<cv::Mat, kCameraCount>& images,
-                           std::span<const MeasuredLoads> loads, const RestShapeAt& shape_at) {
+                           std::span<const MeasuredLoads> loads, const RestSkin& skin) {
   if (const auto enough = CheckMarkerCount(
           model_, {static_cast<int>(detections[0].size()), static_cast<int>(detections[1].size())});
       !enough) {
@@ -36,7 +36,7 @@ Result<bool> RestPose::Add(const DetectionPair& detections, const std::array<cv:
   pairs_.detections.push_back(detections);
   if (has_moved) return SkinMoved();
   if (taken() < frames_) return false;
-  const RestFit fit(model_, rig_, options_, pairs_, shape_at);
+  const RestFit fit(model_, rig_, options_, pairs_, skin);
   std::optional<Error> refusal;
   for (const MeasuredLoads& one : loads) {
     auto result = fit.Explain(one);

@@ -29,7 +29,7 @@ class RestPose {
   /// motion. `images`: that the detections are of. `loads`: under which the pairs may have been taken, at
   /// least one; the first that explain them count.
   Result<bool> Add(const DetectionPair& detections, const std::array<cv::Mat, kCameraCount>& images,
-                   std::span<const MeasuredLoads> loads, const RestShapeAt& shape_at);
+                   std::span<const MeasuredLoads> loads, const RestSkin& skin);
 
   /// Forgets the pairs so far.
   void StartAgain();

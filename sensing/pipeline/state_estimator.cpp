@@ -6,14 +6,16 @@
 
 #include "sensing/contact/contact_writer.h"
 #include "sensing/core/median.h"
+#include "sensing/core/similar_skin.h"
+#include "sensing/estimation/touch_responses.h"
 #include "sensing/pipeline/encirclement.h"
-#include "sensing/pipeline/rest_loads.h"
 
 namespace taclink {
 namespace {
 
-// What nothing is known of is uncertain by that, in SkinMechanics' units.
-constexpr double kUnknownMm = 5, kSpringsMm = 1;  // ... and where springs pull the skin to what is seen
+// Standard deviation of an unobserved marker, and of one that springs pull towards those observed; times
+// LengthUnit of the skin.
+constexpr double kUnknownMm = 5, kSpringsMm = 1;
 constexpr double kWeakInformation = 1e-9;
 // Of a pressure that the shape tells: what the model's inflation is wrong by, and the rest.
 constexpr double kMovingGravitySigma = 1;  // m/s^2: of a link that may accelerate, standard gravity's
@@ -67,6 +69,13 @@ std::optional<RestShape> StateEstimator::RestShapeUnder(const MeasuredLoads& loa
   return RestShape(model_, skin->markers_mm, std::move(errors_mm));
 }
 
+RestSkin StateEstimator::AtRest() {
+  return {
+      .shape_at = [this](const MeasuredLoads& loads) { return RestShapeUnder(loads); },
+      .touch_responses_at =
+          [this](const MeasuredLoads& loads) { return TouchResponses(skin_.mechanics(), loads.Loads()); }};
+}
+
 MeasuredLoads StateEstimator::PressureFromShape(const MarkerObservations& observed, const LoadsPair& loads) {
   constexpr int kSteps = 6;
   const auto baseline = UntouchedAt(loads.baseline.Loads());
@@ -113,7 +122,7 @@ void StateEstimator::WriteShape(SkinShape& shape) const {
       if (measured.information_per_mm2.isZero())
         shape.covariances_mm2[m].diagonal().array() += estimate_.unsettled_mm * estimate_.unsettled_mm;
     } else {
-      const double unknown_mm = estimate_.has_shape ? kSpringsMm : kUnknownMm;
+      const double unknown_mm = (estimate_.has_shape ? kSpringsMm : kUnknownMm) * LengthUnit(model_);
       const Mat3 information =
           measured.information_per_mm2 + 1 / (unknown_mm * unknown_mm) * Mat3::Identity();
       shape.covariances_mm2[m] = information.inverse();

@@ -11,6 +11,7 @@
 #include "sensing/core/link_state.h"
 #include "sensing/estimation/skin_estimator.h"
 #include "sensing/estimation/thesis_force.h"
+#include "sensing/pipeline/rest_loads.h"
 
 namespace taclink {
 
@@ -59,6 +60,8 @@ class StateEstimator {
   std::optional<Eigen::VectorXd> UntouchedAt(const KnownLoads& loads);
   /// Likewise, of rest images; with the errors of the specific force, where it is not exact.
   std::optional<RestShape> RestShapeUnder(const MeasuredLoads& loads);
+  /// For rest images; refers to this.
+  RestSkin AtRest();
   /// The pressure that explains most markers, where nobody tells it: of each marker the one that its
   /// displacement along the inflation asks for, the median of them. Displacements from the baseline.
   MeasuredLoads PressureFromShape(const MarkerObservations& observed, const LoadsPair& loads);

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "sensing/core/similar_skin.h"
 #include "server/arm/link_names.h"
 
 namespace taclink::server {
@@ -24,7 +25,8 @@ Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, C
   for (LinkParts& parts : links) {
     const size_t link = links_.size();
     links_.push_back(std::move(parts.description));
-    watched.push_back({links_.back().name, links_.back().rules, links_.back().model.markers});
+    const LinkModel& model = links_.back().model;
+    watched.push_back({links_.back().name, links_.back().rules, model.markers, LengthUnit(model)});
     pressures_.push_back(parts.pressure ? std::move(parts.pressure) : MakeAssumedPressure(std::nullopt));
     attitudes_.push_back(parts.attitude ? std::move(parts.attitude) : MakeSourceAttitude());
     simulations_.push_back(std::move(parts.simulation));

@@ -56,10 +56,11 @@ class PipelineProcessor final : public LinkProcessor {
 
   CalibrationProgress PollCalibration() override {
     const RestProgress& rest = pipeline_.rest_progress();
-    CalibrationProgress progress{.taken = rest.taken, .wanted = rest.wanted, .end = {}};
+    CalibrationProgress progress{
+        .taken = rest.taken, .wanted = rest.wanted, .waiting_for = rest.waiting_for, .end = {}};
     if (rest.refusal) {
-      pipeline_.CancelRest();
       progress.end = Error{ErrorCode::kFailedPrecondition, rest.refusal->message};
+      pipeline_.CancelRest();
     } else if (rest.taken == rest.wanted) {
       progress.end = Finish();
     }

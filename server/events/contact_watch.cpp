@@ -6,7 +6,6 @@
 namespace taclink::server {
 namespace {
 
-constexpr double kSamePlaceMm = 30;  // as the contact finder's
 // Less is no news.
 constexpr double kLeastChangeN = 0.01, kLeastChangePart = 0.05, kLeastMoveMm = 1;
 
@@ -21,7 +20,7 @@ ContactWatch::Track& ContactWatch::TrackOf(const Contact& contact) {
     if (track.current == contact.id) return track;
   }
   Track* nearest = nullptr;
-  double best_mm = kSamePlaceMm;
+  double best_mm = same_place_mm_;
   for (Track& track : tracks_) {
     const double off_mm = (track.contact.center_mm - contact.center_mm).norm();
     if (track.seen || off_mm >= best_mm) continue;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "sensing/core/contact.h"
 #include "sensing/core/link_state.h"
 #include "server/events/event.h"
 
@@ -13,7 +14,9 @@ namespace taclink::server {
 /// or ends (AreContactsCertain).
 class ContactWatch {
  public:
-  explicit ContactWatch(const EventOptions& options) : options_(options) {}
+  /// `length_unit`: LengthUnit of the link's model.
+  ContactWatch(const EventOptions& options, double length_unit)
+      : options_(options), same_place_mm_(kSameContactMm * length_unit) {}
 
   struct Told {
     EventKind kind;
@@ -40,6 +43,7 @@ class ContactWatch {
   bool UpdateIsDue(const Track& track, int64_t now_ns) const;
 
   const EventOptions options_;
+  const double same_place_mm_;  // a contact that comes back closer than this goes on
   std::vector<Track> tracks_;
   int64_t baseline_utc_ns_ = 0;
   bool new_baseline_ = false;  // and contacts of the old one have not ended yet

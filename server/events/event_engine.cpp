@@ -71,7 +71,7 @@ EventEngine::EventEngine(Hub& hub, std::vector<WatchedLink> links, const EventOp
       audit_(options.audit, static_cast<size_t>(options.audit_max_kb) * 1024),
       lost_told_(links_.size(), 0) {
   for (size_t i = 0; i < links_.size(); ++i)
-    watches_.emplace_back(i, links_[i].rules, links_[i].grid, options);
+    watches_.emplace_back(i, links_[i].rules, links_[i].grid, options, links_[i].length_unit);
   clock_watch_.Poll(clock_);  // steps count from here
 }
 

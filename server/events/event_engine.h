@@ -23,6 +23,7 @@ struct WatchedLink {
   std::string name;
   LinkRules rules;
   MarkerGrid grid;
+  double length_unit = 1;  ///< LengthUnit of its model
 };
 
 /// A force level's rule and how it stands.

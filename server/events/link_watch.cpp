@@ -35,8 +35,9 @@ int Rank(LinkStatus status) {
 
 }  // namespace
 
-LinkWatch::LinkWatch(size_t link, const LinkRules& rules, const MarkerGrid& grid, const EventOptions& options)
-    : link_(link), paths_(grid.paths), options_(options), contacts_(options) {
+LinkWatch::LinkWatch(size_t link, const LinkRules& rules, const MarkerGrid& grid, const EventOptions& options,
+                     double length_unit)
+    : link_(link), paths_(grid.paths), options_(options), contacts_(options, length_unit) {
   forces_.emplace_back("", rules.thresholds);
   for (const Region& region : rules.regions)
     forces_.emplace_back(region.name, region.thresholds, MarkersOf(region, grid));

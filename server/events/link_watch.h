@@ -14,7 +14,9 @@ namespace taclink::server {
 /// What happens to one link, told from its states. One thread at a time.
 class LinkWatch {
  public:
-  LinkWatch(size_t link, const LinkRules& rules, const MarkerGrid& grid, const EventOptions& options);
+  /// `length_unit`: LengthUnit of the link's model.
+  LinkWatch(size_t link, const LinkRules& rules, const MarkerGrid& grid, const EventOptions& options,
+            double length_unit = 1);
 
   /// Appends what the state has of news.
   void Take(const LinkState& state, std::vector<Event>& events);

@@ -35,7 +35,8 @@ struct CalibrationResult {
 };
 
 struct CalibrationProgress {
-  int taken = 0, wanted = 0;  ///< rest pairs
+  int taken = 0, wanted = 0;     ///< rest pairs
+  std::string waiting_for = {};  ///< why the newest frame cannot be a rest pair; empty: it is one
   /// Set once: the end. An error leaves the link as it was.
   std::optional<Result<CalibrationResult>> end;
 };

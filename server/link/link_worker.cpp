@@ -147,10 +147,8 @@ void LinkWorker::Solve(const std::stop_token& stop) {
       TellCalibration();
     } else {
       PublishStatusIfDue();
-      if (job_ && clock_.MonotonicNs() - job_frame_ns_ >
-                      std::chrono::nanoseconds(options_.calibration_patience).count())
-        EndCalibrationWithout({ErrorCode::kUnavailable, "no pictures come from the link's cameras"});
     }
+    EndCalibrationIfStuck();
     tare_.Poll(*processor_, clock_.MonotonicNs(),
                std::chrono::nanoseconds(options_.calibration_patience).count());
   }
@@ -205,11 +203,13 @@ void LinkWorker::TakeCalibrationOrder() {
   {
     const std::lock_guard lock(calibration_mutex_);
     if (!ordered_) return;
-    job_ = std::exchange(ordered_, std::nullopt);
+    job_ = {.order = *std::exchange(ordered_, std::nullopt),
+            .most_taken = 0,
+            .progress_ns = clock_.MonotonicNs(),
+            .waiting_for = {}};
   }
-  job_frame_ns_ = clock_.MonotonicNs();
-  job_->may_save = [this] { return MayEndCalibration(); };
-  const auto begun = processor_->BeginCalibration(*job_);
+  job_->order.may_save = [this] { return MayEndCalibration(); };
+  const auto begun = processor_->BeginCalibration(job_->order);
   if (!begun) EndCalibrationWithout(begun.error());
 }
 
@@ -217,8 +217,12 @@ void LinkWorker::TellCalibration() {
   if (!job_) return;
   // Nobody is told any more what becomes of it: it must not become anything.
   if (!MayEndCalibration()) return EndCalibrationWithout({ErrorCode::kUnavailable, "ended from outside"});
-  job_frame_ns_ = clock_.MonotonicNs();
   const CalibrationProgress progress = processor_->PollCalibration();
+  job_->waiting_for = progress.waiting_for;
+  if (progress.taken > job_->most_taken) {
+    job_->most_taken = progress.taken;
+    job_->progress_ns = clock_.MonotonicNs();
+  }
   if (progress.end) {
     SPDLOG_INFO("link {}: calibration: {}", name_, *progress.end ? "done" : progress.end->error().message);
     if (const auto observer = ForgetCalibration()) observer(progress);
@@ -227,6 +231,15 @@ void LinkWorker::TellCalibration() {
     SPDLOG_INFO("link {}: calibration: cancelled", name_);
     ForgetCalibration();
   }
+}
+
+// Frames that cannot be rest pairs are no progress.
+void LinkWorker::EndCalibrationIfStuck() {
+  const int64_t patience_ns = std::chrono::nanoseconds(options_.calibration_patience).count();
+  if (!job_ || clock_.MonotonicNs() - job_->progress_ns <= patience_ns) return;
+  const std::string why = job_->waiting_for.empty() ? "no images arrive from the link's cameras"
+                                                    : "no further rest pair: " + job_->waiting_for;
+  EndCalibrationWithout({ErrorCode::kUnavailable, why});
 }
 
 CalibrationObserver LinkWorker::Watching() {

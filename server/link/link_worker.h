@@ -41,7 +41,7 @@ struct LinkWorkerOptions {
   std::chrono::milliseconds poll{100};
   /// Without frames the status is published this often.
   std::chrono::milliseconds heartbeat{1000};
-  /// A calibration that gets no frame for so long ends, and a tare that is not complete by then.
+  /// A calibration that gets no further rest pair for so long ends, and a tare that is not complete by then.
   std::chrono::milliseconds calibration_patience{10'000};
   /// So many frames in a row that the processor threw at end the worker: a fresh one may do better.
   int failures = 30;
@@ -106,6 +106,7 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
   void PublishStatusIfDue();
   void TakeCalibrationOrder();
   void TellCalibration();
+  void EndCalibrationIfStuck();
   CalibrationObserver Watching();
   bool MayEndCalibration() { return IsCurrent() && Watching(); }
   CalibrationObserver ForgetCalibration();
@@ -141,8 +142,13 @@ class LinkWorker : public std::enable_shared_from_this<LinkWorker> {
 
   // Used by the FEM thread only.
   std::unique_ptr<LinkProcessor> processor_;
-  std::optional<CalibrationOrder> job_;
-  int64_t job_frame_ns_ = 0;       // of its last frame
+  struct CalibrationJob {
+    CalibrationOrder order;
+    int most_taken = 0;       // rest pairs
+    int64_t progress_ns = 0;  // since `most_taken` grew last
+    std::string waiting_for;  // why it does not grow; empty: no frame came since
+  };
+  std::optional<CalibrationJob> job_;
   int failing_ = 0;                // frames in a row that could not be processed
   bool settled_ = false;           // the last frame was measured
   uint64_t reported_changes_ = 0;  // of the source's condition

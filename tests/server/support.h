@@ -215,8 +215,8 @@ class FakeSource final : public FrameSource {
   const std::shared_ptr<SourceScript> script_;
 };
 
-/// Processes with a function, and calibrates as the test says. `saves` counts the calibrations that would
-/// have written a file.
+/// Processes with a function, and calibrates as the test says; frames with a stale pressure are no rest
+/// pairs. `saves` counts the calibrations that would have written a file.
 class FakeProcessor final : public LinkProcessor {
  public:
   static inline std::atomic<int> saves = 0;
@@ -226,7 +226,8 @@ class FakeProcessor final : public LinkProcessor {
       : process_(std::move(process)), refusal_(std::move(refusal)) {}
 
   void Process(const StereoFrame& frame, LinkState& state) override {
-    if (calibrating_) ++taken_;
+    is_rest_pair_ = !frame.pressure.stale;
+    if (calibrating_ && is_rest_pair_) ++taken_;
     process_(frame, state);
   }
   Result<void> BeginCalibration(const CalibrationOrder& order) override {
@@ -238,7 +239,10 @@ class FakeProcessor final : public LinkProcessor {
     return {};
   }
   CalibrationProgress PollCalibration() override {
-    CalibrationProgress progress{.taken = taken_, .wanted = wanted_, .end = {}};
+    CalibrationProgress progress{.taken = taken_,
+                                 .wanted = wanted_,
+                                 .waiting_for = is_rest_pair_ ? "" : "a stale pressure",
+                                 .end = {}};
     if (taken_ < wanted_) return progress;
     calibrating_ = false;
     if (order_.save && (!order_.may_save || order_.may_save())) ++saves;
@@ -265,6 +269,7 @@ class FakeProcessor final : public LinkProcessor {
   const Function process_;
   const std::optional<Error> refusal_;
   bool calibrating_ = false;
+  bool is_rest_pair_ = true;  // the newest frame
   int taken_ = 0, wanted_ = 0;
   CalibrationOrder order_;
   std::optional<TareOptions> tare_;

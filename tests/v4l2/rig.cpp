@@ -29,7 +29,7 @@ class ImageProcessor final : public server::LinkProcessor {
     server::FillTestState(0, frame.sequence, state);
     state.times = frame.times;
     state.reasons.clear();
-    images_.Take(frame, rig_, ImageRepeats::kFault, state);
+    images_.Take(frame, rig_, ImageRepeats::kFault, false, state);
     if (!images_.trouble()) return;
     state.status = LinkStatus::kDegraded;
     state.status_reason = images_.trouble()->text;

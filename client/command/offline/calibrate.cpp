@@ -186,17 +186,14 @@ Result<std::vector<RestPictures>> ReadPairs(const std::vector<std::string>& path
 
 Result<RestResult> CalibrateUnder(const CalibrateOptions& options, const LinkModel& model,
                                   const std::vector<RestPictures>& pairs, const CalibrationOptions& how) {
-  RestConditions rest{.loads = {}, .shape_at = [&](const MeasuredLoads&) { return RestShape(model); }};
-  if (options.gravity.empty() && options.pressure_kpa == 0)
-    return CalibrateFromPictures(model, pairs, rest, how);
+  const auto estimator = MakeStateEstimator(model, {});
+  RestConditions rest{.loads = {}, .skin = estimator->AtRest()};
   if (auto good = CheckWeight(model, options.gravity); !good) return good.error();
   rest.loads.pressure_mpa = 1e-3 * options.pressure_kpa;
   if (!options.gravity.empty()) {
     if (auto good = TakeGravity(options.gravity, options.gravity_sigma_mps2, rest.loads); !good)
       return good.error();
   }
-  const auto estimator = MakeStateEstimator(model, {});
-  rest.shape_at = [&](const MeasuredLoads& loads) { return estimator->RestShapeUnder(loads); };
   return CalibrateFromPictures(model, pairs, rest, how);
 }
 

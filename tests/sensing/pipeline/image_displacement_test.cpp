@@ -52,8 +52,12 @@ TEST_P(DiagnosisTest, NamesWhatHappenedToAnImage) {
   EXPECT_THAT(Text(About(5, 1)), HasSubstr("the top camera's image is turned by 5.0 degrees against"));
   EXPECT_THAT(Text(About(90, 1)), HasSubstr("is turned by 90.0 degrees against"));
   EXPECT_THAT(Text(About(180, 1)), HasSubstr("is turned by 180.0 degrees against"));
-  EXPECT_THAT(Text(About(0, 1, 6, -4)), HasSubstr("is shifted by 6.0, -4.0 px against"));
+  EXPECT_THAT(Text(About(0, 1, 6, -4)),
+              ::testing::ContainsRegex("is shifted by 6.0, -4.0 px .[0-9.]+ mm of the skin. against"));
   EXPECT_THAT(Text(About(0, 1.06)), ::testing::ContainsRegex("is (5.9|6.0|6.1) % larger against"));
+  EXPECT_THAT(Text(About(0, 1, 2, 1)), HasSubstr("is shifted by 2.0, 1.0 px")) << "a knock";
+  EXPECT_THAT(Text(About(0.6, 1)), HasSubstr("is turned by 0.6 degrees against"));
+  EXPECT_THAT(Text(About(0, 1.012)), ::testing::ContainsRegex("is 1.[123] % larger against"));
   cv::Mat mirror = cv::Mat::eye(2, 3, CV_64F);
   mirror.at<double>(0, 0) = -1;
   mirror.at<double>(0, 2) = images_[0].cols - 1;
@@ -76,6 +80,12 @@ TEST_P(DiagnosisTest, APressedSkinIsNoDisplacement) {
       model_.nominal_rig,
       studio_.Truth(
           "  - {at: {path: 7, ring: 5}, patch_diameter_mm: 30, depth_mm: 6, begin_s: 0, end_s: 2}\n"));
+  EXPECT_FALSE(Diagnose());
+  // On the slack skin, a dent of more than a third of the radius.
+  images_ = studio_.Take(
+      model_.nominal_rig,
+      studio_.Truth(
+          "  - {at: {path: 7, ring: 5}, patch_diameter_mm: 6, depth_mm: 14, begin_s: 0, end_s: 2}\n"));
   EXPECT_FALSE(Diagnose());
 }
 

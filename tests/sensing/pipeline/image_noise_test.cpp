@@ -2,9 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
 #include "sensing/capture/decode.h"
 #include "sensing/capture/encode.h"
 #include "sensing/model/model_file.h"
+#include "sensing/pipeline/temporal_smoothing.h"
 #include "sensing/simulation/renderer.h"
 #include "tests/support/studio.h"
 
@@ -153,6 +159,46 @@ TEST_F(ImageRepetitionTest, TwoCamerasHaveTheirOwnNoise) {
   NoiseSample dark;
   dark.Take(cv::Mat::zeros(gray.size(), CV_8U));
   EXPECT_FALSE(NoiseSample::Correlation(dark, dark)) << "without noise nothing is known";
+}
+
+class TemporalSmoothingTest : public ImageRepetitionTest {
+ protected:
+  // Of eight images, each `made` of a live one.
+  std::optional<double> ShareOf(const std::function<cv::Mat(const cv::Mat&)>& made) {
+    TemporalSmoothing smoothing;
+    for (int i = 0; i < 8; ++i) smoothing.Take(made(Live()), true);
+    smoothing.Take(Live(), false);
+    return smoothing.share();
+  }
+};
+
+TEST_F(TemporalSmoothingTest, TheShareOfTheImageBeforeIsFound) {
+  for (const double share : {0.3, 0.5, 0.85}) {
+    cv::Mat blended;
+    Live().convertTo(blended, CV_32F);
+    for (int i = 0; i < 30; ++i) cv::accumulateWeighted(Live(), blended, 1 - share);
+    const auto found = ShareOf([&](const cv::Mat& live) {
+      cv::accumulateWeighted(live, blended, 1 - share);
+      cv::Mat sent;
+      blended.convertTo(sent, CV_8U);
+      return sent;
+    });
+    ASSERT_TRUE(found) << share;
+    EXPECT_LT(*found, share + 0.08);
+    EXPECT_GT(*found, 0.6 * share) << "rounding to 8 bits is noise, too";
+  }
+}
+
+TEST_F(TemporalSmoothingTest, OtherCamerasDoNotSmooth) {
+  EXPECT_EQ(ShareOf([](const cv::Mat& live) { return live; }), std::nullopt);
+  for (const int quality : {50, 80})
+    EXPECT_EQ(ShareOf([&](const cv::Mat& live) { return Compressed(live, quality); }), std::nullopt);
+  cv::Mat pattern(480, 640, CV_8U);
+  cv::randu(pattern, 0, 8);
+  EXPECT_EQ(ShareOf([&](const cv::Mat& live) { return cv::Mat(live + pattern); }), std::nullopt);
+  const cv::Mat held = Live();
+  EXPECT_EQ(ShareOf([&](const cv::Mat&) { return held; }), std::nullopt) << "a file that repeats";
+  EXPECT_EQ(ShareOf([&](const cv::Mat&) { return cv::Mat(480, 640, CV_8U, cv::Scalar(9)); }), std::nullopt);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "sensing/core/similar_skin.h"
@@ -171,6 +172,32 @@ TEST_F(LinkPipelineTest, RestGivenUpLeavesAllAsItWas) {
   EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
   EXPECT_EQ(state_.contacts.size(), 1u);
   EXPECT_EQ(pipeline.calibration()->rms_px, before);
+}
+
+TEST_F(LinkPipelineTest, RestGivenUpBeforeTheFirstBaselineKeepsTheConfiguredCameras) {
+  options_.rig = model_.nominal_rig;
+  LinkPipeline pipeline(model_, options_);
+  pipeline.BeginRest(3);
+  pipeline.Process(Frame(0), state_);
+  pipeline.CancelRest();
+  TakeRest(pipeline);
+  for (const CameraId id : kBothCameras)
+    EXPECT_EQ(StepBetween(model_.nominal_rig[id], pipeline.calibration()->rig[id]), CameraStep::Zero());
+}
+
+TEST_F(LinkPipelineTest, AStalePressureIsNamedWhileRestPairsAreTaken) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  pipeline.BeginRest(3);
+  StereoFrame frame = Frame(0.5);
+  frame.pressure = {.origin = PressureOrigin::kSerial, .stale = true, .mpa = 0, .age_ns = 0};
+  frame.pressure.trouble = "no reading for 9 s";
+  pipeline.Process(frame, state_);
+  EXPECT_THAT(pipeline.rest_progress().waiting_for, HasSubstr("no reading for 9 s"));
+  EXPECT_EQ(pipeline.rest_progress().taken, 0);
+  pipeline.Process(Frame(0.5), state_);
+  EXPECT_EQ(pipeline.rest_progress().waiting_for, "");
+  EXPECT_EQ(pipeline.rest_progress().taken, 1);
 }
 
 TEST_F(LinkPipelineTest, LostCameraIsDegradedAndSaysWhich) {
@@ -405,6 +432,61 @@ TEST_F(LinkPipelineTest, TouchedSkinIsNoBaselineOfKnownCameras) {
   pipeline.Process(Frame(0), state_);
   EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
   pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_NEAR(state_.total_force_n.norm(), 0.2, 0.04);
+}
+
+// Recursive noise reduction: y(t) = a y(t-1) + (1 - a) x(t).
+TEST_F(LinkPipelineTest, ACameraThatBlendsImagesIsNamed) {
+  options_.rest_frames = 8;
+  options_.pictures_may_repeat = true;  // files, too
+  LinkPipeline pipeline(model_, options_);
+  cv::Mat blended;
+  for (int k = 0; k < 12; ++k) {
+    StereoFrame frame = Frame(0);  // leaves the bottom image in gray_
+    if (blended.empty()) gray_.convertTo(blended, CV_32F);
+    cv::accumulateWeighted(gray_, blended, 0.5);
+    cv::Mat sent;
+    blended.convertTo(sent, CV_8U);
+    PackYuyv(sent, renderer_.chroma(CameraId::kBottom), frame.images[Index(CameraId::kBottom)]);
+    pipeline.Process(frame, state_);
+  }
+  ASSERT_EQ(state_.reasons.size(), 1U) << state_.status_reason;
+  EXPECT_EQ(state_.reasons[0].id, ReasonId::kTemporalSmoothing);
+  EXPECT_THAT(state_.status_reason, HasSubstr("the bottom camera blends"));
+  EXPECT_NEAR(state_.reasons[0].value.value(), 0.5, 0.1);
+}
+
+// By 2 px, the cameras with each other.
+TEST_F(LinkPipelineTest, AKnockThatMovesBothCamerasIsNamed) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  const cv::Mat shift = (cv::Mat_<double>(2, 3) << 1, 0, 2, 0, 1, 0.6);
+  for (int k = 0; k < 9; ++k) {
+    StereoFrame frame = Frame(0.1 + k / 30.0);
+    for (const CameraId id : kBothCameras) {
+      renderer_.Render(truth_, id, gray_);
+      cv::warpAffine(gray_, gray_, shift, gray_.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+      PackYuyv(gray_, renderer_.chroma(id), frame.images[Index(id)]);
+    }
+    pipeline.Process(frame, state_);
+    EXPECT_NE(state_.status, LinkStatus::kOk);
+  }
+  ASSERT_FALSE(state_.reasons.empty());
+  EXPECT_EQ(state_.reasons[0].id, ReasonId::kCamerasMoved);
+  EXPECT_THAT(state_.status_reason,
+              ::testing::AllOf(HasSubstr("top camera's image is shifted by 2.0, 0.6 px"),
+                               HasSubstr("bottom camera's image is shifted by 2.0")));
+}
+
+// Nor where they are calibrated from the same images; the link begins once the skin is released.
+TEST_F(LinkPipelineTest, TouchedSkinCalibratesNoCameras) {
+  LinkPipeline pipeline(model_, options_);
+  for (int k = 0; k < options_.rest_frames; ++k) pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kCalibrating);
+  EXPECT_THAT(state_.status_reason, HasSubstr("the skin is touched near path"));
+  TakeRest(pipeline);
+  pipeline.Process(Frame(kTouchedS), state_);
+  EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
   EXPECT_NEAR(state_.total_force_n.norm(), 0.2, 0.04);
 }
 

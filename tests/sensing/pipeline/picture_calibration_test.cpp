@@ -3,8 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdio>
+
 #include "sensing/camera/triangulation.h"
 #include "sensing/model/model_file.h"
+#include "sensing/pipeline/state_estimator.h"
 #include "tests/support/studio.h"
 
 namespace taclink {
@@ -193,6 +197,64 @@ TEST_F(RefusalTest, TouchedSkinIsRefused) {
   EXPECT_THAT(refused(3), ::testing::ContainsRegex("touched near path [678], ring [456]"));
   EXPECT_THAT(refused(10), HasSubstr("touche"));
 }
+
+TEST_F(RefusalTest, SmoothErrorsOfTheMouldAreNoTouch) {
+  SkinTruth truth = studio_.Truth();
+  for (size_t m = 0; m < truth.marker_mm.size(); ++m) {
+    const Vec3 place = truth.marker_mm[m];
+    const double angle = std::atan2(place.y(), place.x()), along = kPi * place.z() / model_.length_mm;
+    const double out_mm = 0.15 * std::cos(2 * angle + 1) * std::sin(along) +
+                          0.15 * std::cos(4 * angle) * std::sin(2 * along) + 0.1 * std::cos(3 * angle + 2) +
+                          0.1 * std::cos(5 * angle) * std::sin(3 * along);
+    const Vec3 shift = out_mm * Vec3(std::cos(angle), std::sin(angle), 0);
+    truth.marker_mm[m] += shift;
+    truth.marker_wall_mm[m] += shift;
+  }
+  EXPECT_EQ(Message(Calibrate(model_, studio_.Take(model_.nominal_rig, truth))), "accepted");
+}
+
+struct Touched {
+  std::string model;
+  double kpa;
+  int path, ring;  // counted from 1
+  double force_n;
+  double mount = 1;  // how far the cameras are off their nominal places
+};
+
+class TouchedTest : public ::testing::TestWithParam<Touched> {};
+
+// On a nonlinear skin, with cameras that are mounted off their nominal places.
+TEST_P(TouchedTest, IsRefusedWithItsPlace) {
+  const auto& [name, kpa, path, ring, force_n, mount] = GetParam();
+  const LinkModel model = LoadLinkModel(name).value();
+  char text[400];
+  std::snprintf(text, sizeof text,
+                "taclink_scene: 1\nname: touched\nmodel: %s\nframe_rate_hz: 10\nduration_s: 2\n"
+                "pressure_kpa: %g\ncontacts:\n"
+                "  - {at: {path: %d, ring: %d}, force_n: %g, begin_s: 0, end_s: 2, ramp_s: 0.01}\n",
+                name.c_str(), kpa, path, ring, force_n);
+  SkinTruth truth;
+  SimulatedSkin::Make(model, ParseScene("touched", text).value()).value()->Evaluate(1, truth);
+  StereoRig rig = model.nominal_rig;
+  Misalign(rig[CameraId::kTop], mount * Vec3(0.7, -0.4, 0.5), mount * Vec3(0.6, -0.3, 0.4));
+  Misalign(rig[CameraId::kBottom], mount * Vec3(-0.3, 0.6, -0.8), mount * Vec3(-0.2, 0.7, -0.5));
+  const PicturePair images = Studio(model).Take(rig, truth);
+  const auto estimator = MakeStateEstimator(model, {});
+  RestConditions rest{.loads = {}, .skin = estimator->AtRest()};
+  rest.loads.pressure_mpa = 1e-3 * kpa;
+  const auto found = CalibrateFromPictures(model, {&images, 1}, rest);
+  ASSERT_FALSE(found.ok());
+  EXPECT_THAT(found.error().message, HasSubstr("touched near path " + std::to_string(path) + ", ring " +
+                                               std::to_string(ring) + ":"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    WeakAndStrong, TouchedTest,
+    ::testing::Values(Touched{"cylinder", 0, 7, 5, 0.08}, Touched{"cylinder", 0, 7, 5, 0.08, 0},
+                      Touched{"cylinder", 0, 7, 5, 0.15}, Touched{"cylinder", 0, 14, 3, 0.25},
+                      Touched{"cylinder", 0, 14, 10, 0.05}, Touched{"cylinder", 0.5, 1, 8, 0.05},
+                      Touched{"cylinder", 0.5, 9, 4, 0.6}, Touched{"barrel", 0, 4, 11, 0.08},
+                      Touched{"barrel", 0.5, 9, 16, 0.08}));
 
 TEST_F(RefusalTest, InflatedSkinIsRefused) {
   for (const double kpa : {0.75, 1.2}) {

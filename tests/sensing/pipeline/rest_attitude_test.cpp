@@ -68,9 +68,7 @@ class RestAttitudeTest : public ::testing::TestWithParam<RestCase> {
 TEST_P(RestAttitudeTest, CamerasShapeAndAttitudeAreFound) {
   const auto& [state, is_known] = GetParam();
   const RestPictures images = Images(state);
-  const RestConditions rest{
-      .loads = is_known ? Known(state) : Unknown(),
-      .shape_at = [&](const MeasuredLoads& at) { return estimator_->RestShapeUnder(at); }};
+  const RestConditions rest{.loads = is_known ? Known(state) : Unknown(), .skin = estimator_->AtRest()};
   const auto found = CalibrateFromPictures(model_, {&images, 1}, rest);
   ASSERT_TRUE(found.ok()) << found.error().message;
   EXPECT_LT(found->calibration.rmse_3d_mm, 0.1);

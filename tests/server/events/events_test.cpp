@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "server/config/config.h"
 #include "server/events/event_engine.h"
@@ -17,6 +18,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::UnorderedElementsAre;
 
 MarkerGrid Grid() {
@@ -53,7 +55,7 @@ class LinkWatchTest : public ::testing::Test {
             contact.force_n / static_cast<double>(contact.markers.size());
     }
     std::vector<Event> events;
-    watch_.Take(state_, events);
+    watch_->Take(state_, events);
     std::vector<Event> wanted;
     for (Event& event : events) {
       if (event.kind != EventKind::kLinkStatus || tell_status_) wanted.push_back(std::move(event));
@@ -89,7 +91,7 @@ class LinkWatchTest : public ::testing::Test {
     return options;
   }
   EventOptions options_ = Options();
-  LinkWatch watch_{3, Rules(), Grid(), options_};
+  std::optional<LinkWatch> watch_{std::in_place, 3, Rules(), Grid(), options_};
 };
 
 TEST_F(LinkWatchTest, AContactBeginsIsUpdatedAndEnds) {
@@ -147,6 +149,18 @@ TEST_F(LinkWatchTest, IdsLastWhereTheFinderLosesThem) {
   EXPECT_EQ(ContactOf(far[0]).id, 10u);
 }
 
+// On a skin of a fifth of the size the same distance is far.
+TEST_F(LinkWatchTest, TheSamePlaceScalesWithTheSkin) {
+  const auto events_of_moving_by = [&](double mm, double length_unit) {
+    watch_.emplace(3, Rules(), Grid(), options_, length_unit);
+    Frame({MakeContact(1, 0.2, 20)});
+    return Kinds(Frame({MakeContact(9, 0.2, 20 + mm)}));
+  };
+  EXPECT_THAT(events_of_moving_by(10, 1), IsEmpty());
+  EXPECT_THAT(events_of_moving_by(10, 0.2), ElementsAre("contact_begin"));
+  EXPECT_THAT(events_of_moving_by(5, 0.2), IsEmpty());
+}
+
 // Nobody has seen that what pressed has gone.
 TEST_F(LinkWatchTest, WhereNothingIsMeasuredNoContactEnds) {
   Frame({MakeContact(1, 0.2)});
@@ -161,11 +175,11 @@ TEST_F(LinkWatchTest, WhereNothingIsMeasuredNoContactEnds) {
 // A skin that is pressed too hard for an answer has not been let go.
 TEST_F(LinkWatchTest, ForcesThatAreNotKnownAreNoRelease) {
   Frame({MakeContact(1, 1.2)});
-  ASSERT_EQ(watch_.forces()[0].level(), ForceLevel::kAlarm);
+  ASSERT_EQ(watch_->forces()[0].level(), ForceLevel::kAlarm);
   state_.status = LinkStatus::kDegraded;
   state_.forces.converged = false;
   for (int i = 0; i < 50; ++i) EXPECT_TRUE(Frame({}).empty());
-  EXPECT_EQ(watch_.forces()[0].level(), ForceLevel::kAlarm);
+  EXPECT_EQ(watch_->forces()[0].level(), ForceLevel::kAlarm);
 }
 
 // A torn image, say.
@@ -232,7 +246,7 @@ TEST_F(LinkWatchTest, LevelsHaveHysteresis) {
   EXPECT_THAT(levels(0.39), ElementsAre(ForceLevel::kNormal));
   EXPECT_THAT(levels(1.5), ElementsAre(ForceLevel::kAlarm)) << "both at once";
   Frame({}, false);
-  EXPECT_EQ(watch_.forces()[0].level(), ForceLevel::kAlarm) << "stays while nothing is measured";
+  EXPECT_EQ(watch_->forces()[0].level(), ForceLevel::kAlarm) << "stays while nothing is measured";
   EXPECT_THAT(levels(0.1), ElementsAre(ForceLevel::kNormal));
 }
 
@@ -243,11 +257,11 @@ TEST_F(LinkWatchTest, ARingContactCountsByItsNormalForce) {
   ring.force_n = Vec3(0.001, 0, 0);
   const auto begin = Frame({ring});
   EXPECT_THAT(Kinds(begin), UnorderedElementsAre("contact_begin", "force_level", "force_level"));
-  EXPECT_EQ(watch_.forces()[0].level(), ForceLevel::kAlarm);
-  EXPECT_DOUBLE_EQ(watch_.forces()[0].force_n(), 1.5);
-  EXPECT_DOUBLE_EQ(watch_.forces()[1].force_n(), 0.75) << "half of its markers are in the region";
+  EXPECT_EQ(watch_->forces()[0].level(), ForceLevel::kAlarm);
+  EXPECT_DOUBLE_EQ(watch_->forces()[0].force_n(), 1.5);
+  EXPECT_DOUBLE_EQ(watch_->forces()[1].force_n(), 0.75) << "half of its markers are in the region";
   Frame({});
-  EXPECT_EQ(watch_.forces()[0].level(), ForceLevel::kNormal);
+  EXPECT_EQ(watch_->forces()[0].level(), ForceLevel::kNormal);
 }
 
 TEST_F(LinkWatchTest, ARegionCountsWhatLiesInIt) {
@@ -262,9 +276,9 @@ TEST_F(LinkWatchTest, ARegionCountsWhatLiesInIt) {
   EXPECT_TRUE(regions({8, 11}, 0.4).empty()) << "ring 2";
   EXPECT_TRUE(regions({3, 2}, 0.3).empty()) << "half of it";
   EXPECT_THAT(regions({3, 4}, 0.3), ElementsAre("palm")) << "paths 3 and 0: it crosses path 0";
-  EXPECT_EQ(watch_.forces()[1].level(), ForceLevel::kWarning);
-  EXPECT_NEAR(watch_.forces()[1].force_n(), 0.3, 1e-9);
-  EXPECT_EQ(watch_.forces()[0].level(), ForceLevel::kNormal);
+  EXPECT_EQ(watch_->forces()[1].level(), ForceLevel::kWarning);
+  EXPECT_NEAR(watch_->forces()[1].force_n(), 0.3, 1e-9);
+  EXPECT_EQ(watch_->forces()[0].level(), ForceLevel::kNormal);
 }
 
 TEST_F(LinkWatchTest, StatusIsToldWhenItChangesNotForEveryNumber) {

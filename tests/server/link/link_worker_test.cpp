@@ -265,6 +265,35 @@ TEST_F(LinkWorkerTest, CalibrationWithoutPicturesEnds) {
   EXPECT_EQ(end->error().code, ErrorCode::kUnavailable);
 }
 
+TEST_F(LinkWorkerTest, CalibrationEndsWhereFramesAreNoRestPairs) {
+  Run(Copy);
+  CalibrationLog log;
+  ASSERT_TRUE(worker_->Calibrate({.pairs = 3}, log.Observer()).ok());
+  script_->Push(1);
+  EXPECT_EQ(log.Wait(1).taken, 1);
+  // Frames go on arriving, a second apart.
+  const auto has_ended = [&] {
+    const std::lock_guard lock(log.mutex);
+    return log.told.back().end.has_value();
+  };
+  for (uint64_t i = 2; !has_ended(); ++i) {
+    ASSERT_LT(i, 20U) << "no end after 18 s";
+    clock_.Advance(std::chrono::seconds(1));
+    script_->Push([i](StereoFrame& frame) -> Result<void> {
+      frame.sequence = i;
+      frame.times.exposure_monotonic_ns = static_cast<int64_t>(i);
+      frame.pressure.stale = true;
+      return {};
+    });
+    ASSERT_NE(NextFrame(), nullptr);
+    log.Wait(i);
+  }
+  const std::lock_guard lock(log.mutex);
+  const Error error = log.told.back().end->error();
+  EXPECT_EQ(error.code, ErrorCode::kUnavailable);
+  EXPECT_THAT(error.message, HasSubstr("a stale pressure"));
+}
+
 TEST_F(LinkWorkerTest, CalibrationMayBeRefused) {
   Run(Copy, Error{ErrorCode::kFailedPrecondition, "touched"});
   CalibrationLog log;

@@ -1,0 +1,234 @@
+#include "sensing/pipeline/rest_touch.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "sensing/camera/bundle.h"
+#include "sensing/camera/camera_fit.h"
+#include "sensing/camera/projection.h"
+
+namespace taclink {
+namespace {
+
+// Of the squared residuals without image noise, and of these squares by themselves. Touches by 0.05 N and
+// more on both shipped skins, slack and at 0.5 kPa, explain 0.98 and 13.7 at least; of smooth errors of the
+// mould of 0.2 to 0.3 mm (RMS, harmonics 1 to 5 around and 1 to 3 along) 0.4 and 13.5 at most.
+constexpr double kLeastShare = 0.6, kLeastGain = 12;
+constexpr size_t kMostForces = 2;  // a plate is not a point, and the response is not linear
+constexpr double kLeastMoreShare = 0.05;
+constexpr double kSigmaFloorPx = 0.1;  // a detection is not believed to be better than this
+constexpr double kMostSigmaPx = 2;     // clipped ones do not count
+constexpr Eigen::Index kNuisanceOfCameras = kCameraCount * kCameraParameters;
+// Smooth radial errors of the mould: harmonics around and along the link, each of the standard deviation of a
+// marker's own error.
+constexpr int kMouldAround = 5, kMouldAlong = 3;
+constexpr Eigen::Index kNuisanceOfMould = (2 * kMouldAround + 1) * (kMouldAlong + 1);
+
+Eigen::Matrix<double, 3, kNuisanceOfMould> MouldModes(const LinkModel& model, int marker) {
+  const Vec3 at = model.RestMarker(marker);
+  const double angle = std::atan2(at.y(), at.x());
+  Eigen::Matrix<double, 1, kNuisanceOfMould> size;
+  Eigen::Index mode = 0;
+  for (int along = 0; along <= kMouldAlong; ++along) {
+    const double share = std::cos(along * kPi * at.z() / model.length_mm);
+    size[mode++] = share;
+    for (int around = 1; around <= kMouldAround; ++around) {
+      size[mode++] = share * std::cos(around * angle);
+      size[mode++] = share * std::sin(around * angle);
+    }
+  }
+  return Vec3(std::cos(angle), std::sin(angle), 0) * size;
+}
+
+// y = nuisance a + touches f + noise of unit variance, a with a prior of precision `prior`.
+struct Equations {
+  Eigen::VectorXd y;
+  Eigen::MatrixXd nuisance, touches;
+  Eigen::VectorXd prior;
+  double image_noise = 0;  // expected value of its squares in y
+};
+
+// One marker in all images that show it. Its error in the mould is the same in both.
+struct MarkerRows {
+  Eigen::Vector4d y = Eigen::Vector4d::Zero();
+  Eigen::Matrix<double, 4, kNuisanceOfCameras> by_cameras =
+      Eigen::Matrix<double, 4, kNuisanceOfCameras>::Zero();
+  Eigen::Matrix<double, 4, 3> by_point = Eigen::Matrix<double, 4, 3>::Zero();
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();
+  Eigen::Matrix4d image_noise = Eigen::Matrix4d::Zero();
+  Eigen::Index rows = 0;
+};
+
+MarkerRows RowsOf(const RestShape& shape, const std::array<Projector, kCameraCount>& projectors,
+                  const LabelledMarkers& rest, int marker) {
+  MarkerRows rows;
+  for (const CameraId id : kBothCameras) {
+    const MarkerObservation& seen = rest.cameras[Index(id)][static_cast<size_t>(marker)];
+    if (!seen.seen || !(seen.sigma_px() <= kMostSigmaPx)) continue;
+    const Projector& projector = projectors[Index(id)];
+    const auto expected =
+        projector.ProjectWithCameraJacobian(SeenPoint(shape, marker, projector.center_in_link(), true));
+    if (!expected) continue;
+    const Eigen::Index at = rows.rows;
+    rows.y.segment<2>(at) = seen.center_px - expected->pixel;
+    rows.by_cameras.block<2, kCameraParameters>(
+        at, static_cast<Eigen::Index>(Index(id)) * kCameraParameters) = expected->by_camera;
+    rows.by_point.middleRows<2>(at) = expected->by_point;
+    rows.image_noise.block<2, 2>(at, at) = seen.covariance_px2;
+    rows.covariance.block<2, 2>(at, at) =
+        seen.covariance_px2 + kSigmaFloorPx * kSigmaFloorPx * Mat2::Identity();
+    rows.rows += 2;
+  }
+  return rows;
+}
+
+Equations EquationsOf(const RestShape& shape, const Eigen::MatrixXf& responses, const StereoRig& rig,
+                      const LabelledMarkers& rest, double mould_mm) {
+  const std::array projectors = {Projector(rig[CameraId::kTop]), Projector(rig[CameraId::kBottom])};
+  const int markers = shape.model().markers.count();
+  const Eigen::Index loads = shape.errors_mm().cols(), first_load = kNuisanceOfCameras + kNuisanceOfMould;
+  Equations all;
+  all.y.resize(4 * markers);
+  all.nuisance.resize(4 * markers, first_load + loads);
+  all.touches.resize(4 * markers, responses.cols());
+  Eigen::Index end = 0;
+  for (int m = 0; m < markers; ++m) {
+    MarkerRows one = RowsOf(shape, projectors, rest, m);
+    if (one.rows == 0) continue;
+    one.covariance += mould_mm * mould_mm * one.by_point * one.by_point.transpose();
+    // Rows beyond `rows` are zero but for the covariance's diagonal.
+    const Eigen::LLT<Eigen::Matrix4d> noise(one.covariance);
+    const Eigen::Matrix<double, 4, 3> by_point = noise.matrixL().solve(one.by_point);
+    all.image_noise += noise.solve(one.image_noise).trace();
+    all.y.segment(end, one.rows) = noise.matrixL().solve(one.y).head(one.rows);
+    all.nuisance.block(end, 0, one.rows, kNuisanceOfCameras) =
+        noise.matrixL().solve(one.by_cameras).topRows(one.rows);
+    all.nuisance.block(end, kNuisanceOfCameras, one.rows, kNuisanceOfMould) =
+        mould_mm * by_point.topRows(one.rows) * MouldModes(shape.model(), m);
+    if (loads > 0)
+      all.nuisance.block(end, first_load, one.rows, loads) =
+          by_point.topRows(one.rows) * shape.errors_mm().middleRows<3>(3 * m);
+    all.touches.middleRows(end, one.rows) =
+        by_point.topRows(one.rows) * responses.middleRows<3>(3 * m).cast<double>();
+    end += one.rows;
+  }
+  all.y.conservativeResize(end);
+  all.nuisance.conservativeResize(end, Eigen::NoChange);
+  all.touches.conservativeResize(end, Eigen::NoChange);
+  // Cameras are known by the build's tolerances, their lenses not at all.
+  const BuildTolerance tolerance;
+  CameraStep sigmas = CameraStep::Constant(1e9);
+  sigmas.head<8>() << tolerance.tilt_rad, tolerance.tilt_rad, tolerance.roll_rad,
+      Vec3::Constant(tolerance.place_mm), Vec2::Constant(tolerance.principal_point_px);
+  all.prior = Eigen::VectorXd::Ones(first_load + loads);
+  for (Eigen::Index c = 0; c < static_cast<Eigen::Index>(kCameraCount); ++c)
+    all.prior.segment<kCameraParameters>(c * kCameraParameters) = sigmas.array().square().inverse();
+  return all;
+}
+
+// What remains after the nuisance parameters are eliminated: sums of squares and products.
+struct Reduced {
+  double squares = 0;      // y'y
+  double image_noise = 0;  // in them
+  Eigen::VectorXd pulls;   // touches' y
+  Eigen::MatrixXd normal;  // touches' touches
+};
+
+Reduced Eliminate(const Equations& all) {
+  // Parameters differ by many orders of magnitude in their units.
+  const Eigen::VectorXd units =
+      (all.nuisance.colwise().squaredNorm().transpose() + all.prior).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd nuisance = all.nuisance * units.asDiagonal();
+  Eigen::MatrixXd information = nuisance.transpose() * nuisance;
+  information.diagonal() += all.prior.cwiseProduct(units.cwiseAbs2());
+  information.diagonal().array() += 1e-12;  // parameters that a lens does not have
+  const Eigen::LDLT<Eigen::MatrixXd> factor(information);
+  const Eigen::VectorXd by_y = nuisance.transpose() * all.y;
+  const Eigen::MatrixXd by_touches = nuisance.transpose() * all.touches;
+  const Eigen::MatrixXd solved = factor.solve(by_touches);
+  Reduced reduced;
+  reduced.image_noise = all.image_noise;
+  reduced.squares = all.y.squaredNorm() - by_y.dot(factor.solve(by_y));
+  reduced.pulls = all.touches.transpose() * all.y - solved.transpose() * by_y;
+  reduced.normal = all.touches.transpose() * all.touches - by_touches.transpose() * solved;
+  return reduced;
+}
+
+struct Forces {
+  std::vector<Eigen::Index> at;
+  Eigen::VectorXd n;
+  double gain = 0;  // of squares
+};
+
+// By least squares. nullopt: not all push, or they cannot be told apart.
+std::optional<Forces> FitForces(const Reduced& reduced, std::vector<Eigen::Index> at) {
+  const auto count = static_cast<Eigen::Index>(at.size());
+  Eigen::MatrixXd normal(count, count);
+  Eigen::VectorXd pulls(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    pulls[i] = reduced.pulls[at[static_cast<size_t>(i)]];
+    for (Eigen::Index j = 0; j < count; ++j)
+      normal(i, j) = reduced.normal(at[static_cast<size_t>(i)], at[static_cast<size_t>(j)]);
+  }
+  const Eigen::LLT<Eigen::MatrixXd> factor(normal);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  Forces forces{.at = std::move(at), .n = factor.solve(pulls), .gain = 0};
+  if (!(forces.n.minCoeff() > 0)) return std::nullopt;
+  forces.gain = forces.n.dot(pulls);
+  return forces;
+}
+
+// Greedy forward selection.
+Forces SelectForces(const Reduced& reduced) {
+  Forces best;
+  while (best.at.size() < kMostForces) {
+    std::optional<Forces> better;
+    for (Eigen::Index k = 0; k < reduced.pulls.size(); ++k) {
+      std::vector<Eigen::Index> at = best.at;
+      if (std::find(at.begin(), at.end(), k) != at.end()) continue;
+      at.push_back(k);
+      auto forces = FitForces(reduced, std::move(at));
+      if (forces && (!better || forces->gain > better->gain)) better = std::move(forces);
+    }
+    if (!better || better->gain < best.gain + kLeastMoreShare * reduced.squares) break;
+    best = *std::move(better);
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<RestTouch> FindRestTouch(const RestShape& shape, const Eigen::MatrixXf& responses,
+                                       const StereoRig& rig, const LabelledMarkers& rest, double mould_mm) {
+  const Reduced reduced = Eliminate(EquationsOf(shape, responses, rig, rest, mould_mm));
+  const Forces forces = SelectForces(reduced);
+  const double unexplained = reduced.squares - forces.gain - reduced.image_noise;
+  const double share = forces.gain / (forces.gain + std::max(0.0, unexplained));
+  if (forces.at.empty() || forces.gain < kLeastGain || share < kLeastShare) return std::nullopt;
+  Eigen::Index strongest = 0;
+  forces.n.maxCoeff(&strongest);
+  RestTouch touch;
+  touch.marker = static_cast<int>(forces.at[static_cast<size_t>(strongest)]);
+  touch.share = share;
+  Eigen::Vector3f moved_mm = Eigen::Vector3f::Zero();
+  for (size_t i = 0; i < forces.at.size(); ++i)
+    moved_mm += static_cast<float>(forces.n[static_cast<Eigen::Index>(i)]) *
+                responses.col(forces.at[i]).segment<3>(3 * static_cast<Eigen::Index>(touch.marker));
+  touch.depth_mm = moved_mm.cast<double>().norm();
+  return touch;
+}
+
+std::string Describe(const LinkModel& model, const RestTouch& touch) {
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "the skin is touched near path %d, ring %d: it is pressed in by about %.1f mm; take the rest "
+                "images again with nothing at the skin; if nothing is there, the skin is not formed as the "
+                "model says",
+                model.PathOf(touch.marker) + 1, model.RingOf(touch.marker) + 1, touch.depth_mm);
+  return text;
+}
+
+}  // namespace taclink
