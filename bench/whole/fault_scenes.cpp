@@ -95,6 +95,7 @@ void SceneMaker::Cameras() {
   Trouble("both moved by 1 mm", PictureFault::kMoved, 1, kBoth, {kCamerasMoved});
   Trouble("top scaled by 2 %", PictureFault::kScaled, 1.02, kTop, moved);
   Trouble("top scaled by 10 %", PictureFault::kScaled, 1.1, kTop, {kCamerasMoved});
+  BothCameras();
   WholeScene& other = Touched("another link's calibration", kUsualKpa);
   other.fault.is_calibrated = true;
   other.fault.calibration_off = {.shift_mm = {0.7, -0.5, 0.6}, .turn_rad = {0.01, -0.008, 0.02}};
@@ -102,6 +103,30 @@ void SceneMaker::Cameras() {
   WholeScene& wrong = Touched("wrong model", kUsualKpa);
   wrong.fault.configured_model = model_.name == "cylinder" ? "barrel" : "cylinder";
   wrong.named_by = {kResidual};
+}
+
+// Changes that both cameras undergo alike, so that they agree with each other.
+void SceneMaker::BothCameras() {
+  using enum ReasonId;
+  constexpr std::array<bool, kCameraCount> kBoth = {true, true};
+  Trouble("both shifted by 2 px", PictureFault::kShifted, 2, kBoth, {kCamerasMoved}, false);
+  Trouble("both vibrate by 1.5 px", PictureFault::kVibrating, 1.5, kBoth, {kCamerasMoved}, false);
+  Trouble("both at half the rate", PictureFault::kHalfRate, 0, kBoth, {kFrameRate, ReasonId::kFrozen}, false);
+  for (const double kpa : {0.0, kUsualKpa}) {
+    WholeScene& grows =
+        Touched(kpa == 0 ? "both grow by 1.2 % within 3 s, slack" : "both grow by 1.2 % within 3 s", kpa);
+    grows.fault.pictures = PictureFault::kScaled;
+    grows.fault.amount = 1.012;
+    grows.fault.begin_s = kTouchS;
+    grows.fault.grows_s = 3;
+    grows.named_by = {kCamerasMoved};
+  }
+  for (const double share : {0.5, 0.85}) {
+    WholeScene& blended = Touched(share < 0.6 ? "both blend by 50 %" : "both blend by 85 %", kUsualKpa);
+    blended.fault.pictures = PictureFault::kBlended;
+    blended.fault.amount = share;
+    blended.named_by = {kTemporalSmoothing};
+  }
 }
 
 // Where the two pictures differ little from frame to frame, or one of them shows little.
@@ -128,6 +153,12 @@ void SceneMaker::Light() {
   Trouble("top blurred by 3 px", PictureFault::kBlurred, 3, kTop, {});
   Trouble("top half covered", PictureFault::kCovered, 0.5, kTop, {});
   Trouble("both half covered", PictureFault::kCovered, 0.5, kBoth, dim);
+  Trouble("hair on the top lens", PictureFault::kHair, 4, kTop, {kLabels});
+  Trouble("thick hair on the top lens", PictureFault::kHair, 10, kTop, {kLabels});
+  Trouble("big drop on the top lens", PictureFault::kDrop, 80, kTop, {kLabels});
+  Trouble("hair on both lenses", PictureFault::kHair, 2, kBoth, {kLabels});
+  Trouble("drop on the top lens", PictureFault::kDrop, 40, kTop, {kLabels});
+  Trouble("small drop on the top lens", PictureFault::kDrop, 20, kTop, {kLabels});
   Trouble("top lamp out", PictureFault::kDark, 0.03, kTop, {});
   Trouble("both lamps out", PictureFault::kDark, 0.03, kBoth, dim);
   Trouble("noise of 5 levels", PictureFault::kNoisy, 4.6, kBoth, {});

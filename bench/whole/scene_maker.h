@@ -51,6 +51,7 @@ class SceneMaker {
   void Pressures();
   void Cameras();
   void LateSlowly();
+  void BothCameras();
   void Light();
   void Markers();
   void Baselines();

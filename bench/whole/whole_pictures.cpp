@@ -28,10 +28,11 @@ bool IsCompressed(PictureFault fault) {
   return fault == PictureFault::kJpeg || fault == PictureFault::kReencoded;
 }
 
-void Warp(cv::Mat& gray, double turn_deg, double scale, double shift_px) {
+void Warp(cv::Mat& gray, double turn_deg, double scale, double shift_px, double shift_y_px = 0) {
   const cv::Point2f middle(static_cast<float>(gray.cols - 1) / 2, static_cast<float>(gray.rows - 1) / 2);
   cv::Mat by = cv::getRotationMatrix2D(middle, turn_deg, scale);
   by.at<double>(0, 2) += shift_px;
+  by.at<double>(1, 2) += shift_y_px;
   cv::Mat warped;
   cv::warpAffine(gray, warped, by, gray.size(), cv::INTER_CUBIC, cv::BORDER_CONSTANT);
   gray = std::move(warped);
@@ -54,6 +55,32 @@ void Mirror(cv::Mat& gray) {
   cv::Mat mirrored;
   cv::flip(gray, mirrored, 1);
   gray = std::move(mirrored);
+}
+
+// A hair close to the lens, out of focus, on an arc across the image.
+void AddHair(cv::Mat& gray, double width_px) {
+  Shade(gray, [&](double x, double y, double level) {
+    const double off_px = (y + 0.45 - 0.25 * x * x) * gray.rows / 2;
+    return level * (1 - 0.8 * std::exp(-off_px * off_px / (width_px * width_px)));
+  });
+}
+
+// Magnified most in its middle, beside the image's middle, where the markers of a few rings are.
+void AddDrop(cv::Mat& gray, double radius_px) {
+  constexpr float kMagnified = 0.35F;
+  const cv::Point2f at(0.68F * static_cast<float>(gray.cols), 0.5F * static_cast<float>(gray.rows));
+  cv::Mat from(gray.size(), CV_32FC2);
+  for (int row = 0; row < gray.rows; ++row) {
+    for (int column = 0; column < gray.cols; ++column) {
+      const cv::Point2f pixel(static_cast<float>(column), static_cast<float>(row));
+      const cv::Point2f off = pixel - at;
+      const float part = off.dot(off) / static_cast<float>(radius_px * radius_px);
+      from.at<cv::Point2f>(row, column) = part < 1 ? pixel - kMagnified * (1 - part) * off : pixel;
+    }
+  }
+  cv::Mat seen;
+  cv::remap(gray, seen, from, {}, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  gray = std::move(seen);
 }
 
 void AddNoise(cv::Mat& gray, double levels, unsigned seed) {
@@ -112,7 +139,23 @@ void WholePictures::Spoil(int frame, CameraId id, cv::Mat& gray) {
     case PictureFault::kShifted:
       return Warp(gray, 0, 1, amount);
     case PictureFault::kScaled:
-      return Warp(gray, 0, amount, 0);
+      return Warp(gray, 0, 1 + grown * (fault.amount - 1), 0);
+    case PictureFault::kBlended: {
+      cv::Mat& blended = blended_[Index(id)];
+      if (blended.empty()) gray.convertTo(blended, CV_32F);
+      cv::accumulateWeighted(gray, blended, 1 - amount);
+      return blended.convertTo(gray, CV_8U);
+    }
+    case PictureFault::kVibrating: {
+      std::mt19937 random(static_cast<unsigned>(frame));
+      std::uniform_real_distribution<double> shift_px(-amount, amount);
+      const double x = shift_px(random);
+      return Warp(gray, 0, 1, x, shift_px(random));
+    }
+    case PictureFault::kHair:
+      return AddHair(gray, amount);
+    case PictureFault::kDrop:
+      return AddDrop(gray, amount);
     case PictureFault::kMirrored:
       return Mirror(gray);
     case PictureFault::kHazed: {

@@ -39,7 +39,7 @@ class WholePictures {
   AgingSkin aging_;
   Renderer renderer_, moved_;  // moved_: as the fault has it
   JpegEncoder encoder_;
-  std::array<cv::Mat, kCameraCount> gray_;
+  std::array<cv::Mat, kCameraCount> gray_, blended_;
   SkinTruth then_;
 };
 

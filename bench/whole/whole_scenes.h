@@ -39,6 +39,10 @@ enum class PictureFault : int {
   kTorn,       ///< the lower half is of `amount` seconds ago
   kMirrored,   ///< left and right exchanged
   kTwice,      ///< both images are of the top camera
+  kBlended,    ///< `amount` of it is the image before, which is blended likewise
+  kHair,       ///< a dark hair of `amount` px in width lies across the lens
+  kDrop,       ///< a drop of `amount` px in radius on the lens magnifies what is behind it
+  kVibrating,  ///< shifted from image to image by up to `amount` px along each axis, both cameras alike
 };
 
 /// One trouble, and since when.

@@ -242,6 +242,18 @@ void CameraEvidence::Measure(const Eigen::VectorXd& u, MarkerObservations& obser
   }
 }
 
+void CameraEvidence::Residuals(const Eigen::VectorXd& u, ImageResiduals& residuals) const {
+  for (auto& camera : residuals) camera.assign(rest_mm_.size(), std::nullopt);
+  for (size_t i = 0; i < observations_.size(); ++i) {
+    const Observation& o = observations_[i];
+    const size_t m = i / kCameraCount, c = i % kCameraCount;
+    if (!o.seen) continue;
+    const Vec3 moved_mm = u.segment<3>(3 * static_cast<Eigen::Index>(m));
+    if (const auto pixel = projectors_[c].Project(rest_mm_[m] + moved_mm + o.seen_offset))
+      residuals[c][m] = o.pixel - *pixel;
+  }
+}
+
 CameraAgreement CameraEvidence::Agreement() const {
   CameraAgreement agreement;
   for (size_t m = 0; m < is_suspect_.size(); ++m) {

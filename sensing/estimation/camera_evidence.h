@@ -39,6 +39,9 @@ struct CameraAgreement {
   int apart = 0;  ///< of these, whose two lines of sight do not meet
 };
 
+/// By camera and marker: where it is seen less where it is expected, px. nullopt: it is not seen.
+using ImageResiduals = std::array<std::vector<std::optional<Vec2>>, kCameraCount>;
+
 /// Both cameras' labeled markers as displacements. Where both cameras see a marker its place is the
 /// least-squares point of both images [hartley1997], whatever a model expects; where one does, along its ray
 /// it is where the estimate has it. One thread; no allocation after construction. Displacements: from the
@@ -66,6 +69,9 @@ class CameraEvidence {
   /// with it. `covariances`: of the model's error, by marker. True: something changed; measure again.
   bool Reconsider(const Eigen::VectorXd& u, std::span<const Mat3> covariances);
 
+  /// Of the frame that was observed last, of all seen markers, those left out included, from displacements
+  /// `u`. Fixed residuals are subtracted.
+  void Residuals(const Eigen::VectorXd& u, ImageResiduals& residuals) const;
   /// Of the frame that was observed last, once it was measured.
   CameraAgreement Agreement() const;
 

@@ -23,7 +23,10 @@ constexpr int kMostSteps = 16, kMostTangents = 5;
 constexpr double kLeastStepMm = 0.3;
 constexpr int kStepsOfTangent = 3;  // the least: a new one is a disturbance where a skin may buckle
 constexpr double kShrinks = 0.5;    // steps by less: the tangent is too old
-constexpr double kArrivingMm = 1;   // of a step: a tangent that is made where it leads will be near the end
+// Likewise where the skin nearly rests: a new tangent may choose other loads, which lead elsewhere where
+// bodies hide the markers between them.
+constexpr double kShrinksNearEnd = 0.9;
+constexpr double kArrivingMm = 1;  // of a step: a tangent that is made where it leads will be near the end
 // Between the last two steps, of the loads in any neighborhood by the largest, and of a seen marker: settled.
 constexpr double kSameLoads = 0.1, kSeenSettledMm = 0.2;
 
@@ -236,7 +239,8 @@ bool SkinEstimator::SolveLarge(const SkinProblem& problem, SkinEstimate& estimat
                       (local_n - local_before_n).cwiseAbs().maxCoeff() < kSameLoads * local_n.maxCoeff();
     const double distance_mm = touched_->DistanceMm(estimate.state);
     const bool is_off = distance_mm > touched_->reach_mm || !touched_->HasLocal(local_n);
-    const bool is_slow = step > 0 && step_mm > kShrinks * before_mm;
+    const bool is_near_end = step_mm < kNearlySettledMm * unit;
+    const bool is_slow = step > 0 && step_mm > (is_near_end ? kShrinksNearEnd : kShrinks) * before_mm;
     const bool is_settled =
         step_mm * std::min(1.0, kTangentErrorPerMm * distance_mm / unit) < kNextStepMm * unit;
     if (is_settled && !is_off) return true;

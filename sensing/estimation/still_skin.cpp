@@ -49,6 +49,7 @@ bool SkinEstimator::IsStill(const SkinObservation& observation, const UntouchedS
   Forget();
   estimate.loads.loads.clear();
   estimate.loads.region_chi2_per_dof = estimate.loads.camera_shift_mm = 0;
+  estimate.loads.beside_mm.setZero(untouched.markers_mm.size());
   estimate.loads.by_cameras_mm.setZero(untouched.markers_mm.size());
   for (Eigen::VectorXd& by_camera_mm : estimate.loads.by_camera_mm) by_camera_mm.resize(0);
   estimate.loads.converged = true;

@@ -10,29 +10,44 @@
 #include "sensing/core/link_model.h"
 #include "sensing/core/link_state.h"
 #include "sensing/core/markers.h"
+#include "sensing/estimation/camera_evidence.h"
+#include "sensing/estimation/skin_estimator.h"
 #include "sensing/markers/detect/detector.h"
+#include "sensing/pipeline/camera_drift.h"
 
 namespace taclink {
 
-/// Looks for the cause where a link's images fit neither its calibration nor each other (DiagnoseImages). It
-/// takes as long as some frames, and is done twice a second while that lasts. One thread.
+/// Looks for what is wrong with a link's cameras: in every frame whether their images grow (CameraDrift), and
+/// where the images fit neither their calibration nor each other, how they are displaced (DiagnoseImages),
+/// which takes as long as some frames and is done twice a second while that lasts. One thread.
 class CameraDiagnosis {
  public:
   explicit CameraDiagnosis(const LinkModel& model) : model_(model) {}
 
-  /// The cameras were calibrated, or the link begins again.
-  void Restart();
+  /// The rest images were taken: their known loads, under which the skin is stable, cameras and labels.
+  void Begin(SkinMechanics& mechanics, const MeasuredLoads& loads, const StereoRig& rig,
+             const LabelledMarkers& rest);
 
-  /// After a frame was judged. `images`: CV_8UC1; empty: none from that camera. `skin_mm`: where the
-  /// untouched skin has its markers, link frame, by marker.
-  void Observe(const LinkState& state, const std::array<cv::Mat, kCameraCount>& images, const StereoRig& rig,
-               std::span<const Vec3> skin_mm);
+  /// What one frame shows.
+  struct Frame {
+    const std::array<cv::Mat, kCameraCount>& images;  ///< CV_8UC1; empty: none from that camera
+    std::span<const Vec3> skin_mm;                    ///< the untouched skin's markers, link frame
+    const SkinEstimate& estimate;
+    const ImageResiduals& residuals;  ///< SkinStage::residuals
+  };
+  /// After a frame was judged.
+  void Observe(const LinkState& state, const Frame& frame);
 
   /// Of the frame before. None: nothing is wrong, or it is something else.
-  const std::optional<Reason>& reason() const { return reason_; }
+  const std::optional<Reason>& reason() const { return reason_ ? reason_ : growth_; }
 
  private:
+  void ObserveGrowth(const Frame& frame);
+
   const LinkModel model_;
+  StereoRig rig_;
+  std::optional<CameraDrift> drift_;  // none before Begin
+  std::optional<Reason> growth_;
   MarkerDetector detector_;
   std::array<Detections, kCameraCount> spots_;
   std::optional<Reason> reason_;

@@ -275,7 +275,7 @@ struct LinkPipeline::Stages {
     for (size_t i = 0; i < kCameraCount; ++i) contrasts[i].SetRest(pictures[i], found.markers.cameras[i]);
     keeper.Take(rest_origin, found.markers, loads.Loads(), frame.times, clock);
     attitude.Restart();
-    diagnosis.Restart();
+    diagnosis.Begin(estimator->skin().mechanics(), loads, calibration->rig, found.markers);
     predicted_mm.clear();
   }
 
@@ -471,7 +471,10 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
          .baseline = s.skin->baseline_loads(),
          .estimate = estimate},
         state);
-  s.diagnosis.Observe(state, s.pictures, s.CurrentRig(), s.UntouchedMarkers());
+  s.diagnosis.Observe(state, {.images = s.pictures,
+                              .skin_mm = s.UntouchedMarkers(),
+                              .estimate = estimate,
+                              .residuals = s.skin->residuals()});
   // A tare ends where nothing is measured; where there is a shape without forces it waits for a while.
   if (estimate.failure == EstimateFailure::kNone || !state.measured())
     s.keeper.Learn(frame.times, state, s.labels, *s.skin, *s.estimator, s.clock);

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <vector>
 
 #include "sensing/camera/bundle.h"
 #include "sensing/camera/camera_fit.h"
 #include "sensing/camera/projection.h"
+#include "sensing/pipeline/touch_selection.h"
 
 namespace taclink {
 namespace {
@@ -17,8 +17,7 @@ namespace {
 // more on both shipped skins, slack and at 0.5 kPa, explain 0.98 and 13.7 at least; of smooth errors of the
 // mould of 0.2 to 0.3 mm (RMS, harmonics 1 to 5 around and 1 to 3 along) 0.4 and 13.5 at most.
 constexpr double kLeastShare = 0.6, kLeastGain = 12;
-constexpr size_t kMostForces = 2;  // a plate is not a point, and the response is not linear
-constexpr double kLeastMoreShare = 0.05;
+constexpr int kMostForces = 2;         // a plate is not a point, and the response is not linear
 constexpr double kSigmaFloorPx = 0.1;  // a detection is not believed to be better than this
 constexpr double kMostSigmaPx = 2;     // clipped ones do not count
 constexpr Eigen::Index kNuisanceOfCameras = kCameraCount * kCameraParameters;
@@ -85,6 +84,19 @@ MarkerRows RowsOf(const RestShape& shape, const std::array<Projector, kCameraCou
   return rows;
 }
 
+// Adds for each ring what the same force at each of its markers does; and last what the same outward force at
+// all markers does, as pressure that is higher than known.
+void AddRingsAndInflation(const MarkerGrid& grid, Eigen::MatrixXd& touches) {
+  const Eigen::Index markers = touches.cols();
+  touches.conservativeResize(Eigen::NoChange, markers + grid.rings() + 1);
+  touches.rightCols<1>() = -touches.leftCols(markers).rowwise().sum();
+  for (int ring = 0; ring < grid.rings(); ++ring) {
+    auto all_around = touches.col(markers + ring);
+    all_around.setZero();
+    for (int path = 0; path < grid.paths; ++path) all_around += touches.col(ring * grid.paths + path);
+  }
+}
+
 Equations EquationsOf(const RestShape& shape, const Eigen::MatrixXf& responses, const StereoRig& rig,
                       const LabelledMarkers& rest, double mould_mm) {
   const std::array projectors = {Projector(rig[CameraId::kTop]), Projector(rig[CameraId::kBottom])};
@@ -118,6 +130,7 @@ Equations EquationsOf(const RestShape& shape, const Eigen::MatrixXf& responses, 
   all.y.conservativeResize(end);
   all.nuisance.conservativeResize(end, Eigen::NoChange);
   all.touches.conservativeResize(end, Eigen::NoChange);
+  AddRingsAndInflation(shape.model().markers, all.touches);
   // Cameras are known by the build's tolerances, their lenses not at all.
   const BuildTolerance tolerance;
   CameraStep sigmas = CameraStep::Constant(1e9);
@@ -129,15 +142,8 @@ Equations EquationsOf(const RestShape& shape, const Eigen::MatrixXf& responses, 
   return all;
 }
 
-// What remains after the nuisance parameters are eliminated: sums of squares and products.
-struct Reduced {
-  double squares = 0;      // y'y
-  double image_noise = 0;  // in them
-  Eigen::VectorXd pulls;   // touches' y
-  Eigen::MatrixXd normal;  // touches' touches
-};
-
-Reduced Eliminate(const Equations& all) {
+// Eliminates the nuisance parameters.
+TouchEquations Eliminate(const Equations& all) {
   // Parameters differ by many orders of magnitude in their units.
   const Eigen::VectorXd units =
       (all.nuisance.colwise().squaredNorm().transpose() + all.prior).cwiseSqrt().cwiseInverse();
@@ -149,85 +155,69 @@ Reduced Eliminate(const Equations& all) {
   const Eigen::VectorXd by_y = nuisance.transpose() * all.y;
   const Eigen::MatrixXd by_touches = nuisance.transpose() * all.touches;
   const Eigen::MatrixXd solved = factor.solve(by_touches);
-  Reduced reduced;
-  reduced.image_noise = all.image_noise;
+  TouchEquations reduced;
   reduced.squares = all.y.squaredNorm() - by_y.dot(factor.solve(by_y));
   reduced.pulls = all.touches.transpose() * all.y - solved.transpose() * by_y;
   reduced.normal = all.touches.transpose() * all.touches - by_touches.transpose() * solved;
   return reduced;
 }
 
-struct Forces {
-  std::vector<Eigen::Index> at;
-  Eigen::VectorXd n;
-  double gain = 0;  // of squares
-};
-
-// By least squares. nullopt: not all push, or they cannot be told apart.
-std::optional<Forces> FitForces(const Reduced& reduced, std::vector<Eigen::Index> at) {
-  const auto count = static_cast<Eigen::Index>(at.size());
-  Eigen::MatrixXd normal(count, count);
-  Eigen::VectorXd pulls(count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    pulls[i] = reduced.pulls[at[static_cast<size_t>(i)]];
-    for (Eigen::Index j = 0; j < count; ++j)
-      normal(i, j) = reduced.normal(at[static_cast<size_t>(i)], at[static_cast<size_t>(j)]);
+// Where the forces together press deepest among the places at which they act.
+RestTouch DeepestOf(const SelectedTouches& forces, const LinkModel& model, const Eigen::MatrixXf& responses,
+                    double share) {
+  const int markers = model.markers.count(), paths = model.markers.paths;
+  Eigen::VectorXf at_markers_n = Eigen::VectorXf::Zero(markers);
+  for (size_t i = 0; i < static_cast<size_t>(forces.count); ++i) {
+    const auto force_n = static_cast<float>(forces.force_n[i]);
+    if (const auto ring = forces.at[i] - markers; ring == model.markers.rings())
+      at_markers_n.array() -= force_n;
+    else if (ring >= 0)
+      at_markers_n.segment(ring * paths, paths).array() += force_n;
+    else
+      at_markers_n[forces.at[i]] += force_n;
   }
-  const Eigen::LLT<Eigen::MatrixXd> factor(normal);
-  if (factor.info() != Eigen::Success) return std::nullopt;
-  Forces forces{.at = std::move(at), .n = factor.solve(pulls), .gain = 0};
-  if (!(forces.n.minCoeff() > 0)) return std::nullopt;
-  forces.gain = forces.n.dot(pulls);
-  return forces;
-}
-
-// Greedy forward selection.
-Forces SelectForces(const Reduced& reduced) {
-  Forces best;
-  while (best.at.size() < kMostForces) {
-    std::optional<Forces> better;
-    for (Eigen::Index k = 0; k < reduced.pulls.size(); ++k) {
-      std::vector<Eigen::Index> at = best.at;
-      if (std::find(at.begin(), at.end(), k) != at.end()) continue;
-      at.push_back(k);
-      auto forces = FitForces(reduced, std::move(at));
-      if (forces && (!better || forces->gain > better->gain)) better = std::move(forces);
-    }
-    if (!better || better->gain < best.gain + kLeastMoreShare * reduced.squares) break;
-    best = *std::move(better);
+  const Eigen::VectorXf moved_mm = responses * at_markers_n;
+  RestTouch deepest{.share = share};
+  for (size_t i = 0; i < static_cast<size_t>(forces.count); ++i) {
+    const auto ring = forces.at[i] - markers;
+    if (ring == model.markers.rings()) continue;
+    const auto marker = static_cast<int>(ring >= 0 ? ring * paths : forces.at[i]);
+    const double depth_mm = static_cast<double>(moved_mm.segment<3>(3 * marker).norm());
+    if (depth_mm <= deepest.depth_mm) continue;
+    deepest.marker = marker;
+    deepest.is_around = ring >= 0;
+    deepest.depth_mm = depth_mm;
   }
-  return best;
+  return deepest;
 }
 
 }  // namespace
 
 std::optional<RestTouch> FindRestTouch(const RestShape& shape, const Eigen::MatrixXf& responses,
                                        const StereoRig& rig, const LabelledMarkers& rest, double mould_mm) {
-  const Reduced reduced = Eliminate(EquationsOf(shape, responses, rig, rest, mould_mm));
-  const Forces forces = SelectForces(reduced);
-  const double unexplained = reduced.squares - forces.gain - reduced.image_noise;
+  const Equations all = EquationsOf(shape, responses, rig, rest, mould_mm);
+  const TouchEquations reduced = Eliminate(all);
+  const SelectedTouches forces = SelectTouches(reduced, kMostForces, TouchSign::kPush);
+  const double unexplained = reduced.squares - forces.gain - all.image_noise;
   const double share = forces.gain / (forces.gain + std::max(0.0, unexplained));
-  if (forces.at.empty() || forces.gain < kLeastGain || share < kLeastShare) return std::nullopt;
-  Eigen::Index strongest = 0;
-  forces.n.maxCoeff(&strongest);
-  RestTouch touch;
-  touch.marker = static_cast<int>(forces.at[static_cast<size_t>(strongest)]);
-  touch.share = share;
-  Eigen::Vector3f moved_mm = Eigen::Vector3f::Zero();
-  for (size_t i = 0; i < forces.at.size(); ++i)
-    moved_mm += static_cast<float>(forces.n[static_cast<Eigen::Index>(i)]) *
-                responses.col(forces.at[i]).segment<3>(3 * static_cast<Eigen::Index>(touch.marker));
-  touch.depth_mm = moved_mm.cast<double>().norm();
-  return touch;
+  if (forces.count == 0 || forces.gain < kLeastGain || share < kLeastShare) return std::nullopt;
+  if (forces.at[0] + 1 == reduced.pulls.size()) return std::nullopt;  // inflated
+  return DeepestOf(forces, shape.model(), responses, share);
 }
 
 std::string Describe(const LinkModel& model, const RestTouch& touch) {
-  char text[320];
-  std::snprintf(text, sizeof text,
-                "the skin is touched near path %d, ring %d: it is pressed in by about %.1f mm; take the rest "
-                "images again with nothing at the skin; if nothing is there, the skin is not formed as the "
-                "model says",
-                model.PathOf(touch.marker) + 1, model.RingOf(touch.marker) + 1, touch.depth_mm);
+  char where[60], text[400];
+  if (touch.is_around)
+    std::snprintf(where, sizeof where, "all around at ring %d", model.RingOf(touch.marker) + 1);
+  else
+    std::snprintf(where, sizeof where, "near path %d, ring %d", model.PathOf(touch.marker) + 1,
+                  model.RingOf(touch.marker) + 1);
+  std::snprintf(
+      text, sizeof text,
+      "the skin is touched %s: it is pressed in by about %.1f mm; take the rest images again with "
+      "nothing at the skin; if nothing is there, a camera has moved since it was calibrated, or the "
+      "skin is not shaped as the model says",
+      where, touch.depth_mm);
   return text;
 }
 

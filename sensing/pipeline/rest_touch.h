@@ -12,13 +12,15 @@ namespace taclink {
 
 /// A touch that explains where rest images have their markers.
 struct RestTouch {
-  int marker = 0;       ///< nearest to it
-  double depth_mm = 0;  ///< about: to first order
-  double share = 0;     ///< of the squared residuals that the touch explains
+  int marker = 0;          ///< nearest to it
+  bool is_around = false;  ///< it presses alike all around, at the marker's ring
+  double depth_mm = 0;     ///< about: to first order
+  double share = 0;        ///< of the squared residuals that the touch explains
 };
 
-/// Whether the skin is touched in its rest images: a generalized likelihood ratio test [kay1998] of inward
-/// forces at up to two markers against none. Errors of the cameras (all parameters of `rig`), of the mould
+/// Whether the skin is touched in its rest images: a generalized likelihood ratio test [kay1998] of up to two
+/// inward forces, each at a marker or alike at all markers of a ring, against none. Errors of the cameras
+/// (all parameters of `rig`), of the mould
 /// (`mould_mm`, standard deviation of each marker's coordinates and of each smooth radial harmonic) and of
 /// the known loads (shape.errors_mm) are nuisance parameters, so that the cameras may be fitted to the same
 /// images or have moved since. A touch is found if it is significant and explains most of what the nuisance

@@ -83,6 +83,16 @@ void SkinStage::CompareWithRest(const LabelledMarkers& markers, std::span<const 
   sees_alone_ = rest_.SeesAlone(markers, expected_mm_);
 }
 
+void SkinStage::FindResiduals(std::span<const Vec3> drift_mm, const SkinEstimate& estimate) {
+  for (auto& camera : residuals_) camera.clear();
+  const auto size = 3 * static_cast<Eigen::Index>(model_.markers.count());
+  if (estimate.failure != EstimateFailure::kNone || estimate.loads.beside_mm.size() != size) return;
+  now_mm_ = estimate.displacements_mm - estimate.loads.beside_mm;
+  for (size_t m = 0; m < drift_mm.size(); ++m)
+    now_mm_.segment<3>(3 * static_cast<Eigen::Index>(m)) += drift_mm[m];
+  evidence_.Residuals(now_mm_, residuals_);
+}
+
 void SkinStage::Run(const LabelledMarkers& markers, const std::optional<MeasuredLoads>& pressure,
                     std::span<const Vec3> drift_mm, StateEstimator& estimator, ContactFinder& finder,
                     LinkState& state, MeasuredLoads& told) {
@@ -131,6 +141,7 @@ void SkinStage::Run(const LabelledMarkers& markers, const std::optional<Measured
       estimator.skin().Continue();
   }
   CompareWithRest(markers, drift_mm, estimator.estimate());
+  FindResiduals(drift_mm, estimator.estimate());
   estimator.FindContacts(finder, shape, state.forces, state.contacts);
   shape.rejected.clear();
   for (size_t m = 0; m < count; ++m) {

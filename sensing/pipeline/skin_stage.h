@@ -32,6 +32,9 @@ class SkinStage {
   /// Likewise, where there was an answer: the camera that alone shows the skin elsewhere than pressure moves
   /// it.
   const std::optional<CameraId>& sees_alone() const { return sees_alone_; }
+  /// Likewise, of the markers in both images from the estimated equilibrium, as cameras that have not moved
+  /// see it. Empty: there was no answer.
+  const ImageResiduals& residuals() const { return residuals_; }
   const MeasuredLoads& baseline_loads() const { return baseline_loads_; }
 
   /// `drift_mm`: how far the untouched skin has gone since the baseline, by marker; empty: not. `pressure`:
@@ -44,6 +47,7 @@ class SkinStage {
  private:
   void CompareWithRest(const LabelledMarkers& markers, std::span<const Vec3> drift_mm,
                        const SkinEstimate& estimate);
+  void FindResiduals(std::span<const Vec3> drift_mm, const SkinEstimate& estimate);
   void Measure(const Eigen::VectorXd& about_mm, std::span<const Vec3> drift_mm, SkinShape& shape);
 
   const LinkModel model_;
@@ -52,6 +56,7 @@ class SkinStage {
   RestComparison rest_;
   std::optional<CameraId> sees_alone_;
   RestComparison::Expected expected_mm_;
+  ImageResiduals residuals_;
   const CalibrationDoubt doubt_;
   MeasuredLoads baseline_loads_;
   Eigen::VectorXd baseline_mm_, about_mm_, now_mm_;
