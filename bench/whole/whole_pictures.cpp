@@ -240,7 +240,7 @@ int WholePictures::QualityOf(int frame) const {
 }
 
 void WholePictures::Tear(int frame, CameraId id) {
-  cv::Mat& gray = gray_[Index(id)];
+  const cv::Mat& gray = gray_[Index(id)];
   const cv::Mat upper = gray.rowRange(0, gray.rows / 2).clone();
   Draw(renderer_, frame, then_, id);
   upper.copyTo(gray.rowRange(0, gray.rows / 2));

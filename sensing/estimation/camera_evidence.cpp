@@ -247,7 +247,7 @@ void CameraEvidence::Residuals(const Eigen::VectorXd& u, ImageResiduals& residua
   for (size_t i = 0; i < observations_.size(); ++i) {
     const Observation& o = observations_[i];
     const size_t m = i / kCameraCount, c = i % kCameraCount;
-    if (!o.seen) continue;
+    if (!o.seen || o.residual_of == ResidualOf::kRing) continue;
     const Vec3 moved_mm = u.segment<3>(3 * static_cast<Eigen::Index>(m));
     if (const auto pixel = projectors_[c].Project(rest_mm_[m] + moved_mm + o.seen_offset))
       residuals[c][m] = o.pixel - *pixel;

@@ -69,8 +69,8 @@ class CameraEvidence {
   /// with it. `covariances`: of the model's error, by marker. True: something changed; measure again.
   bool Reconsider(const Eigen::VectorXd& u, std::span<const Mat3> covariances);
 
-  /// Of the frame that was observed last, of all seen markers, those left out included, from displacements
-  /// `u`. Fixed residuals are subtracted.
+  /// Of the frame that was observed last, from displacements `u`, of all seen markers whose fixed residual is
+  /// known, and subtracted; those left out are included.
   void Residuals(const Eigen::VectorXd& u, ImageResiduals& residuals) const;
   /// Of the frame that was observed last, once it was measured.
   CameraAgreement Agreement() const;

@@ -70,6 +70,10 @@ void CameraDiagnosis::Observe(const LinkState& state, const Frame& frame) {
     return TraitsOf(reason.id).may_come_of_cameras && !(reason_ && reason.text == reason_->text);
   };
   suspect_frames_ = std::ranges::any_of(state.reasons, may_come) ? suspect_frames_ + 1 : 0;
+  if (frame.obstruction) {  // which explains the reasons
+    reason_.reset();
+    suspect_frames_ = 0;
+  }
   // A reason stands until a later look does not find it.
   if (suspect_frames_ < kLeastFrames && !reason_) return;
   const int64_t now_ns = state.times.exposure_monotonic_ns;

@@ -14,6 +14,7 @@
 #include "sensing/estimation/skin_estimator.h"
 #include "sensing/markers/detect/detector.h"
 #include "sensing/pipeline/camera_drift.h"
+#include "sensing/pipeline/view_obstruction.h"
 
 namespace taclink {
 
@@ -34,6 +35,7 @@ class CameraDiagnosis {
     std::span<const Vec3> skin_mm;                    ///< the untouched skin's markers, link frame
     const SkinEstimate& estimate;
     const ImageResiduals& residuals;  ///< SkinStage::residuals
+    const std::optional<ViewObstruction>& obstruction;
   };
   /// After a frame was judged.
   void Observe(const LinkState& state, const Frame& frame);

@@ -245,6 +245,7 @@ void Judge(const Evidence& evidence, LinkState& state) {
   if (!lost && evidence.drift) state.reasons.push_back(*evidence.drift);
   if (!lost) AddContrastReason(state);
   if (!lost && state.forces.converged) {
+    AddObstructionReason(evidence, state);
     AddShapeReasons(evidence, state);
     AddSightReasons(evidence, state);
   }

@@ -9,6 +9,7 @@
 #include "sensing/pipeline/attitude_check.h"
 #include "sensing/pipeline/camera_motion.h"
 #include "sensing/pipeline/state_estimator.h"
+#include "sensing/pipeline/view_obstruction.h"
 
 namespace taclink {
 
@@ -35,6 +36,7 @@ struct Evidence {
   std::optional<Reason> diagnosis = {};               ///< of the cameras; see CameraDiagnosis
   std::optional<MotionDisagreement> motion;           ///< see CameraMotion
   std::optional<CameraId> sees_alone;                 ///< see RestComparison
+  std::optional<ViewObstruction> obstruction = {};    ///< see FindViewObstruction
   std::optional<AttitudeDisagreement> attitude = {};  ///< none: measured attitude and skin agree
   double attitude_error_mm = 0;      ///< of a marker, by what is not known of the specific force
   std::optional<Reason> drift;       ///< none: the baseline has not drifted far

@@ -455,6 +455,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
     s.keeper.Apply(WithEstimate(loads, state), estimate, state.shape);
   state.total_force_n.setZero();
   for (const Contact& contact : state.contacts) state.total_force_n += contact.force_n;
+  const auto obstruction = FindViewObstruction(s.model, s.skin->residuals());
   Judge({.model = s.model,
          .camera_trouble = s.camera_pictures.trouble(),
          .camera_warning = s.camera_pictures.warning(),
@@ -462,6 +463,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
          .diagnosis = s.diagnosis.reason(),
          .motion = s.motion->disagreement(),
          .sees_alone = s.skin->sees_alone(),
+         .obstruction = obstruction,
          .attitude = s.attitude.disagreement(),
          .attitude_error_mm = s.estimator->AttitudeErrorMm(),
          .drift = s.keeper.DriftReason(),
@@ -474,7 +476,8 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   s.diagnosis.Observe(state, {.images = s.pictures,
                               .skin_mm = s.UntouchedMarkers(),
                               .estimate = estimate,
-                              .residuals = s.skin->residuals()});
+                              .residuals = s.skin->residuals(),
+                              .obstruction = obstruction});
   // A tare ends where nothing is measured; where there is a shape without forces it waits for a while.
   if (estimate.failure == EstimateFailure::kNone || !state.measured())
     s.keeper.Learn(frame.times, state, s.labels, *s.skin, *s.estimator, s.clock);

@@ -140,6 +140,20 @@ double DentAt(const Evidence& evidence, int marker) {
   return -rest.head<2>().dot(moved.head<2>()) / rest.head<2>().norm();
 }
 
+void AddObstructionReason(const Evidence& evidence, LinkState& state) {
+  const auto& obstruction = evidence.obstruction;
+  if (!obstruction) return;
+  state.reasons.push_back(
+      {ReasonId::kLabels,
+       ReasonText("the %s camera alone shows %d markers displaced, at path %d, ring %d by %.1f px: a hair, a "
+                  "drop or dirt covers that part of its view, and what presses there may be wrong; clean its "
+                  "lens and the wall there",
+                  Name(obstruction->camera), obstruction->markers,
+                  evidence.model.PathOf(obstruction->marker) + 1,
+                  evidence.model.RingOf(obstruction->marker) + 1, obstruction->most_px),
+       static_cast<double>(obstruction->markers)});
+}
+
 void AddSightReasons(const Evidence& evidence, LinkState& state) {
   if (std::any_of(state.contacts.begin(), state.contacts.end(), [&](const Contact& contact) {
         return IsBeyondMarkers(evidence.model, state.shape, contact);
@@ -152,7 +166,7 @@ void AddSightReasons(const Evidence& evidence, LinkState& state) {
   const int left_out = MostLeftOut(evidence.model, state.shape);
   const auto left_out_in_all = static_cast<double>(state.shape.rejected.size());
   const double most_left_out = kLeftOutShare * kCameraCount * evidence.model.markers.count();
-  if (left_out >= kLeftOutTogether || left_out_in_all > most_left_out)
+  if (!evidence.obstruction && (left_out >= kLeftOutTogether || left_out_in_all > most_left_out))
     state.reasons.push_back(
         {ReasonId::kLabels,
          "neighboring or many markers were left out because they contradict the others; clean the "

@@ -478,6 +478,46 @@ TEST_F(LinkPipelineTest, AKnockThatMovesBothCamerasIsNamed) {
                                HasSubstr("bottom camera's image is shifted by 2.0")));
 }
 
+// The cameras agree, and what they show may be inflation.
+TEST_F(LinkPipelineTest, ImagesThatGrowAreNamed) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  for (const double scale : {1.001, 1.008}) {
+    for (int k = 0; k < 3; ++k) {
+      StereoFrame frame = Frame(0.1 + k / 30.0);
+      for (const CameraId id : kBothCameras) {
+        renderer_.Render(truth_, id, gray_);
+        const cv::Mat grown = cv::getRotationMatrix2D(
+            {static_cast<float>(gray_.cols - 1) / 2, static_cast<float>(gray_.rows - 1) / 2}, 0, scale);
+        cv::warpAffine(gray_, gray_, grown, gray_.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+        PackYuyv(gray_, renderer_.chroma(id), frame.images[Index(id)]);
+      }
+      pipeline.Process(frame, state_);
+    }
+    if (scale < 1.003)
+      EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+    else
+      EXPECT_THAT(state_.status_reason, ::testing::ContainsRegex("image is 0\\.[78] % larger"));
+  }
+}
+
+// A drop on the lens.
+TEST_F(LinkPipelineTest, AnObstructedViewIsNamedAndTheRestIsMeasured) {
+  LinkPipeline pipeline(model_, options_);
+  TakeRest(pipeline);
+  StereoFrame frame = Frame(kTouchedS);
+  renderer_.Render(truth_, CameraId::kTop, gray_);
+  const cv::Rect part(400, 190, 100, 100);
+  cv::Mat magnified;
+  cv::resize(gray_(part), magnified, {}, 1.04, 1.04, cv::INTER_CUBIC);
+  magnified(cv::Rect(2, 2, part.width, part.height)).copyTo(gray_(part));
+  PackYuyv(gray_, renderer_.chroma(CameraId::kTop), frame.images[0]);
+  pipeline.Process(frame, state_);
+  EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+  EXPECT_THAT(state_.status_reason, HasSubstr("the top camera alone shows"));
+  EXPECT_NEAR(state_.total_force_n.norm(), 0.2, 0.04);
+}
+
 // Nor where they are calibrated from the same images; the link begins once the skin is released.
 TEST_F(LinkPipelineTest, TouchedSkinCalibratesNoCameras) {
   LinkPipeline pipeline(model_, options_);
