@@ -32,8 +32,13 @@ void SceneMaker::Pressures() {
     whole.fault.is_pressure_reported = false;
     whole.named_by = {kPressureUnknown};
   }
-  Touched("E configured 10 % too high, 0.5 kPa", kUsualKpa).fault.modulus_factor = 1.1;
-  Touched("E configured 10 % too low, 1 kPa", 1).fault.modulus_factor = 0.9;
+  for (const double factor : {1.1, 0.9}) {
+    WholeScene& stiff =
+        Touched(factor > 1 ? "E configured 10 % too high, 0.5 kPa" : "E configured 10 % too low, 1 kPa",
+                factor > 1 ? kUsualKpa : 1);
+    stiff.fault.modulus_factor = factor;
+    stiff.named_by = {kPressureMismatch};
+  }
 }
 
 // From the beginning, which calibration may take up, and within the run.

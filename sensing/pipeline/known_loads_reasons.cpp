@@ -10,6 +10,11 @@ namespace taclink {
 namespace {
 
 constexpr double kPressureDeviations = 3;
+// Of a change of pressure that the skin's shape shows: the model's error, which was 3 % at most in the whole
+// benchmark; and how far a sensor's offset changes, a share of its standard deviation.
+constexpr double kModelShare = 0.02, kSensorShare = 0.1;
+constexpr double kLeastChange = 2;  // of the pressure, in its standard deviations; else it tells no modulus
+constexpr double kStiffest = -0.9;  // widened less: it is not the modulus
 // Where the specific force leaves markers uncertain by more, contacts of 0.02 N may be missed.
 constexpr double kMostAttitudeErrorMm = 0.2;
 
@@ -45,6 +50,34 @@ void AddPressureReasons(const Evidence& evidence, LinkState& state) {
              "baseline's pressure",
              1e3 * now_mpa, 1e3 * measured.pressure_mpa),
          off_mpa, most_off_mpa});
+}
+
+// Pressure and modulus widen the skin only by their ratio. The offset of a sensor does not matter, since
+// changes from the baseline are compared.
+void AddStiffnessReason(const Evidence& evidence, LinkState& state) {
+  if (!state.pressure_estimate || !evidence.is_pressure_measured) return;
+  const MeasuredLoads &measured = evidence.measured, &baseline = evidence.baseline;
+  const double sensor_mpa = std::max(measured.pressure_sigma_mpa, baseline.pressure_sigma_mpa);
+  const double change_mpa = measured.pressure_mpa - baseline.pressure_mpa;
+  if (!(std::abs(change_mpa) > kLeastChange * sensor_mpa)) return;
+  const double off_mpa =
+      state.pressure_estimate->mpa - measured.pressure_mpa - evidence.estimate.loads.baseline_error[0];
+  const double sigma_mpa =
+      std::hypot(state.pressure_estimate->sigma_mpa, kModelShare * change_mpa, kSensorShare * sensor_mpa);
+  if (std::abs(off_mpa) <= kPressureDeviations * sigma_mpa) return;
+  const double share = off_mpa / change_mpa, sigma = sigma_mpa / std::abs(change_mpa);
+  if (!(share > kStiffest)) return;
+  const double modulus_mpa = evidence.model.material.youngs_modulus_mpa, factor = 1 / (1 + share);
+  state.reasons.push_back(
+      {ReasonId::kPressureMismatch,
+       ReasonText(
+           "since the baseline the skin has widened by %.0f %% %s than %.3f kPa more make it with the "
+           "model's Young's modulus of %.4f MPa: that may be %.4f +- %.4f MPa, and forces are off by as "
+           "much, or the sensor's scale is wrong; check the sensor, or determine the modulus (taclink "
+           "calibrate material)",
+           100 * std::abs(share), share > 0 ? "more" : "less", 1e3 * change_mpa, modulus_mpa,
+           modulus_mpa * factor, modulus_mpa * factor * factor * sigma),
+       std::abs(share), kPressureDeviations * sigma});
 }
 
 void AddAttitudeReasons(const Evidence& evidence, LinkState& state) {
@@ -86,6 +119,9 @@ void AddAttitudeReasons(const Evidence& evidence, LinkState& state) {
 
 void AddKnownLoadsReasons(const Evidence& evidence, LinkState& state) {
   AddPressureReasons(evidence, state);
+  const bool is_pressure_doubted =
+      std::ranges::find(state.reasons, ReasonId::kPressureMismatch, &Reason::id) != state.reasons.end();
+  if (state.forces.converged && !is_pressure_doubted) AddStiffnessReason(evidence, state);
   if (state.forces.converged) AddAttitudeReasons(evidence, state);
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 
 #include "sensing/model/model_file.h"
 
@@ -213,7 +214,7 @@ TEST_F(JudgeTest, SkinOutOfSightIsTold) {
 }
 
 TEST_F(JudgeTest, APressureThatDoesNotFitIsTold) {
-  state_.pressure_estimate = {.mpa = 1.14e-3, .sigma_mpa = 1e-6};
+  state_.pressure_estimate = {.mpa = 1.14e-3, .sigma_mpa = 5e-5};
   EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   state_.pressure_estimate->mpa = 1.16e-3;
   EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureMismatch));
@@ -221,7 +222,7 @@ TEST_F(JudgeTest, APressureThatDoesNotFitIsTold) {
 }
 
 TEST_F(JudgeTest, ABaselinesPressureThatDoesNotFitIsTold) {
-  state_.pressure_estimate = {.mpa = 1e-3, .sigma_mpa = 1e-6};
+  state_.pressure_estimate = {.mpa = 1e-3, .sigma_mpa = 5e-5};
   estimate_.loads.baseline_error[0] = -1.4e-4;
   EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   estimate_.loads.baseline_error[0] = -1.6e-4;
@@ -229,6 +230,29 @@ TEST_F(JudgeTest, ABaselinesPressureThatDoesNotFitIsTold) {
   EXPECT_THAT(
       state_.status_reason,
       ::testing::HasSubstr("0.340 kPa when the baseline was taken; measured were 1.000 and 0.500 kPa"));
+}
+
+TEST_F(JudgeTest, AModulusThatDoesNotFitIsTold) {
+  baseline_.pressure_mpa = 0;
+  measured_.pressure_mpa = 3e-4;
+  state_.pressure_estimate = {.mpa = 3.2e-4, .sigma_mpa = 3e-6};
+  state_.forces.converged = true;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  state_.pressure_estimate->mpa = 3.3e-4;
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureMismatch));
+  char text[800];
+  std::snprintf(text, sizeof text,
+                "10 %% more than 0.300 kPa more make it with the model's Young's modulus of "
+                "%.4f MPa: that may be %.4f",
+                model_.material.youngs_modulus_mpa, model_.material.youngs_modulus_mpa / 1.1);
+  EXPECT_THAT(state_.status_reason, ::testing::HasSubstr(text));
+  // The sensor's offset is in both.
+  estimate_.loads.baseline_error[0] = 3e-5;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
+  // Of a change that is hardly measured nothing follows.
+  measured_.pressure_mpa = 9e-5;
+  state_.pressure_estimate->mpa = 1.2e-4;
+  EXPECT_THAT(Reasons(), ::testing::IsEmpty());
 }
 
 TEST_F(JudgeTest, AnAttitudeThatDoesNotFitIsTold) {

@@ -98,6 +98,31 @@ TEST_F(LinkPipelineTest, AStalePressureIsStated) {
   EXPECT_NEAR(state_.contacts[0].normal_force_n, fresh_n, 0.3 * fresh_n);
 }
 
+TEST_F(LinkPipelineTest, AWrongModulusIsNamedWhenInflated) {
+  Scene scene = LoadScene("inflate").value();
+  scene.pressure = {{.time_s = 0, .kpa = 0}, {.time_s = 1, .kpa = 0}, {.time_s = 2, .kpa = 0.3}};
+  scene.contacts.clear();
+  skin_ = SimulatedSkin::Make(model_, scene).value();
+  for (const double factor : {0.9, 1.0, 1.1}) {
+    LinkModel configured = model_;
+    configured.material.youngs_modulus_mpa *= factor;
+    LinkPipeline pipeline(configured, options_);
+    const auto process = [&](double time_s) {
+      StereoFrame frame = Frame(time_s);
+      frame.pressure.origin = PressureOrigin::kSerial;
+      frame.pressure_mpa = truth_.pressure_mpa;
+      pipeline.Process(frame, state_);
+    };
+    for (int k = 0; k < options_.rest_frames; ++k) process(k / 30.0);
+    process(2.5);
+    if (factor == 1)
+      EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+    else
+      EXPECT_THAT(state_.status_reason,
+                  HasSubstr(factor > 1 ? "% more than 0.300 kPa" : "% less than 0.300 kPa"));
+  }
+}
+
 // The baseline's pressure is that of its pictures: pictures of a skin that is being inflated are no baseline,
 // and what slowly changes meanwhile is the mean.
 TEST_F(LinkPipelineTest, ABaselineIsOfOnePressure) {
