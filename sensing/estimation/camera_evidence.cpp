@@ -249,8 +249,10 @@ void CameraEvidence::Residuals(const Eigen::VectorXd& u, ImageResiduals& residua
     const size_t m = i / kCameraCount, c = i % kCameraCount;
     if (!o.seen || o.residual_of == ResidualOf::kRing) continue;
     const Vec3 moved_mm = u.segment<3>(3 * static_cast<Eigen::Index>(m));
-    if (const auto pixel = projectors_[c].Project(rest_mm_[m] + moved_mm + o.seen_offset))
-      residuals[c][m] = o.pixel - *pixel;
+    const auto pixel = projectors_[c].Project(rest_mm_[m] + moved_mm + o.seen_offset);
+    if (!pixel) continue;
+    const Vec2 error = o.pixel - *pixel;
+    residuals[c][m] = {.px = error, .sigmas = std::sqrt(error.dot(o.weight * error))};
   }
 }
 

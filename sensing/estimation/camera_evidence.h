@@ -39,8 +39,13 @@ struct CameraAgreement {
   int apart = 0;  ///< of these, whose two lines of sight do not meet
 };
 
-/// By camera and marker: where it is seen less where it is expected, px. nullopt: it is not seen.
-using ImageResiduals = std::array<std::vector<std::optional<Vec2>>, kCameraCount>;
+/// Where a marker is seen less where it is expected.
+struct ImageResidual {
+  Vec2 px = Vec2::Zero();
+  double sigmas = 0;  ///< by the observation's covariance (Mahalanobis distance)
+};
+/// By camera and marker. nullopt: it is not seen.
+using ImageResiduals = std::array<std::vector<std::optional<ImageResidual>>, kCameraCount>;
 
 /// Both cameras' labeled markers as displacements. Where both cameras see a marker its place is the
 /// least-squares point of both images [hartley1997], whatever a model expects; where one does, along its ray

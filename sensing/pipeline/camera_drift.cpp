@@ -92,7 +92,7 @@ std::optional<std::array<CameraDrift::Growth, kCameraCount>> CameraDrift::Measur
     const auto& camera = residuals[Index(rows_[i].camera)];
     const auto marker = static_cast<size_t>(rows_[i].marker);
     if (marker >= camera.size() || !camera[marker]) continue;
-    y_.segment<2>(2 * static_cast<Eigen::Index>(i)) = *camera[marker] / kSigmaPx;
+    y_.segment<2>(2 * static_cast<Eigen::Index>(i)) = camera[marker]->px / kSigmaPx;
     ++seen;
   }
   if (rows_.empty()) return std::nullopt;

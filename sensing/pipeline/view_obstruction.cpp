@@ -8,17 +8,19 @@ namespace {
 // Of links without faults in the whole benchmark, all but 0.1 % of the frames have three such markers at most
 // of 240; those with a hair, or a drop of 80 px in diameter, four to twelve.
 constexpr double kDisplacedPx = 0.5, kDisplacedMeans = 3, kDisplacedShare = 0.014;
-constexpr double kMostInMeanPx = 0.5;  // outliers do not widen what is usual
-constexpr double kOtherCamera = 0.5;   // of the limit: the other camera sees it where it is expected
+constexpr double kDisplacedSigmas = 4;  // of the observation
+constexpr double kMostInMeanPx = 0.5;   // outliers do not widen what is usual
+constexpr double kOtherCamera = 0.5;    // of the limit: the other camera sees it where it is expected
 
 // Of a ring's markers in one image. Those of the far ring are small, and scatter more.
-double MeanResidualPx(const LinkModel& model, const std::vector<std::optional<Vec2>>& residuals, int ring) {
+double MeanResidualPx(const LinkModel& model, const std::vector<std::optional<ImageResidual>>& residuals,
+                      int ring) {
   double sum_px = 0;
   int seen = 0;
   for (int path = 0; path < model.markers.paths; ++path) {
     const auto& residual = residuals[static_cast<size_t>(model.MarkerIndex(path, ring))];
     if (!residual) continue;
-    sum_px += std::min(residual->norm(), kMostInMeanPx);
+    sum_px += std::min(residual->px.norm(), kMostInMeanPx);
     ++seen;
   }
   return sum_px / std::max(1, seen);
@@ -39,9 +41,9 @@ std::optional<ViewObstruction> FindViewObstruction(const LinkModel& model, const
       if (model.PathOf(marker) == 0)
         limit_px =
             std::max(kDisplacedPx, kDisplacedMeans * MeanResidualPx(model, here, model.RingOf(marker)));
-      if (!here[m] || !there[m] || there[m]->norm() > kOtherCamera * limit_px) continue;
-      const double px = here[m]->norm();
-      if (px <= limit_px) continue;
+      if (!here[m] || !there[m] || there[m]->px.norm() > kOtherCamera * limit_px) continue;
+      const double px = here[m]->px.norm();
+      if (px <= limit_px || here[m]->sigmas <= kDisplacedSigmas) continue;
       ++found.markers;
       if (px <= found.most_px) continue;
       found.most_px = px;

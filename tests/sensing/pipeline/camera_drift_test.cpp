@@ -73,7 +73,7 @@ class CameraDriftTest : public ::testing::TestWithParam<std::string> {
       residuals[c].resize(now.cameras[c].size());
       for (size_t m = 0; m < now.cameras[c].size(); ++m) {
         if (now.cameras[c][m].seen && rest_.cameras[c][m].seen)
-          residuals[c][m] = now.cameras[c][m].center_px - rest_.cameras[c][m].center_px;
+          residuals[c][m] = {.px = now.cameras[c][m].center_px - rest_.cameras[c][m].center_px};
       }
     }
     return residuals;

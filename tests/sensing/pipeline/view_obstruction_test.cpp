@@ -9,12 +9,14 @@ namespace {
 
 class ViewObstructionTest : public ::testing::Test {
  protected:
+  static ImageResidual Residual(const Vec2& px) { return {.px = px, .sigmas = px.norm() / 0.05}; }
   ViewObstructionTest() {
-    for (auto& camera : residuals_) camera.assign(static_cast<size_t>(model_.markers.count()), Vec2(0.1, 0));
+    for (auto& camera : residuals_)
+      camera.assign(static_cast<size_t>(model_.markers.count()), Residual({0.1, 0}));
   }
   void Displace(CameraId id, int ring, int paths, const Vec2& by_px) {
     for (int path = 3; path < 3 + paths; ++path)
-      residuals_[Index(id)][static_cast<size_t>(model_.MarkerIndex(path, ring))] = by_px;
+      residuals_[Index(id)][static_cast<size_t>(model_.MarkerIndex(path, ring))] = Residual(by_px);
   }
 
   const LinkModel model_ = LoadLinkModel("cylinder").value();
@@ -37,13 +39,20 @@ TEST_F(ViewObstructionTest, AFewMarkersAreNone) {
   EXPECT_FALSE(FindViewObstruction(model_, residuals_));
 }
 
+// A marker at the edge of what a camera can see scatters by pixels.
+TEST_F(ViewObstructionTest, MarkersThatScatterByTheirOwnNoiseAreNone) {
+  Displace(CameraId::kTop, 5, 8, {3, 0});
+  for (auto& residual : residuals_[0]) residual->sigmas = residual->px.norm();
+  EXPECT_FALSE(FindViewObstruction(model_, residuals_));
+}
+
 TEST_F(ViewObstructionTest, WhatBothCamerasShowIsNone) {
   for (const CameraId id : kBothCameras) Displace(id, 5, 8, {1, 0});
   EXPECT_FALSE(FindViewObstruction(model_, residuals_));
 }
 
 TEST_F(ViewObstructionTest, ACameraThatHasMovedIsNone) {
-  for (auto& residual : residuals_[0]) residual = Vec2(1.2, 0.3);
+  for (auto& residual : residuals_[0]) residual = Residual({1.2, 0.3});
   EXPECT_FALSE(FindViewObstruction(model_, residuals_));
 }
 
