@@ -54,7 +54,7 @@ v1::LinkStatus ToWire(LinkStatus status) {
 static_assert(static_cast<int>(ReasonId::kFewMarkers) + 1 == v1::REASON_FEW_MARKERS &&
               static_cast<int>(ReasonId::kPressureMismatch) + 1 == v1::REASON_PRESSURE_MISMATCH &&
               static_cast<int>(ReasonId::kForcedBaseline) + 1 == v1::REASON_FORCED_BASELINE &&
-              kReasonCount == v1::REASON_TEMPORAL_SMOOTHING);
+              kReasonCount == v1::REASON_STIFFNESS_MISMATCH);
 v1::Reason ToWire(ReasonId reason) {
   return static_cast<v1::Reason>(static_cast<int>(reason) + 1);
 }

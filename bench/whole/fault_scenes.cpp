@@ -37,7 +37,7 @@ void SceneMaker::Pressures() {
         Touched(factor > 1 ? "E configured 10 % too high, 0.5 kPa" : "E configured 10 % too low, 1 kPa",
                 factor > 1 ? kUsualKpa : 1);
     stiff.fault.modulus_factor = factor;
-    stiff.named_by = {kPressureMismatch};
+    stiff.named_by = {kStiffnessMismatch};
   }
 }
 

@@ -46,6 +46,7 @@ constexpr ReasonTraits kReasonTraits[] = {
     {.name = "image_contrast", .doubts_contacts = false},
     {.name = "late_frame", .unit = ReasonUnit::kSeconds},
     {.name = "temporal_smoothing"},
+    {.name = "stiffness_mismatch", .doubts_contacts = false},
 };
 static_assert(std::size(kReasonTraits) == kReasonCount);
 

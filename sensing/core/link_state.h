@@ -42,7 +42,7 @@ enum class ReasonId : uint8_t {
   kSparseMarkers,      ///< a load on this skin may hide between the markers that are in sight
   kUnsettled,          ///< where no camera sees the skin its shape did not settle
   kForceModel,         ///< the force model that was asked for does not hold here
-  kCamerasMoved,       ///< what they make of markers is taken off, but calibrate
+  kCamerasMoved,       ///< or an image has grown: calibrate; what motion alone explains is taken off
   kDrift,              ///< the baseline has drifted
   kNoFrames,           ///< none come from the source, or from the log that is replayed
   kWorker,             ///< what reads or computes the frames is late, has failed or is being started again
@@ -54,8 +54,9 @@ enum class ReasonId : uint8_t {
   kImageContrast,      ///< markers stand out less in a camera's images than when the rest shape was taken
   kLateFrame,          ///< too much time passed from the exposure to the publication
   kTemporalSmoothing,  ///< a camera blends each image with those before it
+  kStiffnessMismatch,  ///< the skin widens under pressure as with another Young's modulus
 };
-inline constexpr int kReasonCount = static_cast<int>(ReasonId::kTemporalSmoothing) + 1;
+inline constexpr int kReasonCount = static_cast<int>(ReasonId::kStiffnessMismatch) + 1;
 
 /// What a reason's number is in. kNone: a number of markers, or a ratio.
 enum class ReasonUnit : uint8_t { kNone, kMillimeters, kMegapascals, kSeconds, kHertz };

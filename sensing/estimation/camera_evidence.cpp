@@ -9,6 +9,10 @@ namespace taclink {
 namespace {
 
 constexpr double kSameOffsetMm = 0.01;
+// An obstruction displaces the markers behind it. Where it does so along the epipolar line, both rays still
+// meet, at a wrong point. A pair is suspect if at least this many of its eight neighbors (five at the end
+// rings) have rays that miss.
+constexpr int kLeastSuspectNeighbors = 3;
 constexpr double kTriangulatedMm = 0.005, kLongestTriangulationMm = 20;  // of a triangulation
 
 bool IsUsable(const MarkerObservation& o) {
@@ -27,7 +31,7 @@ CameraEvidence::CameraEvidence(const LinkModel& model, const StereoRig& rig,
       rest_mm_(model.RestMarkers()),
       looks_(model, {projectors_[0].center_in_link(), projectors_[1].center_in_link()}),
       observations_(rest_mm_.size() * kCameraCount),
-      is_suspect_(rest_mm_.size()) {
+      suspicion_(rest_mm_.size()) {
   for (size_t i = 0; i < observations_.size(); ++i) {
     Observation& o = observations_[i];
     const auto marker = static_cast<int>(i / kCameraCount);
@@ -165,7 +169,7 @@ void CameraEvidence::FillRing(int ring, size_t camera, double any_change_px2) {
 }
 
 void CameraEvidence::Observe(const LabelledMarkers& markers) {
-  std::fill(is_suspect_.begin(), is_suspect_.end(), 0);
+  std::fill(suspicion_.begin(), suspicion_.end(), Suspicion::kNone);
   const Mat2 camera = options_.camera_sigma_px * options_.camera_sigma_px * Mat2::Identity();
   static const MarkerObservation kUnseen;
   for (size_t i = 0; i < observations_.size(); ++i) {
@@ -223,8 +227,7 @@ void CameraEvidence::Measure(const Eigen::VectorXd& u, MarkerObservations& obser
         observed.information[m] = information;
         continue;
       }
-      // One of both is wrong; which one, the estimate without them tells.
-      is_suspect_[m] = 1;
+      suspicion_[m] = Suspicion::kRaysApart;
       pair[0].dropped = pair[1].dropped = true;
       continue;
     }
@@ -239,6 +242,31 @@ void CameraEvidence::Measure(const Eigen::VectorXd& u, MarkerObservations& obser
       observed.displacement_mm[m] = place + Mat3(information + weak).ldlt().solve(pull);
       observed.information[m] = information;
     }
+  }
+  DropAmongSuspects(observed);
+}
+
+bool CameraEvidence::IsAmongSuspects(int marker) const {
+  const int ring = marker / paths_, path = marker % paths_;
+  int suspects = 0;
+  for (int r = std::max(0, ring - 1); r <= std::min(rings_ - 1, ring + 1); ++r) {
+    for (const int by : {-1, 0, 1}) {
+      const auto neighbor = static_cast<size_t>(r * paths_ + (path + by + paths_) % paths_);
+      suspects += suspicion_[neighbor] == Suspicion::kRaysApart ? 1 : 0;
+    }
+  }
+  return suspects >= kLeastSuspectNeighbors;
+}
+
+void CameraEvidence::DropAmongSuspects(MarkerObservations& observed) {
+  for (size_t m = 0; m < suspicion_.size(); ++m) {
+    Observation* pair = &observations_[m * kCameraCount];
+    if (suspicion_[m] != Suspicion::kNone || !pair[0].in_use() || !pair[1].in_use()) continue;
+    if (!IsAmongSuspects(static_cast<int>(m))) continue;
+    suspicion_[m] = Suspicion::kAmongSuspects;
+    pair[0].dropped = pair[1].dropped = true;
+    observed.displacement_mm[m].setZero();
+    observed.information[m].setZero();
   }
 }
 
@@ -258,10 +286,10 @@ void CameraEvidence::Residuals(const Eigen::VectorXd& u, ImageResiduals& residua
 
 CameraAgreement CameraEvidence::Agreement() const {
   CameraAgreement agreement;
-  for (size_t m = 0; m < is_suspect_.size(); ++m) {
+  for (size_t m = 0; m < suspicion_.size(); ++m) {
     const Observation* pair = &observations_[m * kCameraCount];
     agreement.pairs += pair[0].seen && pair[1].seen ? 1 : 0;
-    agreement.apart += is_suspect_[m] != 0 ? 1 : 0;
+    agreement.apart += suspicion_[m] == Suspicion::kRaysApart ? 1 : 0;
   }
   return agreement;
 }
@@ -280,11 +308,11 @@ bool CameraEvidence::Reconsider(const Eigen::VectorXd& u, std::span<const Mat3> 
   for (size_t i = 0; i < observations_.size(); ++i) {
     Observation& o = observations_[i];
     const size_t m = i / kCameraCount;
-    if (!o.seen || !o.linear || (o.dropped && !is_suspect_[m])) continue;
+    if (!o.seen || !o.linear || (o.dropped && suspicion_[m] == Suspicion::kNone)) continue;
     const bool fits = Misfit(i, u.segment<3>(3 * static_cast<Eigen::Index>(m)), covariances[m]) < limit;
     if (fits == !o.dropped) continue;
-    // Of a suspect pair one may come back.
-    if (fits && !observations_[i ^ 1].dropped) continue;
+    // Of a pair whose rays do not meet one may come back.
+    if (fits && suspicion_[m] == Suspicion::kRaysApart && !observations_[i ^ 1].dropped) continue;
     o.dropped = !fits;
     changed = true;
   }

@@ -39,7 +39,7 @@ struct CameraAgreement {
   int apart = 0;  ///< of these, whose two lines of sight do not meet
 };
 
-/// Where a marker is seen less where it is expected.
+/// Observed minus predicted image position of a marker.
 struct ImageResidual {
   Vec2 px = Vec2::Zero();
   double sigmas = 0;  ///< by the observation's covariance (Mahalanobis distance)
@@ -74,8 +74,8 @@ class CameraEvidence {
   /// with it. `covariances`: of the model's error, by marker. True: something changed; measure again.
   bool Reconsider(const Eigen::VectorXd& u, std::span<const Mat3> covariances);
 
-  /// Of the frame that was observed last, from displacements `u`, of all seen markers whose fixed residual is
-  /// known, and subtracted; those left out are included.
+  /// Residuals of the last observed frame against displacements `u`, rejected markers included. Fixed
+  /// residuals are subtracted; markers without a known one are left out.
   void Residuals(const Eigen::VectorXd& u, ImageResiduals& residuals) const;
   /// Of the frame that was observed last, once it was measured.
   CameraAgreement Agreement() const;
@@ -115,6 +115,8 @@ class CameraEvidence {
   void FillUnknownResiduals();
   void FillRing(int ring, size_t camera, double any_change_px2);
   double Triangulate(int marker, Vec3& place, Mat3& information);  // weighted least squares [hartley1997]
+  bool IsAmongSuspects(int marker) const;
+  void DropAmongSuspects(MarkerObservations& observed);
   double Misfit(size_t observation, const Vec3& u, const Mat3& covariance);
 
   const CameraEvidenceOptions options_;
@@ -123,7 +125,10 @@ class CameraEvidence {
   std::vector<Vec3> rest_mm_;  // link frame
   DomeLooks looks_;
   std::vector<Observation> observations_;
-  std::vector<char> is_suspect_;  // by marker: its two rays do not meet
+  // Suspect pairs are dropped until an estimate without them confirms one (kRaysApart) or both
+  // (kAmongSuspects).
+  enum class Suspicion : uint8_t { kNone, kRaysApart, kAmongSuspects };
+  std::vector<Suspicion> suspicion_;  // by marker
 };
 
 }  // namespace taclink

@@ -11,11 +11,18 @@ namespace {
 
 constexpr int64_t kPauseNs = 500'000'000;
 constexpr int kLeastFrames = 3;  // a single bad image has no cause that lasts
-constexpr int kMostSpots = 3;    // for each marker; more are clutter, and take long
+constexpr int64_t kGrowthHoldsNs = 2'000'000'000;
+constexpr int kMostSpots = 3;  // for each marker; more are clutter, and take long
 // Growth of an image that is a reason: 0.1 mm of a skin of 40 mm. Of links without faults it was 0.2 % at
 // most in all scenes of the whole benchmark up to 0.5 kPa, and 3.5 % of what pressure had widened the skin by
 // since the baseline, by which the model's inflation is wrong.
 constexpr double kMostGrowth = 0.003, kGrowthSigmas = 3, kInflationError = 0.05;
+
+double MeanRadiusMm(const LinkModel& model) {
+  double sum_mm = 0;
+  for (int m = 0; m < model.markers.count(); ++m) sum_mm += model.RestMarker(m).head<2>().norm();
+  return sum_mm / model.markers.count();
+}
 
 // By how much pressure and weight have widened the skin since the baseline, a share of its radius.
 double Widening(const LinkModel& model, const SkinEstimate& estimate) {
@@ -38,45 +45,50 @@ void CameraDiagnosis::Begin(SkinMechanics& mechanics, const MeasuredLoads& loads
   drift_.emplace(mechanics, loads, rig, rest);
   growth_.reset();
   reason_.reset();
-  suspect_frames_ = 0;
+  grown_frames_ = suspect_frames_ = 0;
   next_ns_ = 0;
 }
 
-// A reason stands until a later look does not find it.
-void CameraDiagnosis::ObserveGrowth(const Frame& frame) {
+void CameraDiagnosis::ObserveGrowth(const Frame& frame, int64_t now_ns) {
   const auto growth = drift_ ? drift_->Measure(frame.residuals) : std::nullopt;
-  if (!growth) return;
-  growth_.reset();
-  const double most = kMostGrowth + kInflationError * std::abs(Widening(model_, frame.estimate));
-  for (const CameraId id : kBothCameras) {
-    const auto& [share, sigma] = (*growth)[Index(id)];
-    if (std::abs(share) <= std::max(most, kGrowthSigmas * sigma)) continue;
-    const double radius_mm = model_.RestMarker(0).head<2>().norm();
-    growth_ = Reason{
-        ReasonId::kCamerasMoved,
-        ReasonText("the %s camera's image is %.1f %% %s than when the rest shape was taken: its lens warms, "
-                   "its focus creeps, or it has moved along the link; forces may be wrong; let it come to "
-                   "rest and calibrate again",
-                   Name(id), 100 * std::abs(share), share > 0 ? "larger" : "smaller"),
-        std::abs(share) * radius_mm, most * radius_mm};
+  if (!growth) {
+    if (now_ns > grown_until_ns_) growth_.reset();
     return;
   }
+  const CameraId id =
+      std::abs((*growth)[0].share) > std::abs((*growth)[1].share) ? CameraId::kTop : CameraId::kBottom;
+  const auto& [share, sigma] = (*growth)[Index(id)];
+  const double most = std::max(kMostGrowth + kInflationError * std::abs(Widening(model_, frame.estimate)),
+                               kGrowthSigmas * sigma);
+  grown_frames_ = std::abs(share) > most ? grown_frames_ + 1 : 0;
+  if (grown_frames_ == 0) growth_.reset();
+  if (grown_frames_ < kLeastFrames) return;
+  grown_until_ns_ = now_ns + kGrowthHoldsNs;
+  const double radius_mm = MeanRadiusMm(model_);
+  growth_ =
+      Reason{ReasonId::kCamerasMoved,
+             ReasonText("the %s camera's image is %.1f %% %s than when the baseline was taken: its lens "
+                        "warms, its focus creeps, or it has moved along the link; forces may be wrong; let "
+                        "it come to rest and calibrate again",
+                        Name(id), 100 * std::abs(share), share > 0 ? "larger" : "smaller"),
+             std::abs(share) * radius_mm, most * radius_mm};
 }
 
 void CameraDiagnosis::Observe(const LinkState& state, const Frame& frame) {
-  ObserveGrowth(frame);
-  // Its own reason confirms nothing.
-  const auto may_come = [&](const Reason& reason) {
-    return TraitsOf(reason.id).may_come_of_cameras && !(reason_ && reason.text == reason_->text);
+  // The reason that this class gave for the frame before is among the state's, and confirms nothing.
+  const std::optional<Reason>& own = reason();
+  const auto may_come = [&](const Reason& one) {
+    return TraitsOf(one.id).may_come_of_cameras && !(own && one.text == own->text);
   };
   suspect_frames_ = std::ranges::any_of(state.reasons, may_come) ? suspect_frames_ + 1 : 0;
+  const int64_t now_ns = state.times.exposure_monotonic_ns;
+  ObserveGrowth(frame, now_ns);
   if (frame.obstruction) {  // which explains the reasons
     reason_.reset();
     suspect_frames_ = 0;
   }
   // A reason stands until a later look does not find it.
   if (suspect_frames_ < kLeastFrames && !reason_) return;
-  const int64_t now_ns = state.times.exposure_monotonic_ns;
   if (now_ns < next_ns_ && now_ns >= next_ns_ - kPauseNs) return;
   next_ns_ = now_ns + kPauseNs;
   for (size_t i = 0; i < kCameraCount; ++i) {

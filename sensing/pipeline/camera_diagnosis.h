@@ -44,12 +44,14 @@ class CameraDiagnosis {
   const std::optional<Reason>& reason() const { return reason_ ? reason_ : growth_; }
 
  private:
-  void ObserveGrowth(const Frame& frame);
+  void ObserveGrowth(const Frame& frame, int64_t now_ns);
 
   const LinkModel model_;
   StereoRig rig_;
   std::optional<CameraDrift> drift_;  // none before Begin
   std::optional<Reason> growth_;
+  int grown_frames_ = 0;        // in a row
+  int64_t grown_until_ns_ = 0;  // exposure; without another measurement the reason ends then
   MarkerDetector detector_;
   std::array<Detections, kCameraCount> spots_;
   std::optional<Reason> reason_;

@@ -15,8 +15,8 @@ namespace {
 constexpr double kSigmaPx = 0.2;
 // Beyond this RMS residual, in standard deviations, the model does not hold.
 constexpr double kMostRms = 1.5;
-constexpr double kLeastSeen = 0.7;  // of the rows
-constexpr int kMostForces = 3;
+constexpr double kLeastSeen = 0.8;  // of each camera's rows; the others count as not moved
+constexpr int kMostDriftForces = 3;
 // Standard deviations of a camera's change: wide, since it is what is measured.
 constexpr double kTurnRad = 0.02, kMoveMm = 1, kScale = 0.03;
 constexpr double kSpecificForceMps2 = 0.5;  // likewise, of what is measured of it at least
@@ -54,12 +54,14 @@ void CameraDrift::SetRows(SkinMechanics& mechanics, const KnownLoads& loads, con
       modes_.block<2, 3>(row, first) = at->by_camera.leftCols<3>() * kTurnRad;
       modes_.block<2, 3>(row, first + 3) = at->by_camera.middleCols<3>(3) * kMoveMm;
       modes_.block<2, 1>(row, first + 6) = radius_px * kScale;
-      pulls += modes_.middleRows<2>(row).transpose() * radius_px;
+      pulls.segment<kModesOfCamera>(first) +=
+          modes_.block<2, kModesOfCamera>(row, first).transpose() * radius_px;
       squares += radius_px.squaredNorm();
       modes_.block<2, KnownLoads::kCount>(row, kModes - KnownLoads::kCount) =
           at->by_point * skin->markers_by_loads.middleRows<3>(3 * m);
       touches_.middleRows<2>(row) = at->by_point * responses->middleRows<3>(3 * m).cast<double>();
       rows_.push_back({m, id});
+      ++rows_of_camera_[Index(id)];
     }
     growth_by_modes_[Index(id)] = pulls / std::max(1.0, squares);
   }
@@ -86,26 +88,27 @@ void CameraDrift::Eliminate(const SkinMechanics& mechanics, const MeasuredLoads&
 
 std::optional<std::array<CameraDrift::Growth, kCameraCount>> CameraDrift::Measure(
     const ImageResiduals& residuals) {
-  size_t seen = 0;
-  y_.setZero();  // markers that are not seen count as not moved; they are few
+  std::array<int, kCameraCount> seen = {};
+  y_.setZero();
   for (size_t i = 0; i < rows_.size(); ++i) {
     const auto& camera = residuals[Index(rows_[i].camera)];
     const auto marker = static_cast<size_t>(rows_[i].marker);
     if (marker >= camera.size() || !camera[marker]) continue;
     y_.segment<2>(2 * static_cast<Eigen::Index>(i)) = camera[marker]->px / kSigmaPx;
-    ++seen;
+    ++seen[Index(rows_[i].camera)];
   }
-  if (rows_.empty()) return std::nullopt;
-  if (static_cast<double>(seen) < kLeastSeen * static_cast<double>(rows_.size())) return std::nullopt;
+  for (size_t c = 0; c < kCameraCount; ++c) {
+    if (seen[c] == 0 || seen[c] < kLeastSeen * rows_of_camera_[c]) return std::nullopt;
+  }
   Modes pulls;
   pulls.noalias() = modes_.transpose() * y_;
   const Modes solved = information_.solve(pulls);
   reduced_.squares = y_.squaredNorm() - pulls.dot(solved);
   reduced_.pulls.noalias() = touches_.transpose() * y_;
   reduced_.pulls.noalias() -= modes_by_touches_.transpose() * solved;
-  const SelectedTouches touches = SelectTouches(reduced_, kMostForces, TouchSign::kAny);
-  if (reduced_.squares - touches.gain > kMostRms * kMostRms * 2 * static_cast<double>(seen))
-    return std::nullopt;
+  const SelectedTouches touches = SelectTouches(reduced_, kMostDriftForces, TouchSign::kAny);
+  const double most_squares = kMostRms * kMostRms * 2 * (seen[0] + seen[1]);
+  if (!(reduced_.squares - touches.gain <= most_squares)) return std::nullopt;
   for (int i = 0; i < touches.count; ++i)
     pulls -=
         touches.force_n[static_cast<size_t>(i)] * modes_by_touches_.col(touches.at[static_cast<size_t>(i)]);

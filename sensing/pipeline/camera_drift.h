@@ -28,11 +28,13 @@ class CameraDrift {
   CameraDrift(SkinMechanics& mechanics, const MeasuredLoads& loads, const StereoRig& rig,
               const LabelledMarkers& rest);
 
+  /// The mean radial part of an image's motion by its camera's turn, move and scale; a move along the link
+  /// counts.
   struct Growth {
     double share = 0;  ///< of the image; 0.01: 1 % larger
     double sigma = 0;
   };
-  /// nullopt: too few markers are seen, or first order does not explain the residuals.
+  /// nullopt: a camera sees too few of its markers, or first order does not explain the residuals.
   std::optional<std::array<Growth, kCameraCount>> Measure(const ImageResiduals& residuals);
 
  private:
@@ -51,6 +53,7 @@ class CameraDrift {
 
   // Constant after construction; residuals in standard deviations.
   std::vector<Row> rows_;
+  std::array<int, kCameraCount> rows_of_camera_ = {};
   Eigen::Matrix<double, Eigen::Dynamic, kModes> modes_;
   Eigen::MatrixXd touches_;
   Eigen::LDLT<Eigen::Matrix<double, kModes, kModes>> information_;  // modes' modes and their prior

@@ -10,11 +10,12 @@ namespace taclink {
 namespace {
 
 constexpr double kPressureDeviations = 3;
-// Of a change of pressure that the skin's shape shows: the model's error, which was 3 % at most in the whole
-// benchmark; and how far a sensor's offset changes, a share of its standard deviation.
+// Standard deviations of a change of pressure that the skin's shape shows: the model's error, a share of the
+// change (3 % was the most in the whole benchmark); and how far a sensor's offset changes, a share of its
+// own.
 constexpr double kModelShare = 0.02, kSensorShare = 0.1;
-constexpr double kLeastChange = 2;  // of the pressure, in its standard deviations; else it tells no modulus
-constexpr double kStiffest = -0.9;  // widened less: it is not the modulus
+constexpr double kLeastChange = 2;  // of the pressure, in the sensor's standard deviations
+constexpr double kStiffest = -0.9;  // smaller ratios are not explained by a modulus
 // Where the specific force leaves markers uncertain by more, contacts of 0.02 N may be missed.
 constexpr double kMostAttitudeErrorMm = 0.2;
 
@@ -52,29 +53,50 @@ void AddPressureReasons(const Evidence& evidence, LinkState& state) {
          off_mpa, most_off_mpa});
 }
 
-// Pressure and modulus widen the skin only by their ratio. The offset of a sensor does not matter, since
-// changes from the baseline are compared.
+// The change of pressure since the baseline that the skin's shape shows, less the measured one. What is
+// measured of the two pressures, with standard deviations n and t, and a change with d that the shape shows
+// of its own combine into the estimate's variance n^2 (d^2 + t^2) / (d^2 + t^2 + n^2); an error that both
+// measurements share is no error of the change.
+struct PressureChangeError {
+  double off_mpa = 0, sigma_mpa = 0;
+};
+std::optional<PressureChangeError> ErrorOfPressureChange(const Evidence& evidence,
+                                                         const PressureEstimate& estimate) {
+  const MeasuredLoads &measured = evidence.measured, &baseline = evidence.baseline;
+  const double variance = std::pow(estimate.sigma_mpa, 2), now = std::pow(measured.pressure_sigma_mpa, 2);
+  // The estimator takes a baseline without pressure for exact.
+  const double then = baseline.pressure_mpa != 0 ? std::pow(baseline.pressure_sigma_mpa, 2) : 0;
+  if (!(variance < now)) return std::nullopt;  // the shape shows nothing
+  const double shown = std::max(0.0, (variance * (now + then) - now * then) / (now - variance));
+  // The estimate lies between what is measured and what the shape shows.
+  const double by_shape = (now + then) / (now + then + shown);
+  const double off_mpa = estimate.mpa - measured.pressure_mpa - evidence.estimate.loads.baseline_error[0];
+  return PressureChangeError{off_mpa / by_shape, std::sqrt(shown)};
+}
+
+// Pressure and modulus widen the skin only by their ratio.
 void AddStiffnessReason(const Evidence& evidence, LinkState& state) {
-  if (!state.pressure_estimate || !evidence.is_pressure_measured) return;
+  if (!state.pressure_estimate || !evidence.is_pressure_measured || evidence.diagnosis) return;
   const MeasuredLoads &measured = evidence.measured, &baseline = evidence.baseline;
   const double sensor_mpa = std::max(measured.pressure_sigma_mpa, baseline.pressure_sigma_mpa);
   const double change_mpa = measured.pressure_mpa - baseline.pressure_mpa;
   if (!(std::abs(change_mpa) > kLeastChange * sensor_mpa)) return;
-  const double off_mpa =
-      state.pressure_estimate->mpa - measured.pressure_mpa - evidence.estimate.loads.baseline_error[0];
-  const double sigma_mpa =
-      std::hypot(state.pressure_estimate->sigma_mpa, kModelShare * change_mpa, kSensorShare * sensor_mpa);
-  if (std::abs(off_mpa) <= kPressureDeviations * sigma_mpa) return;
-  const double share = off_mpa / change_mpa, sigma = sigma_mpa / std::abs(change_mpa);
+  // Under suction the equilibrium may be computed at a smaller one (SkinMechanics::Untouched).
+  if (std::min(measured.pressure_mpa, baseline.pressure_mpa) < -sensor_mpa) return;
+  const auto error = ErrorOfPressureChange(evidence, *state.pressure_estimate);
+  if (!error) return;
+  const double sigma_mpa = std::hypot(error->sigma_mpa, kModelShare * change_mpa, kSensorShare * sensor_mpa);
+  if (!(std::abs(error->off_mpa) > kPressureDeviations * sigma_mpa)) return;
+  const double share = error->off_mpa / change_mpa, sigma = sigma_mpa / std::abs(change_mpa);
   if (!(share > kStiffest)) return;
   const double modulus_mpa = evidence.model.material.youngs_modulus_mpa, factor = 1 / (1 + share);
   state.reasons.push_back(
-      {ReasonId::kPressureMismatch,
+      {ReasonId::kStiffnessMismatch,
        ReasonText(
-           "since the baseline the skin has widened by %.0f %% %s than %.3f kPa more make it with the "
-           "model's Young's modulus of %.4f MPa: that may be %.4f +- %.4f MPa, and forces are off by as "
-           "much, or the sensor's scale is wrong; check the sensor, or determine the modulus (taclink "
-           "calibrate material)",
+           "since the baseline the skin's width has changed by %.0f %% %s than a pressure change of %+.3f "
+           "kPa explains with the model's Young's modulus of %.4f MPa; the modulus may be %.4f +- %.4f MPa, "
+           "or the sensor's scale is wrong; forces are off by the same share; compare the sensor with a "
+           "gauge, or determine the modulus (taclink calibrate material)",
            100 * std::abs(share), share > 0 ? "more" : "less", 1e3 * change_mpa, modulus_mpa,
            modulus_mpa * factor, modulus_mpa * factor * factor * sigma),
        std::abs(share), kPressureDeviations * sigma});
@@ -119,9 +141,7 @@ void AddAttitudeReasons(const Evidence& evidence, LinkState& state) {
 
 void AddKnownLoadsReasons(const Evidence& evidence, LinkState& state) {
   AddPressureReasons(evidence, state);
-  const bool is_pressure_doubted =
-      std::ranges::find(state.reasons, ReasonId::kPressureMismatch, &Reason::id) != state.reasons.end();
-  if (state.forces.converged && !is_pressure_doubted) AddStiffnessReason(evidence, state);
+  if (state.forces.converged) AddStiffnessReason(evidence, state);
   if (state.forces.converged) AddAttitudeReasons(evidence, state);
 }
 

@@ -84,12 +84,13 @@ MarkerRows RowsOf(const RestShape& shape, const std::array<Projector, kCameraCou
   return rows;
 }
 
-// Adds for each ring what the same force at each of its markers does; and last what the same outward force at
-// all markers does, as pressure that is higher than known.
+// Adds for each ring what the same force at each of its markers does; and last what the same outward, and the
+// same inward force at all markers does, as pressure that is higher or lower than known.
 void AddRingsAndInflation(const MarkerGrid& grid, Eigen::MatrixXd& touches) {
   const Eigen::Index markers = touches.cols();
-  touches.conservativeResize(Eigen::NoChange, markers + grid.rings() + 1);
-  touches.rightCols<1>() = -touches.leftCols(markers).rowwise().sum();
+  touches.conservativeResize(Eigen::NoChange, markers + grid.rings() + 2);
+  touches.rightCols<1>() = touches.leftCols(markers).rowwise().sum();
+  touches.col(markers + grid.rings()) = -touches.rightCols<1>();
   for (int ring = 0; ring < grid.rings(); ++ring) {
     auto all_around = touches.col(markers + ring);
     all_around.setZero();
@@ -169,8 +170,8 @@ RestTouch DeepestOf(const SelectedTouches& forces, const LinkModel& model, const
   Eigen::VectorXf at_markers_n = Eigen::VectorXf::Zero(markers);
   for (size_t i = 0; i < static_cast<size_t>(forces.count); ++i) {
     const auto force_n = static_cast<float>(forces.force_n[i]);
-    if (const auto ring = forces.at[i] - markers; ring == model.markers.rings())
-      at_markers_n.array() -= force_n;
+    if (const auto ring = forces.at[i] - markers; ring >= model.markers.rings())
+      at_markers_n.array() -= ring == model.markers.rings() ? force_n : -force_n;
     else if (ring >= 0)
       at_markers_n.segment(ring * paths, paths).array() += force_n;
     else
@@ -180,7 +181,7 @@ RestTouch DeepestOf(const SelectedTouches& forces, const LinkModel& model, const
   RestTouch deepest{.share = share};
   for (size_t i = 0; i < static_cast<size_t>(forces.count); ++i) {
     const auto ring = forces.at[i] - markers;
-    if (ring == model.markers.rings()) continue;
+    if (ring >= model.markers.rings()) continue;
     const auto marker = static_cast<int>(ring >= 0 ? ring * paths : forces.at[i]);
     const double depth_mm = static_cast<double>(moved_mm.segment<3>(3 * marker).norm());
     if (depth_mm <= deepest.depth_mm) continue;
@@ -199,9 +200,12 @@ std::optional<RestTouch> FindRestTouch(const RestShape& shape, const Eigen::Matr
   const TouchEquations reduced = Eliminate(all);
   const SelectedTouches forces = SelectTouches(reduced, kMostForces, TouchSign::kPush);
   const double unexplained = reduced.squares - forces.gain - all.image_noise;
-  const double share = forces.gain / (forces.gain + std::max(0.0, unexplained));
-  if (forces.count == 0 || forces.gain < kLeastGain || share < kLeastShare) return std::nullopt;
-  if (forces.at[0] + 1 == reduced.pulls.size()) return std::nullopt;  // inflated
+  double gain = forces.gain;  // of what presses, beside what another pressure explains
+  const Eigen::Index most = forces.count > 0 ? forces.at[0] : 0;
+  if (most >= reduced.pulls.size() - 2)
+    gain -= reduced.pulls[most] * reduced.pulls[most] / reduced.normal(most, most);
+  const double share = gain / (gain + std::max(0.0, unexplained));
+  if (!(gain >= kLeastGain && share >= kLeastShare)) return std::nullopt;
   return DeepestOf(forces, shape.model(), responses, share);
 }
 

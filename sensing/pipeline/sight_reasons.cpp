@@ -142,7 +142,7 @@ double DentAt(const Evidence& evidence, int marker) {
 
 void AddObstructionReason(const Evidence& evidence, LinkState& state) {
   const auto& obstruction = evidence.obstruction;
-  if (!obstruction) return;
+  if (!obstruction || evidence.diagnosis) return;  // that explains what markers are displaced
   state.reasons.push_back(
       {ReasonId::kLabels,
        ReasonText("the %s camera alone shows %d markers displaced, at path %d, ring %d by %.1f px: a hair, a "

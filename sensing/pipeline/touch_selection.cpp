@@ -9,9 +9,9 @@ namespace {
 
 constexpr double kLeastMoreShare = 0.05;
 
-// Those chosen and one more, by least squares. nullopt: not all have the sign, or they cannot be told apart.
-std::optional<SelectedTouches> With(const TouchEquations& equations, SelectedTouches touches,
-                                    Eigen::Index more, TouchSign sign) {
+// Least squares of the selected forces and one more. nullopt: singular, or a force has the wrong sign.
+std::optional<SelectedTouches> FitWith(const TouchEquations& equations, SelectedTouches touches,
+                                       Eigen::Index more, TouchSign sign) {
   touches.at[static_cast<size_t>(touches.count++)] = more;
   // Rows of touches that are not there are those of the identity.
   Eigen::Matrix<double, SelectedTouches::kMost, SelectedTouches::kMost> normal;
@@ -42,7 +42,7 @@ SelectedTouches SelectTouches(const TouchEquations& equations, int most, TouchSi
     const auto end = best.at.begin() + best.count;
     for (Eigen::Index k = 0; k < equations.pulls.size(); ++k) {
       if (std::find(best.at.begin(), end, k) != end) continue;
-      const auto touches = With(equations, best, k, sign);
+      const auto touches = FitWith(equations, best, k, sign);
       if (touches && (!better || touches->gain > better->gain)) better = touches;
     }
     if (!better || better->gain < best.gain + kLeastMoreShare * equations.squares) break;

@@ -9,8 +9,10 @@ namespace {
 // of 240; those with a hair, or a drop of 80 px in diameter, four to twelve.
 constexpr double kDisplacedPx = 0.5, kDisplacedMeans = 3, kDisplacedShare = 0.014;
 constexpr double kDisplacedSigmas = 4;  // of the observation
-constexpr double kMostInMeanPx = 0.5;   // outliers do not widen what is usual
-constexpr double kOtherCamera = 0.5;    // of the limit: the other camera sees it where it is expected
+constexpr int kLeastDisplaced = 4;
+constexpr double kMostShare = 0.25;  // of the markers that both cameras see; more are displaced by the camera
+constexpr double kMostInMeanPx = 0.5;  // outliers do not widen what is usual
+constexpr double kOtherCamera = 0.5;   // of the limit: the other camera sees it where it is expected
 
 // Of a ring's markers in one image. Those of the far ring are small, and scatter more.
 double MeanResidualPx(const LinkModel& model, const std::vector<std::optional<ImageResidual>>& residuals,
@@ -36,12 +38,15 @@ std::optional<ViewObstruction> FindViewObstruction(const LinkModel& model, const
     const auto &here = residuals[Index(id)], &there = residuals[1 - Index(id)];
     ViewObstruction found{.camera = id};
     double limit_px = 0;
+    int compared = 0;
     for (size_t m = 0; m < count; ++m) {
       const auto marker = static_cast<int>(m);
       if (model.PathOf(marker) == 0)
         limit_px =
             std::max(kDisplacedPx, kDisplacedMeans * MeanResidualPx(model, here, model.RingOf(marker)));
-      if (!here[m] || !there[m] || there[m]->px.norm() > kOtherCamera * limit_px) continue;
+      if (!here[m] || !there[m]) continue;
+      ++compared;
+      if (there[m]->px.norm() > kOtherCamera * limit_px) continue;
       const double px = here[m]->px.norm();
       if (px <= limit_px || here[m]->sigmas <= kDisplacedSigmas) continue;
       ++found.markers;
@@ -49,9 +54,10 @@ std::optional<ViewObstruction> FindViewObstruction(const LinkModel& model, const
       found.most_px = px;
       found.marker = marker;
     }
-    if (found.markers > most.markers) most = found;
+    if (found.markers > most.markers && found.markers <= kMostShare * compared) most = found;
   }
-  if (most.markers < kDisplacedShare * model.markers.count()) return std::nullopt;
+  const double least = std::max<double>(kLeastDisplaced, kDisplacedShare * model.markers.count());
+  if (most.markers < least) return std::nullopt;
   return most;
 }
 

@@ -74,5 +74,35 @@ TEST_F(CameraEvidenceTest, WhereNothingOfARingIsSeenItsCreepIsInTheDoubt) {
   EXPECT_LT(doubtful, 0.5 * observed_.information[kHidden].trace()) << "a skin that has not crept has none";
 }
 
+// Cameras are on the axis: epipolar lines are radial in their images.
+TEST_F(CameraEvidenceTest, WhatIsDisplacedAlongTheEpipolarLineAmongRaysThatMissIsDropped) {
+  const int path = 8, ring = 4, marker = model_.MarkerIndex(path, ring);
+  const Vec2 middle = model_.nominal_rig[CameraId::kTop].lens.principal_point_px;
+  const auto displace = [&](LabelledMarkers& seen, int which, double outward_px, double sideways_px) {
+    Vec2& pixel = seen.cameras[Index(CameraId::kTop)][static_cast<size_t>(which)].center_px;
+    const Vec2 outward = (pixel - middle).normalized();
+    pixel += outward_px * outward + sideways_px * Vec2(-outward.y(), outward.x());
+  };
+  for (const bool is_displaced : {true, false}) {
+    LabelledMarkers seen = See(0);
+    for (const int beside : {model_.MarkerIndex(path - 1, ring), model_.MarkerIndex(path + 1, ring),
+                             model_.MarkerIndex(path, ring + 1)})
+      displace(seen, beside, 0, 3);
+    if (is_displaced) displace(seen, marker, 3, 0);
+    CameraEvidence evidence(model_, model_.nominal_rig, Points());
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(3 * model_.markers.count());
+    evidence.SetBaseline(See(0), none);
+    evidence.Observe(seen);
+    evidence.Measure(none, observed_);
+    EXPECT_EQ(evidence.Agreement().apart, 3);
+    for (const CameraId id : kBothCameras) EXPECT_TRUE(evidence.IsDropped(marker, id));
+    EXPECT_TRUE(observed_.information[static_cast<size_t>(marker)].isZero());
+    const std::vector<Mat3> covariances(observed_.information.size(), 1e-4 * Mat3::Identity());
+    EXPECT_TRUE(evidence.Reconsider(none, covariances));
+    EXPECT_EQ(evidence.IsDropped(marker, CameraId::kTop), is_displaced);
+    EXPECT_FALSE(evidence.IsDropped(marker, CameraId::kBottom));
+  }
+}
+
 }  // namespace
 }  // namespace taclink

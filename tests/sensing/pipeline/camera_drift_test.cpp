@@ -110,17 +110,20 @@ TEST_P(CameraDriftTest, IsMeasuredBesideATouch) {
 }
 
 TEST_P(CameraDriftTest, ATouchIsNoGrowth) {
+  int measured = 0;
   for (const double kpa : {0.0, 0.5}) {
     CameraDrift drift = Begin(kpa);
     for (const double force_n : {0.05, 0.08}) {
       const auto found = drift.Measure(FromRest(See(Pressed(kpa, force_n), rig_)));
       if (!found) continue;  // first order does not hold
+      ++measured;
       for (const auto& growth : *found) EXPECT_LT(std::abs(growth.share), 0.003) << kpa << " " << force_n;
     }
   }
+  EXPECT_GT(measured, 0);
 }
 
-TEST_P(CameraDriftTest, ACameraThatTurnsOrMovesIsNoGrowth) {
+TEST_P(CameraDriftTest, ATurnOrASidewaysMoveIsNoGrowth) {
   CameraDrift drift = Begin(0.5);
   StereoRig moved = rig_;
   Misalign(moved[CameraId::kTop], {0.1, 0, 0.1}, {0.1, 0, 0});

@@ -239,11 +239,11 @@ TEST_F(JudgeTest, AModulusThatDoesNotFitIsTold) {
   state_.forces.converged = true;
   EXPECT_THAT(Reasons(), ::testing::IsEmpty());
   state_.pressure_estimate->mpa = 3.3e-4;
-  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kPressureMismatch));
+  EXPECT_THAT(Reasons(), ::testing::ElementsAre(ReasonId::kStiffnessMismatch));
   char text[800];
   std::snprintf(text, sizeof text,
-                "10 %% more than 0.300 kPa more make it with the model's Young's modulus of "
-                "%.4f MPa: that may be %.4f",
+                "10 %% more than a pressure change of +0.300 kPa explains with the model's Young's modulus "
+                "of %.4f MPa; the modulus may be %.4f",
                 model_.material.youngs_modulus_mpa, model_.material.youngs_modulus_mpa / 1.1);
   EXPECT_THAT(state_.status_reason, ::testing::HasSubstr(text));
   // The sensor's offset is in both.

@@ -52,7 +52,7 @@ TEST_F(ViewObstructionTest, WhatBothCamerasShowIsNone) {
 }
 
 TEST_F(ViewObstructionTest, ACameraThatHasMovedIsNone) {
-  for (auto& residual : residuals_[0]) residual = Residual({1.2, 0.3});
+  for (auto& residual : residuals_[0]) residual = Residual({2, 0.3});
   EXPECT_FALSE(FindViewObstruction(model_, residuals_));
 }
 
