@@ -169,6 +169,11 @@ void Fill(const LinkModel& model, v1::LinkModel& out) {
   out.set_tube_radius_m(model.tube_outer_radius_mm * kMetresPerMm);
   out.mutable_material()->set_youngs_modulus_pa(model.material.youngs_modulus_mpa * kPascalsPerMpa);
   out.mutable_material()->set_poisson_ratio(model.material.poisson_ratio);
+  for (const RelaxationTerm& term : model.relaxation.terms) {
+    v1::RelaxationTerm& relaxation = *out.mutable_material()->add_relaxation();
+    relaxation.set_share(term.share);
+    relaxation.set_time_s(term.time_s);
+  }
 
   auto& markers = *out.mutable_markers();
   markers.set_paths(static_cast<uint32_t>(model.markers.paths));

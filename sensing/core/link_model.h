@@ -47,9 +47,27 @@ enum class MaterialLaw : uint8_t {
   kNeoHookean,            ///< incompressible: Poisson's ratio 0.5
 };
 
+/// One term of a Prony series for the stress relaxation of the skin:
+/// E(t) / E(0) = 1 - sum_i share_i (1 - exp(-t / time_s_i)), t since a step of strain.
+struct RelaxationTerm {
+  double share = 0;   ///< of E(0) that this term loses in the end, in (0, 1)
+  double time_s = 0;  ///< time constant
+};
+
+/// How the skin creeps under a constant load. The series scales all moduli alike (quasi-linear
+/// viscoelasticity with one relaxation function), so it holds for any deformation.
+struct Relaxation {
+  std::vector<RelaxationTerm> terms;  ///< empty: the skin is elastic
+  std::vector<double> share_sigmas;   ///< standard deviation of each term's share; empty: nobody measured it
+  std::string source;                 ///< what it was measured from, for people
+
+  bool any() const { return !terms.empty(); }
+};
+
 struct Material {
-  double youngs_modulus_mpa = 0;  ///< at small strain
-  double poisson_ratio = 0;       ///< in [0, 0.5]; the shell is in plane stress, so 0.5 is allowed
+  /// At small strain, of a load that is applied at once: E(0) where there is a Relaxation.
+  double youngs_modulus_mpa = 0;
+  double poisson_ratio = 0;  ///< in [0, 0.5]; the shell is in plane stress, so 0.5 is allowed
   MaterialLaw law = MaterialLaw::kSaintVenantKirchhoff;
 };
 
@@ -94,6 +112,7 @@ struct LinkModel {
 
   Material material;
   std::optional<MaterialEvidence> material_evidence;  ///< none: nobody measured it
+  Relaxation relaxation;
   MarkerGrid markers;
   double tube_outer_radius_mm = 0;  ///< the skin can't move further in; 0: no tube
   StereoRig nominal_rig;            ///< as designed; calibration starts here

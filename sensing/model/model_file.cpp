@@ -58,6 +58,32 @@ RadiusProfile ReadProfile(YamlMap map, double length_mm) {
   return profile;
 }
 
+// skin.material.relaxation: {shares: [...], times_s: [...], evidence: {standard_deviations: [...], from:
+// ...}}
+Relaxation ReadRelaxation(YamlMap map) {
+  constexpr double kMostShare = 0.9;
+  Relaxation relaxation;
+  const auto shares = map.Numbers("shares", 0, kPositive);
+  const auto times_s = map.Numbers("times_s", shares.size(), {.min = 1e-3, .max = 1e7});
+  double sum = 0, last_s = 0;
+  for (size_t i = 0; i < times_s.size(); ++i) {
+    if (times_s[i] <= last_s) map.Fail("times_s", "must rise");
+    last_s = times_s[i];
+    sum += shares[i];
+    relaxation.terms.push_back({shares[i], times_s[i]});
+  }
+  if (shares.empty()) map.Fail("shares", "needs at least one share");
+  if (sum > kMostShare) map.Fail("shares", "must not sum to more than 0.9 of the modulus");
+  if (map.Has("evidence")) {
+    YamlMap evidence = map.Map("evidence");
+    relaxation.share_sigmas = evidence.Numbers("standard_deviations", shares.size(), kPositive);
+    relaxation.source = evidence.Text("from");
+    evidence.Done();
+  }
+  map.Done();
+  return relaxation;
+}
+
 void ReadMaterial(YamlMap map, int version, LinkModel& model) {
   Material& material = model.material;
   material.youngs_modulus_mpa = map.Number("youngs_modulus_mpa", {.min = 1e-4, .max = 1e5});
@@ -72,6 +98,7 @@ void ReadMaterial(YamlMap map, int version, LinkModel& model) {
     model.material_evidence = {evidence.Number("standard_deviation_mpa", kPositive), evidence.Text("from")};
     evidence.Done();
   }
+  if (version >= 2 && map.Has("relaxation")) model.relaxation = ReadRelaxation(map.Map("relaxation"));
   map.Done();
 }
 

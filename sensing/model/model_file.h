@@ -31,6 +31,10 @@ Result<std::string> LinkModelText(const std::string& name_or_path);
 Result<std::string> WithMaterial(const std::string& name, const std::string& content,
                                  const Material& material, const MaterialEvidence& evidence);
 
+/// Likewise with another relaxation of the skin.
+Result<std::string> WithRelaxation(const std::string& name, const std::string& content,
+                                   const Relaxation& relaxation);
+
 /// One camera as it stands in model and calibration files. Keys: image_size_px, lens (division, the default,
 /// or kannala_brandt), focal_px, principal_point_px, k1_per_px2 and k2_per_px4 (division) or fisheye_k (four
 /// numbers), position_mm, rotation_deg.

@@ -30,8 +30,10 @@ enum class EventKind : uint8_t {
   kForceModel,    ///< set
   kCamera,        ///< exposure or gain set
   kClockStepped,  ///< UTC was set, or the machine was suspended
+  kPressureTrip,  ///< of the pressure regulator: its valve was closed, or it was reset
+  kAcceptance,    ///< started or finished
 };
-inline constexpr size_t kEventKinds = 15;
+inline constexpr size_t kEventKinds = 17;
 
 struct ContactDetail {
   uint64_t id = 0;  ///< the contact's in the frame that began it; lasts

@@ -36,9 +36,9 @@ std::string NewRunId(const Clock& clock) {
 
 const char* Name(EventKind kind) {
   static constexpr std::array<const char*, kEventKinds> kNames = {
-      "contact_begin", "contact_update", "contact_end", "force_level", "link_status",
-      "tare",          "calibration",    "baseline",    "drift",       "thresholds",
-      "frames_lost",   "recording",      "force_model", "camera",      "clock_stepped"};
+      "contact_begin", "contact_update", "contact_end",   "force_level",   "link_status", "tare",
+      "calibration",   "baseline",       "drift",         "thresholds",    "frames_lost", "recording",
+      "force_model",   "camera",         "clock_stepped", "pressure_trip", "acceptance"};
   return kNames[static_cast<size_t>(kind)];
 }
 

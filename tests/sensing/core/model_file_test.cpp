@@ -132,6 +132,47 @@ TEST(ModelFile, EvidenceBelongsToVersion2) {
   EXPECT_EQ(model->material_evidence->sigma_mpa, 0.01);
 }
 
+TEST(ModelFile, RelaxationIsReadAndSurvivesANewModulus) {
+  const std::string with =
+      Replaced(Replaced(Cylinder(), "taclink_model: 1", "taclink_model: 2"), "poisson_ratio: 0.5}",
+               "poisson_ratio: 0.5, relaxation: {shares: [0.04, 0.05], times_s: [5, 40]}}");
+  const auto model = ParseLinkModel("m.yaml", with);
+  ASSERT_TRUE(model.ok()) << model.error().message;
+  ASSERT_EQ(model->relaxation.terms.size(), 2u);
+  EXPECT_EQ(model->relaxation.terms[1].share, 0.05);
+  EXPECT_EQ(model->relaxation.terms[1].time_s, 40);
+  EXPECT_TRUE(model->relaxation.share_sigmas.empty());
+  Relaxation measured = model->relaxation;
+  measured.terms[0].share = 0.06;
+  measured.share_sigmas = {0.004, 0.007};
+  measured.source = "a hold";
+  const auto edited = WithRelaxation("m.yaml", with, measured);
+  ASSERT_TRUE(edited.ok()) << edited.error().message;
+  const auto again = WithMaterial("m.yaml", *edited, {0.12, 0.5, MaterialLaw::kNeoHookean}, {0.002, "test"});
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  const auto kept = ParseLinkModel("m.yaml", *again);
+  ASSERT_TRUE(kept.ok());
+  EXPECT_EQ(kept->material.youngs_modulus_mpa, 0.12);
+  ASSERT_EQ(kept->relaxation.terms.size(), 2u);
+  EXPECT_EQ(kept->relaxation.terms[0].share, 0.06);
+  EXPECT_EQ(kept->relaxation.share_sigmas, (std::vector<double>{0.004, 0.007}));
+  EXPECT_EQ(kept->relaxation.source, "a hold");
+}
+
+TEST(ModelFile, RelaxationThatCannotBeIsRefused) {
+  const auto refusal = [](const std::string& relaxation) {
+    const auto model = ParseLinkModel(
+        "m.yaml", Replaced(Replaced(Cylinder(), "taclink_model: 1", "taclink_model: 2"),
+                           "poisson_ratio: 0.5}", "poisson_ratio: 0.5, relaxation: " + relaxation + "}"));
+    return model.ok() ? std::string("accepted") : model.error().message;
+  };
+  EXPECT_THAT(refusal("{shares: [0.04], times_s: [5, 40]}"), HasSubstr("times_s"));
+  EXPECT_THAT(refusal("{shares: [0.04, 0.05], times_s: [40, 5]}"), HasSubstr("must rise"));
+  EXPECT_THAT(refusal("{shares: [0.6, 0.5], times_s: [5, 40]}"), HasSubstr("0.9"));
+  EXPECT_THAT(refusal("{shares: [-0.1], times_s: [5]}"), HasSubstr("shares"));
+  EXPECT_THAT(refusal("{shares: [], times_s: []}"), HasSubstr("at least one"));
+}
+
 TEST(ModelFile, UnknownNameListsTheShippedOnes) {
   const auto model = LoadLinkModel("no-such-model");
   ASSERT_FALSE(model.ok());
