@@ -1,0 +1,102 @@
+#include "sensing/acceptance/load_errors.h"
+
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "sensing/core/units.h"
+
+namespace taclink {
+namespace {
+
+// Below this, relative errors say nothing.
+constexpr double kLeastForceN = 0.02;
+
+std::optional<double> BalanceError(const AcceptanceTrial& trial, double reference_n) {
+  const TrialReference& reference = trial.reference;
+  std::optional<Vec3> direction = reference.direction;
+  // The radial direction stands in for the skin's normal: the profile is not known here, and half of a wall's
+  // slope of 10 degrees changes the result by less than 1 %.
+  if (!direction && reference.place_mm) {
+    const Vec3& at = *reference.place_mm;
+    const Vec3 radial(at.x(), at.y(), 0);
+    if (radial.norm() > 0) direction = -radial.normalized();
+  }
+  if (!direction) return std::nullopt;
+  return (trial.loaded->total_force_n - reference_n * *direction).norm() / reference_n;
+}
+
+std::optional<double> PressureKpa(const AcceptanceTrial& trial) {
+  if (trial.reference.pressure_mpa) return *trial.reference.pressure_mpa / kMpaPerKpa;
+  if (trial.pressure_mpa) return *trial.pressure_mpa / kMpaPerKpa;
+  if (trial.loaded && trial.loaded->pressure_mpa) return *trial.loaded->pressure_mpa / kMpaPerKpa;
+  return std::nullopt;
+}
+
+LoadError ErrorOf(const AcceptanceTrial& trial) {
+  LoadError error{.trial = trial.id, .attitude = trial.attitude};
+  error.pressure_kpa = PressureKpa(trial);
+  const TrialReading& loaded = *trial.loaded;
+  const auto reference_n = ReferenceForce(trial);
+  if (reference_n && *reference_n >= kLeastForceN) {
+    error.force = loaded.has_contact ? loaded.force_n / *reference_n - 1 : -1;
+    error.balance = BalanceError(trial, *reference_n);
+    error.phantom_n = loaded.others_n;
+    if (trial.reference.place_mm && loaded.has_contact)
+      error.place_mm =
+          (AtRadiusOf(*trial.reference.place_mm, loaded.center_mm) - *trial.reference.place_mm).norm();
+  }
+  if (trial.released && IsUsable(*trial.released))
+    error.ghost_n = trial.released->force_n + trial.released->others_n;
+  return error;
+}
+
+template <typename Key>
+int NumberOf(std::map<Key, int>& numbers, const Key& key) {
+  return numbers.emplace(key, static_cast<int>(numbers.size())).first->second;
+}
+
+}  // namespace
+
+Vec3 AtRadiusOf(const Vec3& reference_mm, const Vec3& measured_mm) {
+  const double measured = std::hypot(measured_mm.x(), measured_mm.y());
+  if (!(measured > 0)) return measured_mm;
+  const double scale = std::hypot(reference_mm.x(), reference_mm.y()) / measured;
+  return {scale * measured_mm.x(), scale * measured_mm.y(), measured_mm.z()};
+}
+
+bool IsUsable(const TrialReading& reading) {
+  return reading.usable > 0 && 2 * reading.usable >= reading.frames;
+}
+
+std::optional<double> ReferenceForce(const AcceptanceTrial& trial) {
+  return trial.reference.force_n ? trial.reference.force_n : trial.force_n;
+}
+
+std::vector<LoadError> LoadErrors(const AcceptanceRecord& record) {
+  using Place = std::tuple<int, int, long, long, long>;
+  using Condition = std::tuple<int, double, double, std::string>;
+  std::map<Place, int> places;
+  std::map<Condition, int> conditions;
+  std::optional<int64_t> first_ns;
+  std::vector<LoadError> errors;
+  for (const AcceptanceTrial& trial : record.trials) {
+    if (trial.state != TrialState::kMeasured || !trial.loaded || !IsUsable(*trial.loaded)) continue;
+    LoadError error = ErrorOf(trial);
+    // Places that no marker names are the same within 10 mm.
+    Place place{trial.path, trial.ring, 0, 0, 0};
+    if (trial.path == 0 && trial.reference.place_mm) {
+      const Vec3 at = *trial.reference.place_mm / 10;
+      place = {0, 0, std::lround(at.x()), std::lround(at.y()), std::lround(at.z())};
+    }
+    error.place = NumberOf(places, place);
+    error.condition = NumberOf(conditions, Condition{error.place, trial.force_n.value_or(0),
+                                                     trial.pressure_mpa.value_or(-1), trial.attitude});
+    if (!first_ns) first_ns = trial.loaded->utc_ns;
+    error.hours = 1e-9 / 3600 * static_cast<double>(trial.loaded->utc_ns - *first_ns);
+    errors.push_back(std::move(error));
+  }
+  return errors;
+}
+
+}  // namespace taclink
