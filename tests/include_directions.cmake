@@ -74,21 +74,22 @@ folder(server/attitude sensing/core)
 folder(server/link sensing/core sensing/capture server/config server/process server/hub server/pressure server/attitude)
 folder(server/events sensing/core server/config server/process server/hub)
 folder(server/security sensing/core server/config server/process)
-folder(server/arm sensing/core sensing/capture server/config server/hub server/pressure server/attitude server/link
+folder(server/acceptance sensing/core sensing/acceptance wire server/hub)
+folder(server/arm sensing/core sensing/capture server/config server/hub server/acceptance server/pressure server/attitude server/link
        server/events server/simulation)
-folder(server/messages wire server/events server/arm)
+folder(server/messages wire server/events server/acceptance server/arm)
 folder(server/recording sensing/core mcap wire wire/log server/config server/process server/hub server/arm server/messages)
 folder(server/replay sensing/core sensing/capture mcap wire wire/log server/process server/link server/arm)
 folder(server/listener sensing/core server/process server/security)
 folder(server/rpc/requests sensing/core server/config server/listener server/security)
 folder(server/rpc/streams sensing/core sensing/capture mcap wire wire/log server/process server/hub server/link server/events server/security
        server/arm server/messages server/replay server/rpc/requests)
-folder(server/rpc/services server/process sensing/core sensing/simulation wire server/link server/events server/simulation server/security
+folder(server/rpc/services server/process server/acceptance sensing/core sensing/simulation wire server/link server/events server/simulation server/security
        server/arm server/messages server/recording server/replay server/rpc/requests server/rpc/streams)
 folder(server/rpc sensing/core server/listener server/process server/security server/arm server/rpc/requests server/rpc/services)
 folder(server/publish sensing/core wire server/config server/process server/security server/arm server/messages)
 folder(server/gateway sensing/core server/config server/process server/link server/security server/arm server/rpc server/publish)
-folder(server/assembly sensing/core sensing/yaml sensing/model sensing/camera sensing/capture sensing/pipeline sensing/simulation mcap
+folder(server/assembly server/acceptance sensing/core sensing/yaml sensing/model sensing/camera sensing/capture sensing/pipeline sensing/simulation mcap
        wire/log server/config server/process server/hub server/pressure server/attitude server/simulation server/link server/security server/arm
        server/recording server/replay)
 folder(server sensing/core server/config server/process server/security server/recording server/rpc server/publish
@@ -97,7 +98,7 @@ folder(client/cpp/taclink sensing/core)
 folder(client/cpp sensing/core wire client/cpp/taclink)
 folder(client/cpp/example client/cpp/taclink)
 folder(client/command/cli sensing/core mcap)
-folder(client/command/live sensing/core sensing/model sensing/capture sensing/simulation client/cpp/taclink client/command/cli)
+folder(client/command/live sensing/core sensing/acceptance sensing/model sensing/capture sensing/simulation client/cpp/taclink client/command/cli)
 folder(client/command/offline sensing/core sensing/model sensing/camera sensing/capture sensing/markers/detect
        sensing/markers/label sensing/shell sensing/identification sensing/pipeline sensing/simulation client/cpp/taclink
        client/command/cli client/command/live)

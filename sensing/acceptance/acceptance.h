@@ -90,7 +90,10 @@ struct AcceptanceTrial {
 
 /// Largest errors with which a link is accepted; 0: not limited.
 struct AcceptanceLimits {
-  double force_error = 0.10;      ///< 95th percentile of the relative error of single loads
+  /// Errors of loads below this are compared with this instead: 10 % of 0.3 N is the 0.03 N that a weak load
+  /// may be off.
+  double force_floor_n = 0.3;
+  double force_error = 0.10;      ///< 95th percentile of the error of single loads
   double force_bias = 0.06;       ///< magnitude of the mean relative error
   double place_error_mm = 4;      ///< 95th percentile
   double repeatability = 0.05;    ///< standard deviation of repeated loads, relative

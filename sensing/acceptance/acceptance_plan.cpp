@@ -29,6 +29,8 @@ struct MarkerPlace {
 
 void DescribeLimits(FieldVisitor& visit, AcceptanceLimits& limits) {
   constexpr Range kShare{0, 10};
+  visit("force_floor_n", limits.force_floor_n, {0.001, 1000},
+        "Errors are relative to the load, or to this where the load is weaker.");
   visit("force_error", limits.force_error, kShare,
         "95th percentile of the relative force error of single loads; 0 here and below: not limited.");
   visit("force_bias", limits.force_bias, kShare, "Magnitude of the mean relative force error.");

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kPercent = 100;
 // Smaller effects are not worth a finding, whether or not they are significant.
-constexpr double kLeastScale = 0.03, kLeastGain = 0.02, kLeastOffsetKpa = 0.02, kLeastCreep = 0.03;
+constexpr double kLeastScale = 0.05, kLeastGain = 0.02, kLeastOffsetKpa = 0.02, kLeastCreep = 0.03;
 constexpr double kLeastTurnRad = 1.5 * std::numbers::pi / 180, kLeastShiftMm = 2;
 constexpr double kLeastPhantomN = 0.03, kLeastReasonShare = 0.2;
 
@@ -135,13 +135,13 @@ class Analysis {
   }
 
   void Forces() {
-    const auto errors = Values(report_.loads, &LoadError::force, false);
+    const auto errors = Values(report_.loads, &LoadError::force_to_floor, false);
     AcceptanceQuantity bias =
         Describe("force_bias", "Force: mean error over places", "%", kPercent * limits_.force_bias);
     Set(bias, GroupedMean(errors), static_cast<int>(errors.size()), kPercent);
     Add(std::move(bias));
     Percentile("force_error", "Force: error of single loads, 95 %", "%", kPercent * limits_.force_error,
-               &LoadError::force, kPercent);
+               &LoadError::force_to_floor, kPercent);
     // At the lowest pressure, where the wall's stiffness carries most of a load.
     std::optional<double> lowest_kpa;
     for (const LoadError& load : report_.loads)
@@ -164,7 +164,7 @@ class Analysis {
   void Repeatability() {
     std::vector<GroupedValue> repeated;
     for (const LoadError& load : report_.loads)
-      if (load.force) repeated.push_back({load.condition, *load.force});
+      if (load.force_to_floor) repeated.push_back({load.condition, *load.force_to_floor});
     AcceptanceQuantity quantity = Describe("repeatability", "Force: standard deviation of repeated loads",
                                            "%", kPercent * limits_.repeatability);
     const PercentileEstimate deviation = PooledDeviation(repeated);
@@ -387,13 +387,19 @@ class Analysis {
            Format("The link reports forces of %.2f N where nothing touches (95th percentile): "
                   "tare it, and check the cameras.",
                   phantom.value));
+    for (const LoadError& load : report_.loads) report_.missed += load.force == -1 ? 1 : 0;
+    if (report_.missed > 0)
+      Find(FindingId::kMissed,
+           Format("%d loads were not felt at their places: check the places, and that the loads exceed the "
+                  "limit of detection there.",
+                  report_.missed));
     if (report_.withheld > 0)
       Find(FindingId::kWithheld,
            Format("%d loads were not measured: the link withheld its forces.", report_.withheld));
   }
 
   void Conclude() {
-    bool any = false, failed = report_.withheld > 0, undecided = report_.open > 0;
+    bool any = false, failed = report_.withheld + report_.missed > 0, undecided = report_.open > 0;
     for (const AcceptanceQuantity& quantity : report_.quantities) {
       any = any || quantity.verdict != Verdict::kNotMeasured;
       failed = failed || quantity.verdict == Verdict::kFailed;

@@ -45,10 +45,11 @@ enum class FindingId : uint8_t {
   kAttitudeEffect,  ///< the force error depends on the attitude
   kPhantom,         ///< forces where nothing touches
   kWithheld,        ///< loads that the link did not measure, with its own reason
+  kMissed,          ///< loads that were not felt
 };
-inline constexpr const char* kFindingNames[] = {"force_scale",     "pressure_sensor", "creep",
-                                                "mounting",        "camera",          "pressure_effect",
-                                                "attitude_effect", "phantom",         "withheld"};
+inline constexpr const char* kFindingNames[] = {
+    "force_scale",     "pressure_sensor", "creep",   "mounting", "camera",
+    "pressure_effect", "attitude_effect", "phantom", "withheld", "missed"};
 inline const char* Name(FindingId id) {
   return kFindingNames[static_cast<size_t>(id)];
 }
@@ -60,8 +61,8 @@ struct AcceptanceFinding {
 
 struct AcceptanceReport {
   Verdict verdict = Verdict::kNotMeasured;
-  int measured = 0, skipped = 0, open = 0,
-      withheld = 0;  ///< trials; withheld: measured without usable frames
+  /// Trials; withheld: measured without usable frames; missed: nothing was felt of the load.
+  int measured = 0, skipped = 0, open = 0, withheld = 0, missed = 0;
   std::vector<AcceptanceQuantity> quantities = {};
   std::vector<AcceptanceFinding> findings = {};
   std::vector<LoadError> loads = {};

@@ -1,5 +1,6 @@
 #include "sensing/acceptance/load_errors.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <tuple>
@@ -12,7 +13,7 @@ namespace {
 // Below this, relative errors say nothing.
 constexpr double kLeastForceN = 0.02;
 
-std::optional<double> BalanceError(const AcceptanceTrial& trial, double reference_n) {
+std::optional<double> BalanceError(const AcceptanceTrial& trial, double reference_n, double scale_n) {
   const TrialReference& reference = trial.reference;
   std::optional<Vec3> direction = reference.direction;
   // The radial direction stands in for the skin's normal: the profile is not known here, and half of a wall's
@@ -23,7 +24,7 @@ std::optional<double> BalanceError(const AcceptanceTrial& trial, double referenc
     if (radial.norm() > 0) direction = -radial.normalized();
   }
   if (!direction) return std::nullopt;
-  return (trial.loaded->total_force_n - reference_n * *direction).norm() / reference_n;
+  return (trial.loaded->total_force_n - reference_n * *direction).norm() / scale_n;
 }
 
 std::optional<double> PressureKpa(const AcceptanceTrial& trial) {
@@ -33,14 +34,16 @@ std::optional<double> PressureKpa(const AcceptanceTrial& trial) {
   return std::nullopt;
 }
 
-LoadError ErrorOf(const AcceptanceTrial& trial) {
+LoadError ErrorOf(const AcceptanceTrial& trial, double floor_n) {
   LoadError error{.trial = trial.id, .attitude = trial.attitude};
   error.pressure_kpa = PressureKpa(trial);
   const TrialReading& loaded = *trial.loaded;
   const auto reference_n = ReferenceForce(trial);
   if (reference_n && *reference_n >= kLeastForceN) {
     error.force = loaded.has_contact ? loaded.force_n / *reference_n - 1 : -1;
-    error.balance = BalanceError(trial, *reference_n);
+    const double scale_n = std::max(*reference_n, floor_n);
+    error.force_to_floor = *error.force * *reference_n / scale_n;
+    error.balance = BalanceError(trial, *reference_n, scale_n);
     error.phantom_n = loaded.others_n;
     if (trial.reference.place_mm && loaded.has_contact)
       error.place_mm =
@@ -82,7 +85,7 @@ std::vector<LoadError> LoadErrors(const AcceptanceRecord& record) {
   std::vector<LoadError> errors;
   for (const AcceptanceTrial& trial : record.trials) {
     if (trial.state != TrialState::kMeasured || !trial.loaded || !IsUsable(*trial.loaded)) continue;
-    LoadError error = ErrorOf(trial);
+    LoadError error = ErrorOf(trial, record.limits.force_floor_n);
     // Places that no marker names are the same within 10 mm.
     Place place{trial.path, trial.ring, 0, 0, 0};
     if (trial.path == 0 && trial.reference.place_mm) {

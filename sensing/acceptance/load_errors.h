@@ -14,9 +14,10 @@ struct LoadError {
   int place = 0;                     ///< loads with the same number were at the same place
   int condition = 0;                 ///< likewise the same place, force, pressure and attitude: repetitions
   std::optional<double> force = {};  ///< (measured - reference) / reference; -1: no contact was found
-  std::optional<double> place_mm = {};   ///< distance from the reference place, along the skin
-  std::optional<double> balance = {};    ///< |resultant of all contacts - load| / load
-  std::optional<double> ghost_n = {};    ///< all forces after the load was taken off
+  std::optional<double> force_to_floor = {};  ///< (measured - reference) / the larger of reference and floor
+  std::optional<double> place_mm = {};        ///< distance from the reference place, along the skin
+  std::optional<double> balance = {};  ///< |resultant of all contacts - load| / the larger of load and floor
+  std::optional<double> ghost_n = {};  ///< all forces after the load was taken off
   std::optional<double> phantom_n = {};  ///< of other contacts during the load
   std::optional<double> pressure_kpa =
       {};  ///< inside the skin: manometer, else planned, else the link's sensor

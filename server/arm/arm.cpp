@@ -2,10 +2,29 @@
 
 #include <utility>
 
+#include "sensing/core/read_file.h"
 #include "sensing/core/similar_skin.h"
 #include "server/arm/link_names.h"
 
 namespace taclink::server {
+namespace {
+
+std::unique_ptr<AcceptanceStore> MakeAcceptances(const std::vector<LinkDescription>& links,
+                                                 const std::string& folder, Clock& clock) {
+  std::vector<AcceptedLink> accepted;
+  for (const LinkDescription& link : links) {
+    AcceptedLink& one =
+        accepted.emplace_back(AcceptedLink{link.name, link.model, link.model_hash, link.acceptance});
+    if (link.calibration.empty()) continue;
+    one.calibration_hash = [path = link.calibration] {
+      const auto text = ReadFile(path);
+      return text ? Fingerprint(*text) : std::string();
+    };
+  }
+  return std::make_unique<AcceptanceStore>(std::move(accepted), folder, clock);
+}
+
+}  // namespace
 
 Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, Clock& clock,
          const ArmOptions& options, std::unique_ptr<ArmPoses> poses)
@@ -38,6 +57,7 @@ Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, C
         link, links_.back().name, std::move(parts.source), std::move(parts.processor),
         std::move(parts.factories), hub_, clock, worker, options.watchdog));
   }
+  acceptances_ = MakeAcceptances(links_, options.acceptance_folder, clock);
   events_ = std::make_unique<EventEngine>(hub_, std::move(watched), options.events, clock);
 }
 

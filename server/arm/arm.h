@@ -7,6 +7,7 @@
 #include "sensing/capture/frame_source.h"
 #include "sensing/core/clock.h"
 #include "sensing/core/link_model.h"
+#include "server/acceptance/acceptance_store.h"
 #include "server/arm/arm_contacts.h"
 #include "server/arm/arm_poses.h"
 #include "server/attitude/attitude_source.h"
@@ -29,7 +30,10 @@ struct LinkDescription {
   Rigid3 base_from_link = {};  ///< mm; where the Arm is given poses they count instead
   std::string frame = {};      ///< link of the URDF that it is fixed to; empty: the base
   SourceKind source = SourceKind::kSimulated;
-  LinkRules rules = {};  ///< of its force levels, at the start
+  LinkRules rules = {};          ///< of its force levels, at the start
+  std::string model_hash = {};   ///< Fingerprint of the model's file
+  std::string calibration = {};  ///< path of its calibration file; empty: none
+  std::string acceptance = {};   ///< of a log: its acceptance (AcceptanceStore::FinishedFile); empty: none
 };
 
 /// What a link is made of.
@@ -49,6 +53,7 @@ struct ArmOptions {
   LinkWorkerOptions worker = {};
   WatchdogOptions watchdog = {};
   EventOptions events = {};
+  std::string acceptance_folder = {};  ///< empty: links cannot be accepted
 };
 
 /// All links of an arm, running, and the hub that hands out what they feel.
@@ -83,6 +88,8 @@ class Arm {
   ArmContacts& contacts() { return *contacts_; }
   EventEngine& events() { return *events_; }
   const EventEngine& events() const { return *events_; }
+  AcceptanceStore& acceptances() { return *acceptances_; }
+  const AcceptanceStore& acceptances() const { return *acceptances_; }
   Clock& clock() const { return clock_; }
 
  private:
@@ -98,6 +105,7 @@ class Arm {
   std::vector<std::shared_ptr<AttitudeSource>> attitudes_;    // by link
   std::vector<std::shared_ptr<SimulationDesk>> simulations_;  // by link; null: not simulated
   std::vector<std::unique_ptr<LinkSupervisor>> workers_;      // by link
+  std::unique_ptr<AcceptanceStore> acceptances_;
   Watchdog watchdog_;
 };
 

@@ -88,6 +88,11 @@ Result<void> CheckSceneJoint(const LinkConfig& link, const ArmKinematics& kinema
 // SourceKind names the alternatives of SourceConfig in their order.
 static_assert(std::variant_size_v<SourceConfig> == static_cast<size_t>(SourceKind::kLog));
 
+std::string HashOfModel(const std::string& name_or_path) {
+  const auto text = LinkModelText(name_or_path);
+  return text ? Fingerprint(*text) : "";
+}
+
 Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
   auto model = LoadLinkModel(link.model);
   if (!model) return model.error();
@@ -122,7 +127,9 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
                                    .base_from_link = link.FrameFromLink(),
                                    .frame = link.frame,
                                    .source = static_cast<SourceKind>(link.source.index()),
-                                   .rules = link.rules},
+                                   .rules = link.rules,
+                                   .model_hash = HashOfModel(link.model),
+                                   .calibration = link.calibration.value_or("")},
                    .source = std::move(*source),
                    .processor = std::move(*processor),
                    .pressure = MakePressure(link, clock),
@@ -209,7 +216,8 @@ Result<std::unique_ptr<Arm>> BuildArm(const Config& config, Clock& clock) {
   return std::make_unique<Arm>(config.arm_name, std::move(links), MakeEncoder(names), clock,
                                ArmOptions{.worker = {.age_limit = AgeLimit{config.limits.max_frame_age}},
                                           .watchdog = config.watchdog,
-                                          .events = config.events},
+                                          .events = config.events,
+                                          .acceptance_folder = config.acceptance.folder},
                                std::move(*poses));
 }
 

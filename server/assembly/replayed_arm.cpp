@@ -38,13 +38,15 @@ Result<LinkParts> BuildLink(const LinkConfig& link, const ReplayLink& replay, co
   auto model = ParseLinkModel(log.path + ": " + name, *text);
   if (!model) return model.error();
   if (const auto good = CheckRules(link.rules, model->markers); !good) return good.error();
+  const auto acceptance = AttachmentOf(log, wire::log::AcceptanceAttachment(link.name));
   return LinkParts{
       .description = {.name = link.name,
                       .model = std::move(*model),
                       .base_from_link = link.FrameFromLink(),
                       .frame = link.frame,
                       .source = SourceKind::kLog,
-                      .rules = link.rules},
+                      .rules = link.rules,
+                      .acceptance = acceptance ? *acceptance : ""},
       .source = MakeReplaySource(replay, clock),
       .processor = MakeReplayProcessor(),
       .factories = {.source = [replay, &clock] { return Result(MakeReplaySource(replay, clock)); },

@@ -22,11 +22,12 @@ constexpr const char* kIntroduction = R"(Every key of the configuration file of 
 to the file. `taclinkd --print-config` prints the effective configuration, `taclinkd --check-config` all errors of
 a file, `taclinkd --print-schema` a JSON schema, and `taclinkd --print-config-reference` this page.)";
 
-std::string DefaultRecordings() {
+// Below the folder where programs keep what lasts. Empty: there is no such folder.
+std::string DefaultFolder(const std::string& name) {
   const char* const state = std::getenv("XDG_STATE_HOME");
-  if (state != nullptr && state[0] == '/') return std::string(state) + "/taclink/logs";
+  if (state != nullptr && state[0] == '/') return std::string(state) + "/taclink/" + name;
   const char* const home = std::getenv("HOME");
-  return home != nullptr && home[0] == '/' ? std::string(home) + "/.local/state/taclink/logs" : "";
+  return home != nullptr && home[0] == '/' ? std::string(home) + "/.local/state/taclink/" + name : "";
 }
 
 void DescribeLinks(FieldVisitor& visit, Config& config) {
@@ -64,6 +65,7 @@ void Config::Describe(FieldVisitor& visit) {
   visit("security", security, "Files that guard the server, read again when they change; empty: none.");
   visit("events", events, "Events of contacts, and the audit trail.");
   visit("recording", recording, "Recordings of the links (docs/logs.md).");
+  visit("acceptance", acceptance, "Acceptances of the links (docs/acceptance.md).");
   if (visit.Wants("publish", !publish.url.empty()))
     visit(Shorthand("publish", "url"), publish, "Data for a NATS server with JetStream (docs/fleet.md).");
   visit("log", log, "The server's log; SIGHUP applies changes and opens the file again.");
@@ -86,7 +88,8 @@ Result<Config> ParseConfig(const std::string& name, std::string_view text, const
     return file->Finish().error();  // another version's keys mean something else
   }
   Config config;
-  config.recording.folder = DefaultRecordings();
+  config.recording.folder = DefaultFolder("logs");
+  config.acceptance.folder = DefaultFolder("acceptance");
   ReadFields(root, folder, [&](FieldVisitor& visit) { config.Describe(visit); });
   if (const auto finished = file->Finish(); !finished) return finished.error();
   return config;

@@ -185,6 +185,7 @@ struct Config {
   SecurityConfig security;
   EventOptions events;
   RecordingConfig recording;
+  AcceptanceConfig acceptance;
   PublishConfig publish;
   std::string arm_name;
   KinematicsConfig kinematics;

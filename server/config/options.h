@@ -275,6 +275,14 @@ struct RecordingConfig {
   }
 };
 
+/// Where acceptances of the links are kept.
+struct AcceptanceConfig {
+  std::string folder = {};  ///< empty: links cannot be accepted
+  void Describe(FieldVisitor& visit) {
+    visit.Path(NoDefault("folder"), folder, "Empty: none; not set: ~/.local/state/taclink/acceptance.");
+  }
+};
+
 /// What goes to a NATS server with JetStream.
 struct PublishConfig {
   std::string url = {};  ///< empty: nothing is sent

@@ -184,6 +184,8 @@ void Fill(const Arm& arm, v1::Arm& out) {
     FillCameras(source, statistics, message);
     for (const LevelReport& report : arm.events().Levels(i))
       Fill(report, link.rules, *message.add_force_levels());
+    if (auto acceptance = arm.acceptances().Summary(i))
+      *message.mutable_acceptance() = *std::move(acceptance);
     message.set_status(v1::LINK_STATUS_STARTING);
     if (const auto latest = arm.hub().Latest(i)) {
       message.set_status(wire::ToWire(latest->state().status));

@@ -116,6 +116,12 @@ Result<v1::RecorderStatus> Recorder::Start(const v1::StartRecordingRequest& requ
   metadata["started_by"] = who;
   metadata["pictures"] = order->pictures ? "true" : "false";
   if (!order->note.empty()) metadata["note"] = order->note;
+  for (size_t link = 0; link < arm_.links().size(); ++link) {
+    std::string acceptance = arm_.acceptances().FinishedFile(link);
+    if (acceptance.empty() || arm_.plays_log()) continue;  // a log's attachments are in the preamble
+    preamble.files.push_back({wire::log::AcceptanceAttachment(arm_.links()[link].name), "application/json",
+                              std::move(acceptance)});
+  }
   auto started = Recording::Start(arm_, config_, folder_, *order, std::move(preamble));
   if (!started) return started.error();
   {

@@ -50,9 +50,9 @@ class CallObserver final : public grpc::experimental::ServerInterceptorFactoryIn
 };
 
 std::set<std::string> ServiceNames(bool records) {
-  std::set<std::string> names = {v1::TactileService::service_full_name(),
-                                 v1::OperationsService::service_full_name(),
-                                 v1::SimulationService::service_full_name()};
+  std::set<std::string> names = {
+      v1::TactileService::service_full_name(), v1::OperationsService::service_full_name(),
+      v1::SimulationService::service_full_name(), v1::AcceptanceService::service_full_name()};
   if (records) names.insert(v1::RecordingService::service_full_name());
   return names;
 }
@@ -65,6 +65,7 @@ RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const
       service_(arm, limits, senders_, security),
       operations_(arm, security),
       simulations_(arm),
+      acceptances_(arm, security),
       health_(ServiceNames(recorder != nullptr), senders_, security) {
   if (recorder != nullptr)
     recordings_ = std::make_unique<RecordingService>(*recorder, service_.registry(), senders_, security);
@@ -101,6 +102,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
   builder.RegisterService(&out->service_);
   builder.RegisterService(&out->operations_);
   builder.RegisterService(&out->simulations_);
+  builder.RegisterService(&out->acceptances_);
   builder.RegisterService(&out->health_);
   if (recorder != nullptr) builder.RegisterService(out->recordings_.get());
   out->listener_ = std::move(*listener);
@@ -124,6 +126,7 @@ void RpcServer::Shutdown(const std::string& reason, std::chrono::milliseconds pa
   listener_->Close();
   health_.Stop(reason);
   service_.EndStreams(reason);
+  acceptances_.EndCalls(reason);
   // Calls from within the process lose their last words once gRPC shuts down, so they get their time before.
   const auto deadline = std::chrono::system_clock::now() + patience;
   service_.WaitUntilNoStreams(patience);
@@ -131,6 +134,7 @@ void RpcServer::Shutdown(const std::string& reason, std::chrono::milliseconds pa
   server_->Wait();
   if (recordings_) recordings_->Join();
   service_.Join();
+  acceptances_.Join();
   senders_->join();
   server_.reset();
 }

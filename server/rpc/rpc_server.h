@@ -11,6 +11,7 @@
 #include "sensing/core/result.h"
 #include "server/arm/arm.h"
 #include "server/listener/listener.h"
+#include "server/rpc/services/acceptance_service.h"
 #include "server/rpc/services/health_service.h"
 #include "server/rpc/services/operations_service.h"
 #include "server/rpc/services/recording_service.h"
@@ -20,8 +21,8 @@
 
 namespace taclink::server {
 
-/// gRPC over one arm: TactileService, OperationsService, RecordingService, health, reflection. The arm must
-/// outlive it.
+/// gRPC over one arm: TactileService, OperationsService, AcceptanceService, SimulationService,
+/// RecordingService, health, reflection. The arm must outlive it.
 class RpcServer {
  public:
   /// Listens at once. `security` null: everybody may call, in the clear. `recorder` null: no
@@ -53,6 +54,7 @@ class RpcServer {
   TactileService service_;
   OperationsService operations_;
   SimulationService simulations_;
+  AcceptanceService acceptances_;
   std::unique_ptr<RecordingService> recordings_;                              // null: none
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;  // of the listener's connections
   std::unique_ptr<Listener> listener_;

@@ -9,6 +9,7 @@
 #include <limits>
 #include <set>
 
+#include "taclink/v1/acceptance.grpc.pb.h"
 #include "taclink/v1/operations.grpc.pb.h"
 #include "taclink/v1/recording.grpc.pb.h"
 #include "taclink/v1/simulation.grpc.pb.h"
@@ -30,6 +31,7 @@ const std::set<std::string> kMayBeNegative = {
     "UpdateJointStatesRequest.positions",
     "UpdateJointStatesRequest.velocities",
     "UpdatePressureRequest.pressure_pa",  // below the surroundings
+    "TrialReference.pressure_pa",         // likewise
     "Vector3.x",
     "Vector3.y",
     "Vector3.z",
@@ -206,7 +208,8 @@ class RequestFieldsTest : public ::testing::Test {
          {v1::GetArmRequest::descriptor()->file()->FindServiceByName("TactileService"),
           v1::StartRecordingRequest::descriptor()->file()->FindServiceByName("RecordingService"),
           v1::RestartLinkRequest::descriptor()->file()->FindServiceByName("OperationsService"),
-          v1::PressRequest::descriptor()->file()->FindServiceByName("SimulationService")}) {
+          v1::PressRequest::descriptor()->file()->FindServiceByName("SimulationService"),
+          v1::MeasureTrialRequest::descriptor()->file()->FindServiceByName("AcceptanceService")}) {
       EXPECT_NE(service, nullptr);
       for (int i = 0; service != nullptr && i < service->method_count(); ++i)
         out.push_back(service->method(i));

@@ -47,9 +47,10 @@ class TestServer {
       if (link == 0)  // as clients tell it
         links_.back().attitude = std::make_shared<ClientAttitude>(0.2, std::chrono::milliseconds(200));
     }
-    arm_ =
-        std::make_unique<Arm>("test", std::move(links_), CountingEncoder(), clock_,
-                              ArmOptions{.worker = {.poll = std::chrono::milliseconds(5)}}, std::move(poses));
+    arm_ = std::make_unique<Arm>("test", std::move(links_), CountingEncoder(), clock_,
+                                 ArmOptions{.worker = {.poll = std::chrono::milliseconds(5)},
+                                            .acceptance_folder = NewFolder("acceptance")},
+                                 std::move(poses));
     recorder_ = std::make_unique<Recorder>(
         *arm_, recording, LogPreamble{.files = {}, .metadata = {{"taclink", {{"arm", "test"}}}}}, files);
     auto server = RpcServer::Start(address, *arm_, limits, nullptr, recorder_.get());

@@ -78,4 +78,8 @@ std::string CalibrationAttachment(std::string_view link) {
   return "links/" + std::string(link) + "/calibration.yaml";
 }
 
+std::string AcceptanceAttachment(std::string_view link) {
+  return "links/" + std::string(link) + "/acceptance.json";
+}
+
 }  // namespace taclink::wire::log

@@ -53,5 +53,7 @@ inline constexpr const char* kConfigAttachment = "taclinkd.yaml";
 inline constexpr const char* kUrdfAttachment = "arm.urdf";
 std::string ModelAttachment(std::string_view link);
 std::string CalibrationAttachment(std::string_view link);
+/// taclink.v1.Acceptance as JSON: the link's last finished one when the recording began.
+std::string AcceptanceAttachment(std::string_view link);
 
 }  // namespace taclink::wire::log

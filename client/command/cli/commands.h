@@ -12,6 +12,7 @@ namespace taclink::command {
 using Selected = std::function<Result<void>()>;
 
 /// Each registers one subcommand with its options.
+void AddAccept(const Arguments& app, Selected& selected);
 void AddDoctor(const Arguments& app, Selected& selected);
 void AddCompletion(const Arguments& app, Selected& selected);
 void AddCameras(const Arguments& app, Selected& selected);

@@ -26,6 +26,7 @@ void AddCommands(const taclink::command::Arguments& app, taclink::command::Selec
   AddSimulate(app, selected);
   AddSkin(app, selected);
   AddCalibrate(app, selected);
+  AddAccept(app, selected);
   AddCameras(app, selected);
   AddShow(app, selected);
   AddToken(app, selected);
@@ -35,7 +36,7 @@ void AddCommands(const taclink::command::Arguments& app, taclink::command::Selec
                      "restart"});
   app.Group("Recordings", {"record", "log"});
   app.Group("Offline", {"detect", "solve", "simulate", "skin"});
-  app.Group("Setup", {"cameras", "calibrate", "show", "token", "doctor", "completion"});
+  app.Group("Setup", {"cameras", "calibrate", "accept", "show", "token", "doctor", "completion"});
 }
 
 }  // namespace

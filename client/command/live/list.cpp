@@ -7,6 +7,7 @@
 
 #include "client/command/cli/commands.h"
 #include "client/command/cli/json.h"
+#include "client/command/live/accept_report.h"
 #include "client/command/live/connect.h"
 #include "client/cpp/taclink/client.h"
 #include "sensing/core/marker_text.h"
@@ -70,6 +71,29 @@ void PrintMissingMarkers(const v1::Arm& arm) {
   }
 }
 
+// How good each link was in its last acceptance.
+void PrintAcceptances(const v1::Arm& arm) {
+  for (const auto& link : arm.links()) {
+    const std::string text = AcceptanceText(link);
+    if (!text.empty()) fmt::print("\n{}: acceptance {}\n", Printable(link.name()), text);
+  }
+}
+
+Json AcceptanceJson(const v1::Link& link) {
+  if (!link.has_acceptance()) return nullptr;
+  const v1::AcceptanceSummary& summary = link.acceptance();
+  Json out = {{"verdict", client::Name(summary.verdict())},
+              {"finished_utc_ns", summary.finished_utc_ns()},
+              {"loads", summary.loads()},
+              {"findings", std::vector<std::string>(summary.findings().begin(), summary.findings().end())},
+              {"outdated", summary.outdated()}};
+  if (summary.has_force_bias()) out["force_bias"] = summary.force_bias();
+  if (summary.has_force_bias_half_width()) out["force_bias_half_width"] = summary.force_bias_half_width();
+  if (summary.has_force_error_95()) out["force_error_95"] = summary.force_error_95();
+  if (summary.has_place_error_95_m()) out["place_error_95_mm"] = summary.place_error_95_m() * 1e3;
+  return out;
+}
+
 Json CameraJson(const v1::Camera& camera) {
   Json out = {{"camera", camera.name()},       {"configured", camera.configured()},
               {"device", camera.device()},     {"format", camera.format()},
@@ -109,6 +133,7 @@ Json ListedLinkJson(const v1::Link& link) {
           {"pairs_skipped", statistics.pairs_skipped()},
           {"missing_markers", std::vector<uint32_t>(link.baseline().missing_markers().begin(),
                                                     link.baseline().missing_markers().end())},
+          {"acceptance", AcceptanceJson(link)},
           {"cameras", std::move(cameras)}};
 }
 
@@ -131,6 +156,7 @@ Result<void> RunList(const ListOptions& options) {
     PrintTable(*arm);
     PrintCameras(*arm);
     PrintMissingMarkers(*arm);
+    PrintAcceptances(*arm);
   }
   return {};
 }

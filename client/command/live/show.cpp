@@ -3,6 +3,7 @@
 #include <string>
 
 #include "client/command/cli/commands.h"
+#include "sensing/acceptance/acceptance_plan.h"
 #include "sensing/model/model_file.h"
 #include "sensing/simulation/scene.h"
 
@@ -35,6 +36,11 @@ void AddShow(const Arguments& app, Selected& selected) {
   scene.AddOption("name", *name, "Its name").Required();
   scene.OnChosen([name, &selected] {
     selected = [name] { return Print(ShippedSceneText(*name), "scene", *name, ShippedSceneNames()); };
+  });
+  const Arguments plan = show.AddCommand("plan", "A plan of taclink accept");
+  plan.AddOption("name", *name, "Its name").Required();
+  plan.OnChosen([name, &selected] {
+    selected = [name] { return Print(ShippedPlanText(*name), "plan", *name, ShippedPlanNames()); };
   });
 }
 

@@ -69,6 +69,7 @@ struct Credentials {
 /// Client::Connect has then reported the error.
 std::chrono::milliseconds Patience(std::chrono::milliseconds usual);
 
+class Acceptances;       // taclink/acceptance.h
 class Recordings;        // taclink/recordings.h
 class ContactReader;     // taclink/arm_contacts.h
 class JointStateWriter;  // likewise
@@ -138,6 +139,9 @@ class Client {
 
   /// The server's recordings; see taclink/recordings.h.
   Recordings RecordingCalls() const;
+
+  /// Acceptances of the server's links; see taclink/acceptance.h.
+  Acceptances AcceptanceCalls() const;
 
   /// All contacts of the arm in its base frame. `max_rate_hz` 0: whenever a link publishes. Returns once the
   /// server has accepted. Errors: kInvalidArgument, kResourceExhausted, kUnavailable.

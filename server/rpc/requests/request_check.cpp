@@ -24,6 +24,7 @@ constexpr double kMostPosition = 1e6;
 constexpr double kMostVacuumPa = 2e5, kMostPressurePa = 1e7;
 constexpr double kMostSpecificForce = 100;  // m/s^2
 constexpr double kMostHoldS = 3600;
+constexpr double kMostMeasuredS = 36000, kMostTrial = 1e6;
 constexpr double kMostHistoryS = 300;
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
@@ -69,6 +70,12 @@ constexpr std::array kBounds = {
     Bounds{"SetScenePressureRequest.pressure_pa", 0, kMostPressurePa, "Pa above the surroundings"},
     Bounds{"MoveSceneJointRequest.position_rad", -kMostPosition, kMostPosition, "rad"},
     Bounds{"PressRequest.hold_s", 0, kMostHoldS, "s; 0: until Release"},
+    Bounds{"MeasureTrialRequest.trial", 0, kMostTrial, "of the acceptance"},
+    Bounds{"SkipTrialRequest.trial", 0, kMostTrial, "of the acceptance"},
+    Bounds{"MeasureTrialRequest.duration_s", 0, kMostMeasuredS, "s; 0: 1, or as long as a load is held"},
+    Bounds{"TrialReference.force_n", 0, kMostForceN, "N"},
+    Bounds{"TrialReference.force_sigma_n", 0, kMostForceN, "N"},
+    Bounds{"TrialReference.pressure_pa", -kMostVacuumPa, kMostPressurePa, "Pa above the surroundings"},
     Bounds{"Vector3.x", -kMostSpecificForce, kMostSpecificForce, "m/s^2"},
     Bounds{"Vector3.y", -kMostSpecificForce, kMostSpecificForce, "m/s^2"},
     Bounds{"Vector3.z", -kMostSpecificForce, kMostSpecificForce, "m/s^2"},
