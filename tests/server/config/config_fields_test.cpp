@@ -32,6 +32,7 @@ events: {history: 50, begin_n: 0.5, end_n: 0.4, release_s: 0.3, update_rate_hz: 
   audit_max_kb: 5}
 recording: {folder: /logs, at_start: true, pictures: true, compression: lz4, picture_compression: zstd, split_mb: 10, split_s: 0,
   quota_mb: 100, sync_s: 0.5, queue_mb: 64, scene_rate_hz: 0}
+acceptance: {folder: /accepted}
 publish: {url: "nats://b:4222", site: lab, stream: all, stream_mb: 10, tls_ca: /ca.pem, certificate: /p.pem, key: /p.key,
   credentials: /u.creds, token_file: /token, frames_detail: full, frames_rate_hz: 0, contacts_deadband_n: 0.1, queue_mb: 8}
 log: {level: debug, format: json, file: /log, rate_limit: 1, rate_limit_total: 2}
