@@ -13,6 +13,7 @@
 #include "server/listener/listener.h"
 #include "server/rpc/services/health_service.h"
 #include "server/rpc/services/operations_service.h"
+#include "server/rpc/services/pressure_service.h"
 #include "server/rpc/services/recording_service.h"
 #include "server/rpc/services/simulation_service.h"
 #include "server/rpc/services/tactile_service.h"
@@ -20,8 +21,8 @@
 
 namespace taclink::server {
 
-/// gRPC over one arm: TactileService, OperationsService, RecordingService, health, reflection. The arm must
-/// outlive it.
+/// gRPC over one arm: TactileService, OperationsService, PressureService, RecordingService, health,
+/// reflection. The arm must outlive it.
 class RpcServer {
  public:
   /// Listens at once. `security` null: everybody may call, in the clear. `recorder` null: no
@@ -52,6 +53,7 @@ class RpcServer {
   const std::shared_ptr<boost::asio::thread_pool> senders_;
   TactileService service_;
   OperationsService operations_;
+  PressureService pressures_;
   SimulationService simulations_;
   std::unique_ptr<RecordingService> recordings_;                              // null: none
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;  // of the listener's connections

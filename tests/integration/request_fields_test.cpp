@@ -10,6 +10,7 @@
 #include <set>
 
 #include "taclink/v1/operations.grpc.pb.h"
+#include "taclink/v1/pressure.grpc.pb.h"
 #include "taclink/v1/recording.grpc.pb.h"
 #include "taclink/v1/simulation.grpc.pb.h"
 #include "taclink/v1/tactile.grpc.pb.h"
@@ -206,6 +207,7 @@ class RequestFieldsTest : public ::testing::Test {
          {v1::GetArmRequest::descriptor()->file()->FindServiceByName("TactileService"),
           v1::StartRecordingRequest::descriptor()->file()->FindServiceByName("RecordingService"),
           v1::RestartLinkRequest::descriptor()->file()->FindServiceByName("OperationsService"),
+          v1::SetPressureRequest::descriptor()->file()->FindServiceByName("PressureService"),
           v1::PressRequest::descriptor()->file()->FindServiceByName("SimulationService")}) {
       EXPECT_NE(service, nullptr);
       for (int i = 0; service != nullptr && i < service->method_count(); ++i)
