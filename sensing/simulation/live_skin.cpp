@@ -27,6 +27,14 @@ T Mixed(const T& a, const T& b, double share) {
   return a + share * (b - a);
 }
 
+// A key lies ahead of the time for which the pressure is given. A pressure that changes, such as that of a
+// regulator, is continued to the key; otherwise the skin would follow it late.
+Handling Ahead(Handling wanted, double by_s) {
+  if (wanted.pressure_mpa)
+    wanted.pressure_mpa = std::max(0.0, *wanted.pressure_mpa + by_s * wanted.pressure_mpaps);
+  return wanted;
+}
+
 }  // namespace
 
 LiveSkin::LiveSkin(const LinkModel& model, const Scene& scene, std::vector<ContactPlan> plans,
@@ -61,7 +69,7 @@ bool LiveSkin::Evaluate(double time_s, const Handling& wanted, SkinNodes& nodes,
   while (to_.time_s < time_s) {
     // A late caller gets one longer span rather than many.
     const double next_s = std::max(to_.time_s + kKeySpanS, time_s);
-    if (!NextKey(next_s, wanted)) return false;
+    if (!NextKey(next_s, Ahead(wanted, next_s - time_s))) return false;
   }
   if (IsAlone(to_.time_s, wanted)) return false;
   Interpolate(time_s, nodes, truth);
@@ -140,19 +148,21 @@ SkinBalance LiveSkin::Predicted(double from_s, const HandledMotion& from, double
   return predicted;
 }
 
-// Goes on as far as the effort that is left allows. Returns the share of the way where balance_ is.
-double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to) {
+// Goes on as far as so many factorizations allow, in steps that begin with `step`. Returns the share of the
+// way where balance_ is.
+double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to,
+                       int most_factorizations, double& step) {
   const int before = skin_.factorizations();
   const auto time_at = [&](double share) { return from_s + share * (to_s - from_s); };
   double reached = 0;
-  while (reached < 1 && skin_.factorizations() - before < effort_) {
-    const double next = std::min(reached + step_, 1.0);
+  while (reached < 1 && skin_.factorizations() - before < most_factorizations) {
+    const double next = std::min(reached + step, 1.0);
     const HandledMotion here = Between(from, to, reached), there = Between(from, to, next);
     if (Balance(time_at(next), there, Predicted(time_at(reached), here, time_at(next), there))) {
       reached = next;
-      step_ = std::min(kStepGrowth * step_, 1.0);
-    } else if (step_ > kLeastStep) {
-      step_ /= 2;
+      step = std::min(kStepGrowth * step, 1.0);
+    } else if (step > kLeastStep) {
+      step /= 2;
     } else {
       break;
     }
@@ -160,8 +170,9 @@ double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, co
   return reached;
 }
 
-// Bodies that can't go on at their speed go on slower or stay where they are; where that has no equilibrium
-// either, the user lets go of all.
+// Bodies that can't go on at their speed go on slower or stay where they are, while the pressure goes on
+// without them: that of a regulator does not wait for a body. Where that has no equilibrium either, the user
+// lets go of all.
 bool LiveSkin::NextKey(double time_s, const Handling& wanted) {
   from_ = std::move(to_);
   RemoveBodies();
@@ -172,11 +183,19 @@ bool LiveSkin::NextKey(double time_s, const Handling& wanted) {
   effort_ = std::min(effort_ + kFactorizationsPerKey, kMostSaved);
   const bool tries = effort_ > 0;
   const int spent_before = skin_.factorizations();
-  const double reached = Reach(from_.time_s, before, time_s, motion_);
-  effort_ -= skin_.factorizations() - spent_before;
+  const double reached = Reach(from_.time_s, before, time_s, motion_, effort_, step_);
   if (tries) trouble_.clear();
   if (reached < 1) {
-    motion_ = Between(before, motion_, reached);
+    const HandledMotion here = Between(before, motion_, reached);
+    HandledMotion inflated = here;
+    inflated.pressure_mpa = motion_.pressure_mpa;
+    double step = 1, share = 0;
+    if (here.pressure_mpa != inflated.pressure_mpa)
+      share = Reach(from_.time_s + reached * span_s, here, time_s, inflated, kFactorizationsPerKey, step);
+    motion_ = Between(here, inflated, share);
+  }
+  effort_ -= skin_.factorizations() - spent_before;
+  if (reached < 1) {
     if (tries && reached == 0 && step_ <= kLeastStep)
       trouble_ = "what presses stays where it is: the skin has no equilibrium further on, it would snap";
     if (!Balance(time_s, motion_, balance_)) {

@@ -49,7 +49,8 @@ class LiveSkin {
   bool Balance(double time_s, const HandledMotion& motion, SkinBalance guess);
   void PlaceNewDiscs(const SkinLoad& load, SkinBalance& balance) const;
   SkinBalance Predicted(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to);
-  double Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to);
+  double Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to,
+               int most_factorizations, double& step);
   bool NextKey(double time_s, const Handling& wanted);
   void AddBodies(const std::vector<PressedBody>& wanted);
   void RemoveBodies();

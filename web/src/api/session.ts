@@ -2,6 +2,7 @@ import { Code, ConnectError, createClient, type Client, type Interceptor } from 
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { computed, signal } from "@preact/signals";
 import { OperationsService, Role, type GetCallerResponse } from "./gen/taclink/v1/operations_pb";
+import { PressureService } from "./gen/taclink/v1/pressure_pb";
 import { RecordingService } from "./gen/taclink/v1/recording_pb";
 import { SimulationService } from "./gen/taclink/v1/simulation_pb";
 import { TactileService } from "./gen/taclink/v1/tactile_pb";
@@ -13,6 +14,7 @@ export class Session {
   readonly tactile: Client<typeof TactileService>;
   readonly recording: Client<typeof RecordingService>;
   readonly operations: Client<typeof OperationsService>;
+  readonly pressure: Client<typeof PressureService>;
   readonly simulation: Client<typeof SimulationService>;
 
   /** As the server sees the user; undefined: not asked yet. */
@@ -33,6 +35,7 @@ export class Session {
     this.tactile = createClient(TactileService, transport);
     this.recording = createClient(RecordingService, transport);
     this.operations = createClient(OperationsService, transport);
+    this.pressure = createClient(PressureService, transport);
     this.simulation = createClient(SimulationService, transport);
   }
 

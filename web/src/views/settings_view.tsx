@@ -13,6 +13,7 @@ import { NumberField } from "../ui/number_field";
 import { OperatorButton } from "../ui/operator_button";
 import { MODEL_NOTES, MODEL_WORDS } from "../ui/words";
 import { CameraView } from "./camera_view";
+import { PressureForm } from "./pressure_form";
 import { Steps, TareDialog, TouchLine } from "./tare_dialog";
 
 /** All that can be chosen, the most exact ones first. */
@@ -28,6 +29,7 @@ export function SettingsView({ link }: { link: Link }) {
   return (
     <div class="settings">
       <Baseline link={link} />
+      {link.regulator && <PressureForm link={link.name} last={link.regulator} />}
       <Model link={link} />
       {link.forceLevels.map((state) => (
         <ThresholdForm key={`${link.name}\n${state.region}`} link={link} state={state} />
