@@ -144,9 +144,11 @@ LoadedSkin::LoadedSkin(LoadedSkin&&) noexcept = default;
 LoadedSkin& LoadedSkin::operator=(LoadedSkin&&) noexcept = default;
 LoadedSkin::~LoadedSkin() = default;
 
-Result<LoadedSkin> LoadedSkin::Make(const LinkModel& model, const KnownLoads& loads, int refinement) {
+Result<LoadedSkin> LoadedSkin::Make(const LinkModel& model, const KnownLoads& loads, int refinement,
+                                    double step_mm) {
   if (auto good = CheckLoads(loads, refinement); !good) return good.error();
-  auto skin = std::make_unique<PressedSkin>(model, PressedSkinOptions{.refinement = refinement});
+  auto skin =
+      std::make_unique<PressedSkin>(model, PressedSkinOptions{.refinement = refinement, .step_mm = step_mm});
   const PressSummary inflated = skin->Load(loads);
   if (!inflated.ok()) {
     const bool is_weightless = loads.specific_force_mps2.isZero(0);
@@ -163,8 +165,15 @@ double LoadedSkin::InflationMm(int marker) const {
 
 Result<std::vector<SkinPushResult>> LoadedSkin::Push(int marker, std::span<const double> depths_mm,
                                                      double patch_diameter_mm) {
+  PushedAsFar pushed = PushAsFar(marker, depths_mm, patch_diameter_mm);
+  if (!pushed.end) return pushed.end.error();
+  return std::move(pushed.results);
+}
+
+LoadedSkin::PushedAsFar LoadedSkin::PushAsFar(int marker, std::span<const double> depths_mm,
+                                              double patch_diameter_mm) {
   for (const double depth_mm : depths_mm) {
-    if (auto good = CheckPlace(model_, marker, depth_mm, patch_diameter_mm); !good) return good.error();
+    if (auto good = CheckPlace(model_, marker, depth_mm, patch_diameter_mm); !good) return {{}, good};
   }
   skin_->RemoveBodies(untouched_);
   const ShellMesh& mesh = skin_->mesh();
@@ -181,22 +190,27 @@ Result<std::vector<SkinPushResult>> LoadedSkin::Push(int marker, std::span<const
   const double radius = std::max(patch_diameter_mm / 2, kRimMm);
   const Vec3 face = mesh.mid_mm[center] + (model_.thickness_mm / 2 + height) * axis;
   skin_->AddBody(RigidStamp{face, -axis, radius, kRimMm}, false);
-  std::vector<SkinPushResult> results;
+  PushedAsFar all;
   for (const double depth_mm : depths_mm) {
-    SkinPushResult& result = results.emplace_back();
+    SkinPushResult result;
     result.inflation_mm = inflation_mm;
-    if (!(height + depth_mm > 0)) continue;  // it does not come as far as the skin
-    const Vec3 by = -(height + depth_mm) * axis;
-    const PressSummary pushed = skin_->Move({&by, 1});
-    if (!pushed.ok()) return NoEquilibrium("pushing", pushed);
-    height = -depth_mm;
-    const auto contact = skin_->ContactOf(0);
-    result.force_n = -contact.force_n.dot(axis);
-    result.nodes_in_contact = contact.points;
-    result.indentation_mm = contact.penetration_mm;
-    result.solution = pushed.Text();
+    if (height + depth_mm > 0) {  // else it does not come as far as the skin
+      const Vec3 by = -(height + depth_mm) * axis;
+      const PressSummary pushed = skin_->Move({&by, 1});
+      if (!pushed.ok()) {
+        all.end = NoEquilibrium("pushing", pushed);
+        break;
+      }
+      height = -depth_mm;
+      const auto contact = skin_->ContactOf(0);
+      result.force_n = -contact.force_n.dot(axis);
+      result.nodes_in_contact = contact.points;
+      result.indentation_mm = contact.penetration_mm;
+      result.solution = pushed.Text();
+    }
+    all.results.push_back(std::move(result));
   }
-  return results;
+  return all;
 }
 
 Result<SkinStiffness> LoadedSkin::Stiffness(int marker, double indentation_mm, double patch_diameter_mm) {

@@ -58,8 +58,9 @@ class PressedSkin;
 /// disc begins from that same equilibrium. The nonlinear shell. One thread.
 class LoadedSkin {
  public:
-  /// Errors: those of PushSkin.
-  static Result<LoadedSkin> Make(const LinkModel& model, const KnownLoads& loads, int refinement = 3);
+  /// `refinement`, `step_mm`: as in PressedSkinOptions. Errors: those of PushSkin.
+  static Result<LoadedSkin> Make(const LinkModel& model, const KnownLoads& loads, int refinement = 3,
+                                 double step_mm = 1);
   LoadedSkin(LoadedSkin&&) noexcept;
   LoadedSkin& operator=(LoadedSkin&&) noexcept;
   ~LoadedSkin();
@@ -72,6 +73,12 @@ class LoadedSkin {
   /// PushSkin.
   Result<std::vector<SkinPushResult>> Push(int marker, std::span<const double> depths_mm,
                                            double patch_diameter_mm);
+  /// The same, as far as equilibria are found: fewer results than depths, and why it ends there.
+  struct PushedAsFar {
+    std::vector<SkinPushResult> results;
+    Result<void> end;
+  };
+  PushedAsFar PushAsFar(int marker, std::span<const double> depths_mm, double patch_diameter_mm);
   /// `indentation_mm`: of the disc, from the surface under these loads; positive. Errors: those of PushSkin.
   Result<SkinStiffness> Stiffness(int marker, double indentation_mm, double patch_diameter_mm);
 

@@ -93,6 +93,7 @@ void AddSkin(const Arguments& app, Selected& selected) {
   push.AddFlag("--json", options->json, "One JSON object");
   push.OnChosen([options, &selected] { selected = [options] { return Push(*options); }; });
   AddSkinStiffness(skin, selected);
+  AddSkinCheck(skin, selected);
 }
 
 }  // namespace taclink::command
