@@ -57,6 +57,7 @@ folder(sensing/markers/track sensing/core sensing/markers/detect sensing/markers
 folder(sensing/shell sensing/core)
 folder(sensing/identification sensing/core sensing/shell)
 folder(sensing/estimation sensing/core sensing/camera sensing/shell)
+folder(sensing/design sensing/core sensing/camera sensing/shell sensing/estimation)
 folder(sensing/contact sensing/core sensing/estimation)
 folder(sensing/pipeline sensing/core sensing/camera sensing/capture sensing/markers/detect sensing/markers/label
        sensing/markers/track sensing/estimation sensing/contact)
@@ -100,8 +101,8 @@ folder(client/cpp/example client/cpp/taclink)
 folder(client/command/cli sensing/core mcap)
 folder(client/command/live sensing/core sensing/acceptance sensing/model sensing/capture sensing/simulation client/cpp/taclink client/command/cli)
 folder(client/command/offline sensing/core sensing/model sensing/camera sensing/capture sensing/markers/detect
-       sensing/markers/label sensing/shell sensing/identification sensing/pipeline sensing/simulation client/cpp/taclink
-       client/command/cli client/command/live)
+       sensing/markers/label sensing/shell sensing/identification sensing/design sensing/pipeline sensing/simulation
+       client/cpp/taclink client/command/cli client/command/live)
 folder(client/command/logs sensing/core sensing/model sensing/camera sensing/capture sensing/contact sensing/pipeline mcap wire
        wire/log client/command/cli)
 folder(bench/tools sensing/core)
