@@ -45,7 +45,8 @@ LiveSkin::LiveSkin(const LinkModel& model, const Scene& scene, std::vector<Conta
       skin_(model, scene_discs_ + kMostBodyParts, {.refinement = scene.refinement}),
       loads_(model, scene, std::move(plans), skin_.mesh()),
       finder_(model, skin_.mesh()),
-      balance_(skin_.Rest()) {
+      balance_(skin_.Rest()),
+      history_(model) {
   loads_.SetFreeSkins(std::move(free_skins));
 }
 
@@ -60,9 +61,17 @@ bool LiveSkin::Begin(double time_s, const SkinNodes& nodes, std::span<const KeyC
   }
   const HandledGoal goal = GoalAt(time_s, {});
   motion_ = {{}, goal.pressure_mpa, goal.joint};
+  BeginHistory(time_s);
   if (!Balance(time_s, motion_, balance_)) return false;
   from_ = to_ = MakeKey(time_s);
   return true;
+}
+
+// The scene keeps no internal forces: those are taken that hold the skin where the scene has it.
+void LiveSkin::BeginHistory(double time_s) {
+  if (!history_.any()) return;
+  const Eigen::VectorXd elastic_n = skin_.InternalForces(balance_.state);
+  history_.Begin(time_s, elastic_n, elastic_n - skin_.Residual(LoadAt(time_s, motion_), balance_));
 }
 
 bool LiveSkin::Evaluate(double time_s, const Handling& wanted, SkinNodes& nodes, SkinTruth& truth) {
@@ -112,7 +121,7 @@ void LiveSkin::PlaceNewDiscs(const SkinLoad& load, SkinBalance& balance) const {
 }
 
 bool LiveSkin::Balance(double time_s, const HandledMotion& motion, SkinBalance guess) {
-  const SkinLoad load = LoadAt(time_s, motion);
+  const SkinLoad load = ElasticLoadAt(time_s, motion);
   PlaceNewDiscs(load, guess);
   is_balance_newest_ = skin_.Balance(load, guess).ok();
   if (is_balance_newest_) balance_ = std::move(guess);
@@ -125,7 +134,7 @@ SkinBalance LiveSkin::Predicted(double from_s, const HandledMotion& from, double
                                 const HandledMotion& to) {
   if (!is_balance_newest_ && !Balance(from_s, from, balance_)) return balance_;
   const auto load_at = [&](double share) {
-    return LoadAt(from_s + share * (to_s - from_s), Between(from, to, share));
+    return ElasticLoadAt(from_s + share * (to_s - from_s), Between(from, to, share));
   };
   // Not from 0 on, where what begins to press with a force is not on yet.
   const SkinLoad before = load_at(kRateShare), after = load_at(2 * kRateShare);
@@ -203,6 +212,7 @@ bool LiveSkin::NextKey(double time_s, const Handling& wanted) {
       return false;
     }
   }
+  if (history_.any()) history_.Advance(time_s, skin_.InternalForces(balance_.state));
   to_ = MakeKey(time_s);
   ReadBack(to_.contacts);
   return true;
@@ -268,6 +278,7 @@ void LiveSkin::ReadBack(const std::vector<TrueContact>& contacts) {
 }
 
 bool LiveSkin::IsAlone(double time_s, const Handling& wanted) const {
+  if (history_.any()) return false;
   const HandledGoal goal = GoalAt(time_s, wanted);
   return !wanted.any() && motion_.bodies.empty() &&
          std::abs(goal.pressure_mpa - motion_.pressure_mpa) < kSameMpa &&
