@@ -1,6 +1,7 @@
 import { Code, ConnectError, createClient, type Client, type Interceptor } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { computed, signal } from "@preact/signals";
+import { AcceptanceService } from "./gen/taclink/v1/acceptance_pb";
 import { OperationsService, Role, type GetCallerResponse } from "./gen/taclink/v1/operations_pb";
 import { PressureService } from "./gen/taclink/v1/pressure_pb";
 import { RecordingService } from "./gen/taclink/v1/recording_pb";
@@ -14,6 +15,7 @@ export class Session {
   readonly tactile: Client<typeof TactileService>;
   readonly recording: Client<typeof RecordingService>;
   readonly operations: Client<typeof OperationsService>;
+  readonly acceptance: Client<typeof AcceptanceService>;
   readonly pressure: Client<typeof PressureService>;
   readonly simulation: Client<typeof SimulationService>;
 
@@ -35,6 +37,7 @@ export class Session {
     this.tactile = createClient(TactileService, transport);
     this.recording = createClient(RecordingService, transport);
     this.operations = createClient(OperationsService, transport);
+    this.acceptance = createClient(AcceptanceService, transport);
     this.pressure = createClient(PressureService, transport);
     this.simulation = createClient(SimulationService, transport);
   }
