@@ -57,6 +57,7 @@ folder(sensing/markers/track sensing/core sensing/markers/detect sensing/markers
 folder(sensing/shell sensing/core)
 folder(sensing/identification sensing/core sensing/shell)
 folder(sensing/estimation sensing/core sensing/camera sensing/shell)
+folder(sensing/design sensing/core sensing/camera sensing/shell sensing/estimation)
 folder(sensing/contact sensing/core sensing/estimation)
 folder(sensing/pipeline sensing/core sensing/camera sensing/capture sensing/markers/detect sensing/markers/label
        sensing/markers/track sensing/estimation sensing/contact)
@@ -68,8 +69,8 @@ folder(wire/log sensing/core mcap wire)
 folder(server/config sensing/core sensing/yaml sensing/pipeline sensing/simulation mcap wire)
 folder(server/process sensing/core server/config)
 folder(server/hub sensing/core wire)
-folder(server/simulation sensing/core sensing/simulation)
 folder(server/pressure sensing/core server/config server/process)
+folder(server/simulation sensing/core sensing/simulation server/config server/pressure)
 folder(server/attitude sensing/core)
 folder(server/link sensing/core sensing/capture server/config server/process server/hub server/pressure server/attitude)
 folder(server/events sensing/core server/config server/process server/hub)
@@ -77,14 +78,14 @@ folder(server/security sensing/core server/config server/process)
 folder(server/acceptance sensing/core sensing/acceptance wire server/hub)
 folder(server/arm sensing/core sensing/capture server/config server/hub server/acceptance server/pressure server/attitude server/link
        server/events server/simulation)
-folder(server/messages wire server/events server/acceptance server/arm)
+folder(server/messages wire server/pressure server/events server/acceptance server/arm)
 folder(server/recording sensing/core mcap wire wire/log server/config server/process server/hub server/arm server/messages)
 folder(server/replay sensing/core sensing/capture mcap wire wire/log server/process server/link server/arm)
 folder(server/listener sensing/core server/process server/security)
 folder(server/rpc/requests sensing/core server/config server/listener server/security)
 folder(server/rpc/streams sensing/core sensing/capture mcap wire wire/log server/process server/hub server/link server/events server/security
        server/arm server/messages server/replay server/rpc/requests)
-folder(server/rpc/services server/process server/acceptance sensing/core sensing/simulation wire server/link server/events server/simulation server/security
+folder(server/rpc/services server/process server/acceptance sensing/core sensing/simulation wire server/pressure server/link server/events server/simulation server/security
        server/arm server/messages server/recording server/replay server/rpc/requests server/rpc/streams)
 folder(server/rpc sensing/core server/listener server/process server/security server/arm server/rpc/requests server/rpc/services)
 folder(server/publish sensing/core wire server/config server/process server/security server/arm server/messages)
@@ -100,8 +101,8 @@ folder(client/cpp/example client/cpp/taclink)
 folder(client/command/cli sensing/core mcap)
 folder(client/command/live sensing/core sensing/acceptance sensing/model sensing/capture sensing/simulation client/cpp/taclink client/command/cli)
 folder(client/command/offline sensing/core sensing/model sensing/camera sensing/capture sensing/markers/detect
-       sensing/markers/label sensing/shell sensing/identification sensing/pipeline sensing/simulation client/cpp/taclink
-       client/command/cli client/command/live)
+       sensing/markers/label sensing/shell sensing/identification sensing/design sensing/pipeline sensing/simulation
+       client/cpp/taclink client/command/cli client/command/live)
 folder(client/command/logs sensing/core sensing/model sensing/camera sensing/capture sensing/contact sensing/pipeline mcap wire
        wire/log client/command/cli)
 folder(bench/tools sensing/core)
@@ -111,9 +112,10 @@ folder(bench/stability sensing/core sensing/model sensing/shell sensing/pipeline
        bench/force)
 folder(bench/thesis sensing/core sensing/capture bench/tools bench/vision)
 folder(bench/whole sensing/core sensing/capture sensing/pipeline sensing/simulation bench/tools bench/vision bench/force)
+folder(bench/acceptance sensing/core sensing/acceptance sensing/pipeline sensing/simulation bench/tools bench/vision)
 folder(bench/server sensing/core sensing/model sensing/capture sensing/simulation client/cpp/taclink bench/vision)
 folder(bench/log sensing/core sensing/model sensing/capture mcap wire wire/log client/cpp/taclink bench/vision bench/server)
-folder(bench/command sensing/core sensing/model sensing/capture client/command/cli bench/vision bench/force bench/stability
+folder(bench/command sensing/core sensing/acceptance sensing/model sensing/capture client/command/cli bench/vision bench/acceptance bench/force bench/stability
        bench/whole bench/server bench/log)
 folder(bench/micro sensing/model sensing/capture sensing/markers/detect sensing/markers/label sensing/markers/track
        sensing/shell sensing/estimation sensing/contact sensing/pipeline sensing/simulation server/config server/process

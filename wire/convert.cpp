@@ -204,6 +204,7 @@ static_assert(static_cast<int>(AcquireReason::kForced) == v1::ACQUIRE_REASON_FOR
 static_assert(static_cast<int>(PressureOrigin::kNone) + 1 == v1::PRESSURE_ORIGIN_NONE);
 static_assert(static_cast<int>(PressureOrigin::kSimulated) + 1 == v1::PRESSURE_ORIGIN_SIMULATED);
 static_assert(static_cast<int>(PressureOrigin::kClient) + 1 == v1::PRESSURE_ORIGIN_CLIENT);
+static_assert(static_cast<int>(PressureOrigin::kRegulator) + 1 == v1::PRESSURE_ORIGIN_REGULATOR);
 
 void Fill(const PressureReport& report, v1::PressureReport& out) {
   out.set_origin(static_cast<v1::PressureOrigin>(static_cast<int>(report.origin) + 1));

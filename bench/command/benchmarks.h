@@ -5,6 +5,7 @@
 namespace taclink::command {
 
 // Each registers one subcommand of taclink-bench with its options.
+void AddBenchAcceptance(const Arguments& bench, Selected& selected);
 void AddBenchAccuracy(const Arguments& bench, Selected& selected);
 void AddBenchLog(const Arguments& bench, Selected& selected);
 void AddBenchServer(const Arguments& bench, Selected& selected);

@@ -8,6 +8,7 @@
 #include "client/cpp/patience.h"
 #include "client/cpp/stream_call.h"
 #include "taclink/v1/operations.grpc.pb.h"
+#include "taclink/v1/pressure.grpc.pb.h"
 #include "taclink/v1/simulation.grpc.pb.h"
 #include "taclink/v1/tactile.grpc.pb.h"
 
@@ -204,6 +205,25 @@ Result<void> Client::MoveSceneJoint(const v1::MoveSceneJointRequest& request, mi
   const auto simulation = v1::SimulationService::NewStub(connection_->channel);
   return WithoutValue(
       Ask(*simulation, &v1::SimulationService::Stub::MoveSceneJoint, request, timeout, connection_->address));
+}
+
+Result<v1::PressureRegulator> Client::SetPressure(const v1::SetPressureRequest& request,
+                                                  milliseconds timeout) {
+  const auto pressure = v1::PressureService::NewStub(connection_->channel);
+  auto response =
+      Ask(*pressure, &v1::PressureService::Stub::SetPressure, request, timeout, connection_->address);
+  if (!response) return response.error();
+  return std::move(*response->mutable_regulator());
+}
+
+Result<v1::PressureRegulator> Client::GetPressure(const std::string& link, milliseconds timeout) {
+  const auto pressure = v1::PressureService::NewStub(connection_->channel);
+  v1::GetPressureRequest request;
+  request.set_link(link);
+  auto response =
+      Ask(*pressure, &v1::PressureService::Stub::GetPressure, request, timeout, connection_->address);
+  if (!response) return response.error();
+  return std::move(*response->mutable_regulator());
 }
 
 Result<void> Client::SetCamera(const v1::SetCameraRequest& request, milliseconds timeout) {

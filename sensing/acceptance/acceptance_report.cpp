@@ -48,7 +48,15 @@ AcceptanceQuantity Describe(std::string id, std::string label, std::string unit,
           .limit = limit};
 }
 
+// Rounding errors are not results.
+double Rounded(double value) {
+  return std::abs(value) < 1e-9 ? 0 : value;
+}
+
 void Judge(AcceptanceQuantity& quantity) {
+  quantity.value = Rounded(quantity.value);
+  if (quantity.low) quantity.low = Rounded(*quantity.low);
+  if (quantity.high) quantity.high = Rounded(*quantity.high);
   if (quantity.loads == 0)
     quantity.verdict = Verdict::kNotMeasured;
   else if (quantity.limit == 0)

@@ -80,7 +80,8 @@ std::string Plot(const std::string& title, const std::string& x_label, const std
       high = {std::max(high.x, p.x), std::max(high.y, p.y)};
     }
   }
-  if (!any) return "";
+  // A single place on the x axis shows nothing that the table does not.
+  if (!any || (!is_diagonal && high.x - low.x < 1e-6 * std::max(1.0, std::abs(high.x)))) return "";
   if (is_diagonal) low = {0, 0}, high = {std::max(high.x, high.y), std::max(high.x, high.y)};
   const Point margin{0.06 * std::max(high.x - low.x, 1e-6), 0.08 * std::max(high.y - low.y, 1e-6)};
   low = {low.x - margin.x, low.y - margin.y};
@@ -165,7 +166,7 @@ std::string PlacePlot(const AcceptanceRecord& record) {
     reference.points.push_back({a.z(), kDegPerRad * std::atan2(a.y(), a.x())});
     measured.points.push_back({b.z(), kDegPerRad * std::atan2(b.y(), b.x())});
   }
-  return Plot("Places on the unrolled skin: reference (blue), measured (orange)", "z, mm", "angle, degrees",
+  return Plot("Places: reference (blue), measured (orange)", "z, mm", "angle, degrees",
               {reference, measured});
 }
 
@@ -240,9 +241,9 @@ std::string AcceptanceHtml(const AcceptanceRecord& record, const AcceptanceRepor
                                      : std::string("not finished");
   page +=
       Text("; %d trials measured, %d skipped, %d open</p>\n", report.measured, report.skipped, report.open);
-  if (!record.model_hash.empty() || !record.calibration_hash.empty())
-    page += "<p>Model " + Escaped(record.model_hash) + ", calibration " + Escaped(record.calibration_hash) +
-            "</p>\n";
+  if (!record.model_hash.empty()) page += "<p>Model file " + Escaped(record.model_hash);
+  if (!record.calibration_hash.empty()) page += ", calibration file " + Escaped(record.calibration_hash);
+  page += record.model_hash.empty() ? "" : "</p>\n";
   page += "<h2>Findings</h2>\n";
   if (report.findings.empty()) page += "<p>None.</p>\n";
   for (const AcceptanceFinding& finding : report.findings)

@@ -47,6 +47,7 @@ enum class PressureOrigin : uint8_t {
   kFile,       ///< a sensor, through a file or pipe
   kSerial,     ///< a sensor on a serial line
   kClient,     ///< a client of the server
+  kRegulator,  ///< the sensor of the regulator that inflates the skin
 };
 
 /// How the pressure of a frame is known.

@@ -338,6 +338,7 @@ double PressureSigma(PressureOrigin origin) {
     case PressureOrigin::kFile:
     case PressureOrigin::kSerial:
     case PressureOrigin::kClient:
+    case PressureOrigin::kRegulator:
       return 5e-5;
     case PressureOrigin::kNone:
     case PressureOrigin::kConstant:

@@ -59,9 +59,7 @@ DiscSkin::DiscSkin(const LinkModel& model, size_t disc_count, const PressedSkinO
       body_(corner_areas_mm2_, Vec3::Zero()),
       factor_(std::make_unique<Factor>(shell_.Pattern())) {
   const RigidContactOptions contact = {
-      .spacing_mm = options.spacing_mm,
-      .stiffness_n_mm3 = options.stiffness * model.material.youngs_modulus_mpa / model.thickness_mm,
-      .sticks = false};
+      .spacing_mm = options.spacing_mm, .stiffness_n_mm3 = WallStiffness({}), .sticks = false};
   const RigidContact of_nothing(shell_, contact);  // its points are those of all
   if (model.tube_outer_radius_mm > 0) {
     tube_ = std::make_unique<RigidContact>(of_nothing);
@@ -97,6 +95,12 @@ RigidBody DiscSkin::BodyOf(const SkinDisc& disc, double depth_mm) const {
   return RigidStamp{foremost, -outward, radius, kRimMm};
 }
 
+// N/mm^3.
+double DiscSkin::WallStiffness(const SkinLoad& load) const {
+  return load.wall_stiffness *
+         (options_.stiffness * model_.material.youngs_modulus_mpa / model_.thickness_mm);
+}
+
 void DiscSkin::Apply(const SkinLoad& load, const SkinBalance& balance) {
   pressure_ = FollowerPressure(load.pressure_mpa);
   loads_ = {&pressure_};
@@ -104,13 +108,18 @@ void DiscSkin::Apply(const SkinLoad& load, const SkinBalance& balance) {
     body_ = BodyForce(corner_areas_mm2_, model_.MassPerArea() * load.specific_force_mps2);
     loads_.push_back(&body_);
   }
-  if (tube_) loads_.push_back(tube_.get());
+  const double stiffness_n_mm3 = WallStiffness(load);
+  if (tube_) {
+    tube_->SetStiffness(stiffness_n_mm3);
+    loads_.push_back(tube_.get());
+  }
   searched_.clear();
   for (size_t i = 0; i < discs_.size(); ++i) {
     const SkinDisc& disc = load.discs[i];
     if (!disc.on) continue;
     const bool searched = disc.force_n && !balance.limited[i];
     discs_[i].SetBody(BodyOf(disc, searched ? balance.depth_mm[i] : disc.depth_mm));
+    discs_[i].SetStiffness(stiffness_n_mm3);
     loads_.push_back(&discs_[i]);
     if (searched) searched_.push_back(i);
   }
@@ -120,6 +129,7 @@ void DiscSkin::Apply(const SkinLoad& load, const SkinBalance& balance) {
 double DiscSkin::Misfit(const SkinLoad& load, const SkinBalance& balance) {
   Apply(load, balance);
   shell_.Gradient(balance.state, loads_, gradient_);
+  if (load.dead_n.size() > 0) gradient_ -= load.dead_n;
   const double unit = ForceUnit(model_);
   double misfit = gradient_.size() > 0 ? gradient_.cwiseAbs().maxCoeff() / (kTolerance * unit) : 0.0;
   excess_.resize(static_cast<Eigen::Index>(searched_.size()));
@@ -134,9 +144,10 @@ double DiscSkin::Misfit(const SkinLoad& load, const SkinBalance& balance) {
   return misfit;
 }
 
-bool DiscSkin::Factorize(const ShellState& state) {
+bool DiscSkin::Factorize(const SkinLoad& load, const ShellState& state) {
   ++factorizations_;
   shell_.Hessian(state, loads_, gradient_, factor_->hessian);
+  if (load.dead_n.size() > 0) gradient_ -= load.dead_n;
   factor_->good = factor_->llt.Factorise(factor_->hessian);
   return factor_->good;
 }
@@ -181,7 +192,7 @@ void DiscSkin::LearnDepths(const SkinLoad& load, const SkinBalance& balance) {
     const size_t i = searched_[static_cast<size_t>(k)];
     by_depth_.col(k) = DepthGradient(i, load.discs[i], balance.depth_mm[i], balance.state);
     stiffness_(k, k) = discs_[i].Summarize(balance.state).area_mm2 * options_.stiffness *
-                       model_.material.youngs_modulus_mpa / model_.thickness_mm;
+                       model_.material.youngs_modulus_mpa / model_.thickness_mm * load.wall_stiffness;
   }
   factor_->llt.Solve(by_depth_, answer_);
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -289,7 +300,7 @@ BalanceSummary DiscSkin::Balance(const SkinLoad& load, SkinBalance& balance) {
       misfit = Misfit(load, balance);
     }
     if (slow) {
-      if (!Factorize(balance.state)) return ended(BalanceStop::kUnstable);
+      if (!Factorize(load, balance.state)) return ended(BalanceStop::kUnstable);
       moved_mm = 0;
       LearnDepths(load, balance);
       taken_.clear();
@@ -309,7 +320,7 @@ BalanceSummary DiscSkin::Balance(const SkinLoad& load, SkinBalance& balance) {
     if (load.discs[i].on && (!load.discs[i].force_n || balance.limited[i]))
       balance.depth_mm[i] = load.discs[i].depth_mm;
   }
-  const bool stable = moved_mm < kNearMm || Factorize(balance.state);
+  const bool stable = moved_mm < kNearMm || Factorize(load, balance.state);
   return ended(stable ? BalanceStop::kConverged : BalanceStop::kUnstable);
 }
 
@@ -349,9 +360,15 @@ std::vector<RigidContact::Summary> DiscSkin::Contacts(const SkinLoad& load, cons
   return contacts;
 }
 
-double DiscSkin::Residual(const SkinLoad& load, const SkinBalance& balance) {
+const Eigen::VectorXd& DiscSkin::Residual(const SkinLoad& load, const SkinBalance& balance) {
   Misfit(load, balance);
-  return gradient_.size() > 0 ? gradient_.cwiseAbs().maxCoeff() : 0.0;
+  return gradient_;
+}
+
+Eigen::VectorXd DiscSkin::InternalForces(const ShellState& state) const {
+  Eigen::VectorXd forces;
+  shell_.Gradient(state, {}, forces);
+  return forces;
 }
 
 }  // namespace taclink

@@ -31,6 +31,10 @@ struct SkinLoad {
   double pressure_mpa = 0;
   std::vector<SkinDisc> discs;
   Vec3 specific_force_mps2 = Vec3::Zero();  ///< gravity less acceleration, link frame; zero: weightless
+  /// Constant forces on the shell's degrees of freedom, N; zero on rotations, where a moment has no
+  /// potential. Empty: none.
+  Eigen::VectorXd dead_n = {};
+  double wall_stiffness = 1;  ///< of the wall under discs and at the tube, times PressedSkinOptions'
 };
 
 /// Depth of a disc that is not there.
@@ -88,8 +92,12 @@ class DiscSkin {
   /// By disc, of a balance; the force's entries are zero where there is none.
   std::vector<RigidContact::Summary> Contacts(const SkinLoad& load, const SkinBalance& balance);
 
-  /// Largest entry of the residual with the discs where the balance has them, N or N mm.
-  double Residual(const SkinLoad& load, const SkinBalance& balance);
+  /// What a state is out of balance by with the discs where it has them, by degree of freedom, N or N mm:
+  /// internal forces less what acts.
+  const Eigen::VectorXd& Residual(const SkinLoad& load, const SkinBalance& balance);
+  /// Forces that the elastic skin exerts, by degree of freedom; in a balance all but rounding of them are on
+  /// translations.
+  Eigen::VectorXd InternalForces(const ShellState& state) const;
 
   const ShellMesh& mesh() const { return mesh_; }
   int factorizations() const { return factorizations_; }
@@ -98,9 +106,10 @@ class DiscSkin {
   struct Factor;
 
   RigidBody BodyOf(const SkinDisc& disc, double depth_mm) const;
+  double WallStiffness(const SkinLoad& load) const;
   void Apply(const SkinLoad& load, const SkinBalance& balance);
   double Misfit(const SkinLoad& load, const SkinBalance& balance);
-  bool Factorize(const ShellState& state);
+  bool Factorize(const SkinLoad& load, const ShellState& state);
   void LearnDepths(const SkinLoad& load, const SkinBalance& balance);
   Eigen::VectorXd DepthGradient(size_t disc, const SkinDisc& place, double depth_mm, const ShellState& state);
   void Solve(const Eigen::VectorXd& forces, const Eigen::VectorXd& disc_forces);

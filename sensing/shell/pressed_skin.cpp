@@ -89,6 +89,11 @@ int PressedSkin::AddBody(const RigidBody& body, bool sticks) {
   return static_cast<int>(bodies_.size()) - 1;
 }
 
+void PressedSkin::RemoveBodies(const ShellState& untouched) {
+  bodies_.clear();
+  state_ = untouched;
+}
+
 RigidContact::Summary PressedSkin::TubeContact() const {
   return tube_ ? tube_->Summarize(state_) : RigidContact::Summary{};
 }

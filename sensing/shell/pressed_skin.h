@@ -67,6 +67,8 @@ class PressedSkin {
   PressSummary Inflate(double pressure_mpa) { return Load({pressure_mpa, known_loads_.specific_force_mps2}); }
   /// A body that does not touch yet. Returns its index.
   int AddBody(const RigidBody& body, bool sticks);
+  /// Takes all bodies away; the skin returns to `untouched`, an equilibrium without them under these loads.
+  void RemoveBodies(const ShellState& untouched);
   /// Moves all bodies in a straight line, together, `by_mm` each by index.
   PressSummary Move(std::span<const Vec3> by_mm);
 

@@ -29,6 +29,8 @@ class RigidContact final : public ElementLoad {
 
   void SetBody(const RigidBody& body);
   const RigidBody& body() const { return body_; }
+  /// Instead of the options'. Of what sticks, only before anything is held.
+  void SetStiffness(double n_mm3) { options_.stiffness_n_mm3 = n_mm3; }
 
   /// Holds what touches where it is, and lets go what does not: call with an equilibrium. True: something
   /// that had been held was let go, so that this is no equilibrium any more.

@@ -2,8 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sensing/shell/linear_shell.h"
@@ -25,28 +27,29 @@ std::string Shown(double value) {
   return text;
 }
 
-Result<void> Check(const LinkModel& model, const SkinPush& push) {
-  if (push.marker < 0 || push.marker >= model.markers.count()) {
+Result<void> CheckLoads(const KnownLoads& loads, int refinement) {
+  if (refinement < 1 || refinement > 8)
+    return Error{ErrorCode::kInvalidArgument, "the refinement must be from 1 to 8"};
+  if (!(std::abs(loads.pressure_mpa) <= kMaxPressureMpa))
+    return Error{ErrorCode::kInvalidArgument, "the pressure must be between -20 and 20 kPa"};
+  if (!(loads.specific_force_mps2.norm() <= kMaxSpecificForceMps2))
+    return Error{ErrorCode::kInvalidArgument, "the specific force must be at most 100 m/s^2"};
+  return {};
+}
+
+Result<void> CheckPlace(const LinkModel& model, int marker, double depth_mm, double patch_diameter_mm) {
+  if (marker < 0 || marker >= model.markers.count()) {
     return Error{ErrorCode::kInvalidArgument, "no such marker; the model has " +
                                                   std::to_string(model.markers.paths) + " paths and " +
                                                   std::to_string(model.markers.rings()) + " rings"};
   }
-  if (!std::isfinite(push.depth_mm) ||
-      !(push.patch_diameter_mm >= 0 && push.patch_diameter_mm <= model.length_mm) || push.refinement < 1 ||
-      push.refinement > 8) {
+  if (!std::isfinite(depth_mm) || !(patch_diameter_mm >= 0 && patch_diameter_mm <= model.length_mm)) {
     return Error{ErrorCode::kInvalidArgument,
-                 "the depth must be finite, the patch no larger than the skin, the refinement from 1 to 8"};
+                 "the depth must be finite, and the patch no larger than the skin"};
   }
-  if (!(std::abs(push.pressure_mpa) <= kMaxPressureMpa)) {
-    return Error{ErrorCode::kInvalidArgument, "the pressure must be between -20 and 20 kPa"};
-  }
-  if (!(push.specific_force_mps2.norm() <= kMaxSpecificForceMps2)) {
-    return Error{ErrorCode::kInvalidArgument, "the specific force must be at most 100 m/s^2"};
-  }
-  const double z = model.markers.rings_z_mm[static_cast<size_t>(model.RingOf(push.marker))];
-  const double room = model.PointAtDepth(0, z, model.thickness_mm).x() - model.tube_outer_radius_mm;
-  if (push.depth_mm > room) {
-    return Error{ErrorCode::kInvalidArgument, "a depth of " + Shown(push.depth_mm) +
+  const double room = RoomBehindMm(model, marker);
+  if (depth_mm > room) {
+    return Error{ErrorCode::kInvalidArgument, "a depth of " + Shown(depth_mm) +
                                                   " mm goes into the tube or beyond the axis; at most " +
                                                   Shown(room) + " mm is possible there"};
   }
@@ -126,51 +129,128 @@ Error NoEquilibrium(const char* where, const PressSummary& summary) {
                                               summary.Text() + "; try a finer mesh or a smaller load"};
 }
 
-Result<SkinPushResult> PushNonlinear(const LinkModel& model, const SkinPush& push) {
-  PressedSkin skin(model, {.refinement = push.refinement});
-  const PressSummary inflated = skin.Load({push.pressure_mpa, push.specific_force_mps2});
-  if (!inflated.ok()) {
-    const bool is_weightless = push.specific_force_mps2.isZero(0);
-    return NoEquilibrium(is_weightless ? "inflating" : "applying pressure and weight", inflated);
-  }
-  const ShellMesh& mesh = skin.mesh();
-  const auto center = static_cast<size_t>(mesh.NodeOfMarker(model, push.marker));
-  const Vec3 axis = mesh.normals[center];
-  SkinPushResult result;
-  result.inflation_mm = (skin.state().mids_mm[center] - mesh.mid_mm[center]).dot(axis);
-  // From just outside the inflated skin; a flat disc meets a doubly curved one at its highest point.
-  double highest = result.inflation_mm;
-  for (const int node : NodesUnderDisc(mesh, static_cast<int>(center), axis, push.patch_diameter_mm / 2)) {
-    const auto i = static_cast<size_t>(node);
-    highest = std::max(highest, axis.dot(skin.state().mids_mm[i] - mesh.mid_mm[center]));
-  }
-  const double start = highest + kStartMm;
-  const double way = start + push.depth_mm;
-  if (way > 0) {
-    const Vec3 face = mesh.mid_mm[center] + (model.thickness_mm / 2 + start) * axis;
-    const double radius = std::max(push.patch_diameter_mm / 2, kRimMm);
-    skin.AddBody(RigidStamp{face, -axis, radius, kRimMm}, false);
-    const Vec3 by = -way * axis;
-    const PressSummary pushed = skin.Move({&by, 1});
-    if (!pushed.ok()) return NoEquilibrium("pushing", pushed);
-    const auto contact = skin.ContactOf(0);
-    result.force_n = -contact.force_n.dot(axis);
-    result.nodes_in_contact = contact.points;
-    result.indentation_mm = contact.penetration_mm;
-    result.solution = pushed.Text();
-  }
-  return result;
-}
+constexpr double kOnsetBegin = 0.1, kOnsetEnd = 0.2;  // of the thickness; see SkinStiffness
 
 }  // namespace
 
+double RoomBehindMm(const LinkModel& model, int marker) {
+  const double z = model.markers.rings_z_mm[static_cast<size_t>(model.RingOf(marker))];
+  return model.PointAtDepth(0, z, model.thickness_mm).x() - model.tube_outer_radius_mm;
+}
+
+LoadedSkin::LoadedSkin(const LinkModel& model, std::unique_ptr<PressedSkin> skin)
+    : model_(model), skin_(std::move(skin)), untouched_(skin_->state()) {}
+LoadedSkin::LoadedSkin(LoadedSkin&&) noexcept = default;
+LoadedSkin& LoadedSkin::operator=(LoadedSkin&&) noexcept = default;
+LoadedSkin::~LoadedSkin() = default;
+
+Result<LoadedSkin> LoadedSkin::Make(const LinkModel& model, const KnownLoads& loads, int refinement,
+                                    double step_mm) {
+  if (auto good = CheckLoads(loads, refinement); !good) return good.error();
+  auto skin =
+      std::make_unique<PressedSkin>(model, PressedSkinOptions{.refinement = refinement, .step_mm = step_mm});
+  const PressSummary inflated = skin->Load(loads);
+  if (!inflated.ok()) {
+    const bool is_weightless = loads.specific_force_mps2.isZero(0);
+    return NoEquilibrium(is_weightless ? "inflating" : "applying pressure and weight", inflated);
+  }
+  return LoadedSkin(model, std::move(skin));
+}
+
+double LoadedSkin::InflationMm(int marker) const {
+  const ShellMesh& mesh = skin_->mesh();
+  const auto center = static_cast<size_t>(mesh.NodeOfMarker(model_, marker));
+  return (untouched_.mids_mm[center] - mesh.mid_mm[center]).dot(mesh.normals[center]);
+}
+
+Result<std::vector<SkinPushResult>> LoadedSkin::Push(int marker, std::span<const double> depths_mm,
+                                                     double patch_diameter_mm) {
+  PushedAsFar pushed = PushAsFar(marker, depths_mm, patch_diameter_mm);
+  if (!pushed.end) return pushed.end.error();
+  return std::move(pushed.results);
+}
+
+LoadedSkin::PushedAsFar LoadedSkin::PushAsFar(int marker, std::span<const double> depths_mm,
+                                              double patch_diameter_mm) {
+  for (const double depth_mm : depths_mm) {
+    if (auto good = CheckPlace(model_, marker, depth_mm, patch_diameter_mm); !good) return {{}, good};
+  }
+  skin_->RemoveBodies(untouched_);
+  const ShellMesh& mesh = skin_->mesh();
+  const auto center = static_cast<size_t>(mesh.NodeOfMarker(model_, marker));
+  const Vec3 axis = mesh.normals[center];
+  const double inflation_mm = InflationMm(marker);
+  // From just outside the inflated skin; a flat disc meets a doubly curved one at its highest point.
+  double highest = inflation_mm;
+  for (const int node : NodesUnderDisc(mesh, static_cast<int>(center), axis, patch_diameter_mm / 2)) {
+    const auto i = static_cast<size_t>(node);
+    highest = std::max(highest, axis.dot(untouched_.mids_mm[i] - mesh.mid_mm[center]));
+  }
+  double height = highest + kStartMm;
+  const double radius = std::max(patch_diameter_mm / 2, kRimMm);
+  const Vec3 face = mesh.mid_mm[center] + (model_.thickness_mm / 2 + height) * axis;
+  skin_->AddBody(RigidStamp{face, -axis, radius, kRimMm}, false);
+  PushedAsFar all;
+  for (const double depth_mm : depths_mm) {
+    SkinPushResult result;
+    result.inflation_mm = inflation_mm;
+    if (height + depth_mm > 0) {  // else it does not come as far as the skin
+      const Vec3 by = -(height + depth_mm) * axis;
+      const PressSummary pushed = skin_->Move({&by, 1});
+      if (!pushed.ok()) {
+        all.end = NoEquilibrium("pushing", pushed);
+        break;
+      }
+      height = -depth_mm;
+      const auto contact = skin_->ContactOf(0);
+      result.force_n = -contact.force_n.dot(axis);
+      result.nodes_in_contact = contact.points;
+      result.indentation_mm = contact.penetration_mm;
+      result.solution = pushed.Text();
+    }
+    all.results.push_back(std::move(result));
+  }
+  return all;
+}
+
+Result<SkinStiffness> LoadedSkin::Stiffness(int marker, double indentation_mm, double patch_diameter_mm) {
+  if (auto good = CheckPlace(model_, marker, 0, patch_diameter_mm); !good) return good.error();
+  if (!(indentation_mm > 0)) return Error{ErrorCode::kInvalidArgument, "the indentation must be positive"};
+  const double inflation_mm = InflationMm(marker);
+  const double begin_mm = kOnsetBegin * model_.thickness_mm, end_mm = kOnsetEnd * model_.thickness_mm;
+  std::array<double, 3> depths_mm = {begin_mm, end_mm, indentation_mm};
+  std::ranges::sort(depths_mm);
+  std::array<double, 3> from_uninflated_mm = depths_mm;
+  for (double& depth_mm : from_uninflated_mm) depth_mm -= inflation_mm;
+  const auto pushed = Push(marker, from_uninflated_mm, patch_diameter_mm);
+  if (!pushed) return pushed.error();
+  const auto force_at = [&](double depth_mm) {
+    const auto found = std::ranges::find(depths_mm, depth_mm);
+    return (*pushed)[static_cast<size_t>(found - depths_mm.begin())].force_n;
+  };
+  const double force_n = force_at(indentation_mm);
+  return SkinStiffness{.inflation_mm = inflation_mm,
+                       .force_n = force_n,
+                       .secant_n_per_mm = force_n / indentation_mm,
+                       .onset_n_per_mm = (force_at(end_mm) - force_at(begin_mm)) / (end_mm - begin_mm)};
+}
+
 Result<SkinPushResult> PushSkin(const LinkModel& model, const SkinPush& push) {
-  if (auto good = Check(model, push); !good) return good.error();
+  const KnownLoads loads{push.pressure_mpa, push.specific_force_mps2};
+  if (auto good = CheckPlace(model, push.marker, push.depth_mm, push.patch_diameter_mm); !good)
+    return good.error();
+  if (auto good = CheckLoads(loads, push.refinement); !good) return good.error();
   if (push.force_model == ForceModel::kLinear) return PushLinear(model, push);
-  if (push.force_model == ForceModel::kNonlinear) return PushNonlinear(model, push);
-  return Error{
-      ErrorCode::kUnsupported,
-      std::string("a push is solved with force model linear or nonlinear, not ") + Name(push.force_model)};
+  if (push.force_model != ForceModel::kNonlinear) {
+    return Error{
+        ErrorCode::kUnsupported,
+        std::string("a push is solved with force model linear or nonlinear, not ") + Name(push.force_model)};
+  }
+  auto skin = LoadedSkin::Make(model, loads, push.refinement);
+  if (!skin) return skin.error();
+  const auto pushed = skin->Push(push.marker, {&push.depth_mm, 1}, push.patch_diameter_mm);
+  if (!pushed) return pushed.error();
+  return pushed->front();
 }
 
 }  // namespace taclink

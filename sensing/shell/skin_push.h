@@ -1,11 +1,16 @@
 #pragma once
 
+#include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "sensing/core/contact.h"
 #include "sensing/core/geometry.h"
+#include "sensing/core/known_loads.h"
 #include "sensing/core/link_model.h"
 #include "sensing/core/result.h"
+#include "sensing/shell/nonlinear_shell.h"
 
 namespace taclink {
 
@@ -36,5 +41,57 @@ struct SkinPushResult {
 /// Errors: kInvalidArgument (no such marker, not finite, deeper than the tube lets the skin go), kUnsupported
 /// (another force model), kFailedPrecondition (no equilibrium was found: how far it went and why it stopped).
 Result<SkinPushResult> PushSkin(const LinkModel& model, const SkinPush& push);
+
+/// How stiff a skin is against a flat disc, from where the disc begins to touch it.
+struct SkinStiffness {
+  double inflation_mm = 0;     ///< as in SkinPushResult
+  double force_n = 0;          ///< at the indentation that was asked for
+  double secant_n_per_mm = 0;  ///< that force over that indentation
+  /// Slope of the force over the indentation from 0.1 to 0.2 of the thickness: the disc bears with its whole
+  /// face, and the dent is still shallow.
+  double onset_n_per_mm = 0;
+};
+
+class PressedSkin;
+
+/// A skin in equilibrium under pressure and weight, against which discs are pressed one after another; each
+/// disc begins from that same equilibrium. The nonlinear shell. One thread.
+class LoadedSkin {
+ public:
+  /// `refinement`, `step_mm`: as in PressedSkinOptions. Errors: those of PushSkin.
+  static Result<LoadedSkin> Make(const LinkModel& model, const KnownLoads& loads, int refinement = 3,
+                                 double step_mm = 1);
+  LoadedSkin(LoadedSkin&&) noexcept;
+  LoadedSkin& operator=(LoadedSkin&&) noexcept;
+  ~LoadedSkin();
+
+  /// As in SkinPushResult.
+  double InflationMm(int marker) const;
+  const PressedSkin& skin() const { return *skin_; }
+
+  /// To each depth in turn, rising, from the uninflated radius (SkinPush::depth_mm). Errors: those of
+  /// PushSkin.
+  Result<std::vector<SkinPushResult>> Push(int marker, std::span<const double> depths_mm,
+                                           double patch_diameter_mm);
+  /// The same, as far as equilibria are found: fewer results than depths, and why it ends there.
+  struct PushedAsFar {
+    std::vector<SkinPushResult> results;
+    Result<void> end;
+  };
+  PushedAsFar PushAsFar(int marker, std::span<const double> depths_mm, double patch_diameter_mm);
+  /// `indentation_mm`: of the disc, from the surface under these loads; positive. Errors: those of PushSkin.
+  Result<SkinStiffness> Stiffness(int marker, double indentation_mm, double patch_diameter_mm);
+
+ private:
+  LoadedSkin(const LinkModel& model, std::unique_ptr<PressedSkin> skin);
+
+  LinkModel model_;
+  std::unique_ptr<PressedSkin> skin_;
+  ShellState untouched_;
+};
+
+/// The deepest that a disc can be asked to go at a marker, from the uninflated radius: to the tube, or to the
+/// axis where there is no tube, mm.
+double RoomBehindMm(const LinkModel& model, int marker);
 
 }  // namespace taclink

@@ -34,6 +34,7 @@ struct PressedBody {
 struct Handling {
   std::vector<PressedBody> bodies = {};
   std::optional<double> pressure_mpa = {};  ///< none: the scene's
+  double pressure_mpaps = 0;                ///< how fast pressure_mpa changes, MPa/s; 0: a pressure to go to
   std::optional<double> joint_rad = {};     ///< of the scene's swing; none: as the scene swings
 
   bool any() const { return !bodies.empty() || pressure_mpa || joint_rad; }

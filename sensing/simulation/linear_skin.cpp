@@ -24,6 +24,10 @@ Eigen::VectorXd Flat(const ShellDisplacement& d) {
 
 Result<std::unique_ptr<SimulatedSkin>> LinearSkin::Make(const LinkModel& model, const Scene& scene,
                                                         std::shared_ptr<const LinearShell> shell) {
+  if (model.relaxation.any())
+    return Error{ErrorCode::kInvalidArgument,
+                 "scene '" + scene.name + "': the linear skin does not creep, and model '" + model.name +
+                     "' has skin.material.relaxation; use 'skin: nonlinear'"};
   auto plans = PlanContacts(model, scene);
   if (!plans) return plans.error();
   std::vector<SkinContact> contacts;

@@ -24,8 +24,8 @@ inline constexpr int kSimulatedRefinement = 3;
 /// construction; a moment then costs only sums. A contact is an even load over its patch.
 class LinearSkin final : public SimulatedSkin {
  public:
-  /// Errors: those of SimulatedSkin::Make. `shell` of that model may be shared by several scenes; null: one
-  /// of kSimulatedRefinement.
+  /// Errors: those of SimulatedSkin::Make; kInvalidArgument (a model that creeps). `shell` of that model may
+  /// be shared by several scenes; null: one of kSimulatedRefinement.
   static Result<std::unique_ptr<SimulatedSkin>> Make(const LinkModel& model, const Scene& scene,
                                                      std::shared_ptr<const LinearShell> shell = nullptr);
 

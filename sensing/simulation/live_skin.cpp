@@ -27,6 +27,14 @@ T Mixed(const T& a, const T& b, double share) {
   return a + share * (b - a);
 }
 
+// A key lies ahead of the time for which the pressure is given. A pressure that changes, such as that of a
+// regulator, is continued to the key; otherwise the skin would follow it late.
+Handling Ahead(Handling wanted, double by_s) {
+  if (wanted.pressure_mpa)
+    wanted.pressure_mpa = std::max(0.0, *wanted.pressure_mpa + by_s * wanted.pressure_mpaps);
+  return wanted;
+}
+
 }  // namespace
 
 LiveSkin::LiveSkin(const LinkModel& model, const Scene& scene, std::vector<ContactPlan> plans,
@@ -37,7 +45,8 @@ LiveSkin::LiveSkin(const LinkModel& model, const Scene& scene, std::vector<Conta
       skin_(model, scene_discs_ + kMostBodyParts, {.refinement = scene.refinement}),
       loads_(model, scene, std::move(plans), skin_.mesh()),
       finder_(model, skin_.mesh()),
-      balance_(skin_.Rest()) {
+      balance_(skin_.Rest()),
+      history_(model) {
   loads_.SetFreeSkins(std::move(free_skins));
 }
 
@@ -52,16 +61,24 @@ bool LiveSkin::Begin(double time_s, const SkinNodes& nodes, std::span<const KeyC
   }
   const HandledGoal goal = GoalAt(time_s, {});
   motion_ = {{}, goal.pressure_mpa, goal.joint};
+  BeginHistory(time_s);
   if (!Balance(time_s, motion_, balance_)) return false;
   from_ = to_ = MakeKey(time_s);
   return true;
+}
+
+// The scene keeps no internal forces: those are taken that hold the skin where the scene has it.
+void LiveSkin::BeginHistory(double time_s) {
+  if (!history_.any()) return;
+  const Eigen::VectorXd elastic_n = skin_.InternalForces(balance_.state);
+  history_.Begin(time_s, elastic_n, elastic_n - skin_.Residual(LoadAt(time_s, motion_), balance_));
 }
 
 bool LiveSkin::Evaluate(double time_s, const Handling& wanted, SkinNodes& nodes, SkinTruth& truth) {
   while (to_.time_s < time_s) {
     // A late caller gets one longer span rather than many.
     const double next_s = std::max(to_.time_s + kKeySpanS, time_s);
-    if (!NextKey(next_s, wanted)) return false;
+    if (!NextKey(next_s, Ahead(wanted, next_s - time_s))) return false;
   }
   if (IsAlone(to_.time_s, wanted)) return false;
   Interpolate(time_s, nodes, truth);
@@ -104,7 +121,7 @@ void LiveSkin::PlaceNewDiscs(const SkinLoad& load, SkinBalance& balance) const {
 }
 
 bool LiveSkin::Balance(double time_s, const HandledMotion& motion, SkinBalance guess) {
-  const SkinLoad load = LoadAt(time_s, motion);
+  const SkinLoad load = ElasticLoadAt(time_s, motion);
   PlaceNewDiscs(load, guess);
   is_balance_newest_ = skin_.Balance(load, guess).ok();
   if (is_balance_newest_) balance_ = std::move(guess);
@@ -117,7 +134,7 @@ SkinBalance LiveSkin::Predicted(double from_s, const HandledMotion& from, double
                                 const HandledMotion& to) {
   if (!is_balance_newest_ && !Balance(from_s, from, balance_)) return balance_;
   const auto load_at = [&](double share) {
-    return LoadAt(from_s + share * (to_s - from_s), Between(from, to, share));
+    return ElasticLoadAt(from_s + share * (to_s - from_s), Between(from, to, share));
   };
   // Not from 0 on, where what begins to press with a force is not on yet.
   const SkinLoad before = load_at(kRateShare), after = load_at(2 * kRateShare);
@@ -140,19 +157,21 @@ SkinBalance LiveSkin::Predicted(double from_s, const HandledMotion& from, double
   return predicted;
 }
 
-// Goes on as far as the effort that is left allows. Returns the share of the way where balance_ is.
-double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to) {
+// Goes on as far as so many factorizations allow, in steps that begin with `step`. Returns the share of the
+// way where balance_ is.
+double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to,
+                       int most_factorizations, double& step) {
   const int before = skin_.factorizations();
   const auto time_at = [&](double share) { return from_s + share * (to_s - from_s); };
   double reached = 0;
-  while (reached < 1 && skin_.factorizations() - before < effort_) {
-    const double next = std::min(reached + step_, 1.0);
+  while (reached < 1 && skin_.factorizations() - before < most_factorizations) {
+    const double next = std::min(reached + step, 1.0);
     const HandledMotion here = Between(from, to, reached), there = Between(from, to, next);
     if (Balance(time_at(next), there, Predicted(time_at(reached), here, time_at(next), there))) {
       reached = next;
-      step_ = std::min(kStepGrowth * step_, 1.0);
-    } else if (step_ > kLeastStep) {
-      step_ /= 2;
+      step = std::min(kStepGrowth * step, 1.0);
+    } else if (step > kLeastStep) {
+      step /= 2;
     } else {
       break;
     }
@@ -160,8 +179,9 @@ double LiveSkin::Reach(double from_s, const HandledMotion& from, double to_s, co
   return reached;
 }
 
-// Bodies that can't go on at their speed go on slower or stay where they are; where that has no equilibrium
-// either, the user lets go of all.
+// Bodies that can't go on at their speed go on slower or stay where they are, while the pressure goes on
+// without them: that of a regulator does not wait for a body. Where that has no equilibrium either, the user
+// lets go of all.
 bool LiveSkin::NextKey(double time_s, const Handling& wanted) {
   from_ = std::move(to_);
   RemoveBodies();
@@ -172,11 +192,19 @@ bool LiveSkin::NextKey(double time_s, const Handling& wanted) {
   effort_ = std::min(effort_ + kFactorizationsPerKey, kMostSaved);
   const bool tries = effort_ > 0;
   const int spent_before = skin_.factorizations();
-  const double reached = Reach(from_.time_s, before, time_s, motion_);
-  effort_ -= skin_.factorizations() - spent_before;
+  const double reached = Reach(from_.time_s, before, time_s, motion_, effort_, step_);
   if (tries) trouble_.clear();
   if (reached < 1) {
-    motion_ = Between(before, motion_, reached);
+    const HandledMotion here = Between(before, motion_, reached);
+    HandledMotion inflated = here;
+    inflated.pressure_mpa = motion_.pressure_mpa;
+    double step = 1, share = 0;
+    if (here.pressure_mpa != inflated.pressure_mpa)
+      share = Reach(from_.time_s + reached * span_s, here, time_s, inflated, kFactorizationsPerKey, step);
+    motion_ = Between(here, inflated, share);
+  }
+  effort_ -= skin_.factorizations() - spent_before;
+  if (reached < 1) {
     if (tries && reached == 0 && step_ <= kLeastStep)
       trouble_ = "what presses stays where it is: the skin has no equilibrium further on, it would snap";
     if (!Balance(time_s, motion_, balance_)) {
@@ -184,6 +212,7 @@ bool LiveSkin::NextKey(double time_s, const Handling& wanted) {
       return false;
     }
   }
+  if (history_.any()) history_.Advance(time_s, skin_.InternalForces(balance_.state));
   to_ = MakeKey(time_s);
   ReadBack(to_.contacts);
   return true;
@@ -249,6 +278,7 @@ void LiveSkin::ReadBack(const std::vector<TrueContact>& contacts) {
 }
 
 bool LiveSkin::IsAlone(double time_s, const Handling& wanted) const {
+  if (history_.any()) return false;
   const HandledGoal goal = GoalAt(time_s, wanted);
   return !wanted.any() && motion_.bodies.empty() &&
          std::abs(goal.pressure_mpa - motion_.pressure_mpa) < kSameMpa &&

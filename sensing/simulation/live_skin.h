@@ -8,14 +8,16 @@
 #include "sensing/simulation/handled_motion.h"
 #include "sensing/simulation/played_scene.h"
 #include "sensing/simulation/scene_loads.h"
+#include "sensing/simulation/skin_history.h"
 #include "sensing/simulation/skin_truth.h"
 #include "sensing/simulation/skin_writer.h"
 
 namespace taclink {
 
 /// A skin under what its scene does and what a user does to it besides, solved while it is played: an
-/// equilibrium every kKeySpanS, one ahead of the time that is asked for, and straight lines between them. One
-/// thread.
+/// equilibrium every kKeySpanS, one ahead of the time that is asked for, and straight lines between them. A
+/// skin that creeps keeps its history from key to key; it never goes back to its scene, whose history is
+/// another. One thread.
 class LiveSkin {
  public:
   static constexpr double kKeySpanS = 0.1;
@@ -46,10 +48,15 @@ class LiveSkin {
   double SceneTime(double time_s) const { return scene_.SceneTime(time_s); }
   HandledGoal GoalAt(double time_s, const Handling& wanted) const;
   SkinLoad LoadAt(double time_s, const HandledMotion& motion) const;
+  SkinLoad ElasticLoadAt(double time_s, const HandledMotion& motion) const {
+    return history_.ElasticLoad(LoadAt(time_s, motion), time_s);
+  }
+  void BeginHistory(double time_s);
   bool Balance(double time_s, const HandledMotion& motion, SkinBalance guess);
   void PlaceNewDiscs(const SkinLoad& load, SkinBalance& balance) const;
   SkinBalance Predicted(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to);
-  double Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to);
+  double Reach(double from_s, const HandledMotion& from, double to_s, const HandledMotion& to,
+               int most_factorizations, double& step);
   bool NextKey(double time_s, const Handling& wanted);
   void AddBodies(const std::vector<PressedBody>& wanted);
   void RemoveBodies();
@@ -70,6 +77,7 @@ class LiveSkin {
   SkinBalance balance_;
   bool is_balance_newest_ = false;  // of what skin_ has solved, or tried to
   HandledMotion motion_;
+  SkinHistory history_;
   double step_ = 1;  // of the way to a key, that a try for the next one takes
   int effort_ = 0;   // factorizations that the user's bodies may take now; negative: they wait
   Key from_, to_;

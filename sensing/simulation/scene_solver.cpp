@@ -35,13 +35,6 @@ bool Same(const SkinDisc& a, const SkinDisc& b) {
          std::abs(a.force_n.value_or(0) - b.force_n.value_or(0)) < kSame;
 }
 
-bool Same(const SkinLoad& a, const SkinLoad& b) {
-  bool same = std::abs(a.pressure_mpa - b.pressure_mpa) < 1e-12 &&
-              (a.specific_force_mps2 - b.specific_force_mps2).norm() < 1e-6;
-  for (size_t i = 0; i < a.discs.size(); ++i) same = same && Same(a.discs[i], b.discs[i]);
-  return same;
-}
-
 // What grows from nothing goes by `share`, what vanishes by the rest of it.
 SkinLoad Blend(const SkinLoad& from, const SkinLoad& to, const std::vector<double>& touching, double share) {
   SkinLoad load = to;
@@ -65,6 +58,13 @@ SkinLoad Blend(const SkinLoad& from, const SkinLoad& to, const std::vector<doubl
 
 }  // namespace
 
+bool SceneSolver::IsSame(const SkinLoad& a, const SkinLoad& b) {
+  bool same = std::abs(a.pressure_mpa - b.pressure_mpa) < 1e-12 &&
+              (a.specific_force_mps2 - b.specific_force_mps2).norm() < 1e-6;
+  for (size_t i = 0; i < a.discs.size(); ++i) same = same && Same(a.discs[i], b.discs[i]);
+  return same;
+}
+
 SceneSolver::SceneSolver(const LinkModel& model, const Scene& scene, std::vector<ContactPlan> plans,
                          const SceneTolerance& tolerance, SceneProgress progress)
     : model_(model),
@@ -73,11 +73,13 @@ SceneSolver::SceneSolver(const LinkModel& model, const Scene& scene, std::vector
       progress_(std::move(progress)),
       skin_(model, scene.contacts.size(), {.refinement = scene.refinement, .spacing_mm = SpacingMm(scene)}),
       loads_(model, scene, std::move(plans), skin_.mesh()),
+      history_(model),
       rest_(skin_.Rest().state),
       greatest_n_(scene.contacts.size(), 0) {}
 
 Result<SolvedScene> SceneSolver::Solve() {
   if (auto solved = SolveFreeSkins(); !solved) return solved.error();
+  if (history_.any()) return SolveCreeping();
   SolvedScene solved;
   for (const ScenePart& part : loads_.parts()) {
     auto first = Begin(solved.parts.empty() ? nullptr : &solved.parts.back(), part);
@@ -119,7 +121,7 @@ Result<SkinKey> SceneSolver::Begin(const PlayedPart* before, const ScenePart& pa
     balance = BalanceOf(before->keys.back(), 0);
   }
   const SkinLoad to = loads_.At(part, part.begin_s);
-  if (!Same(from, to)) {
+  if (!IsSame(from, to)) {
     auto reached = Jump(from, to, std::move(balance), part.begin_s);
     if (!reached) return reached.error();
     balance = std::move(*reached);
@@ -226,7 +228,8 @@ Result<void> SceneSolver::Refine(const ScenePart& part, const SkinKey& from, con
 
 Result<void> SceneSolver::CheckLoop(const SolvedScene& solved) const {
   const PlayedPart &first = solved.parts.front(), &last = solved.parts.back();
-  if (!scene_.loop || !Same(loads_.At(first.part, first.part.begin_s), loads_.At(last.part, last.part.end_s)))
+  if (!scene_.loop ||
+      !IsSame(loads_.At(first.part, first.part.begin_s), loads_.At(last.part, last.part.end_s)))
     return {};
   if (MarkerError(first.keys.front().place, last.keys.back().place) < tolerance_.marker_mm) return {};
   return Refusal(scene_.duration_s, "the skin does not come back to where it began");
@@ -250,9 +253,9 @@ bool SceneSolver::SolveAt(const ScenePart& part, double time_s, SkinBalance& bal
 // snapped since and is elsewhere.
 bool SceneSolver::Recall(const Around& around, double time_s, const SkinBalance& guess, SkinKey& key) const {
   for (const auto& [solved, solved_key] : solved_) {
-    if (!Same(solved.now, around.now)) continue;
-    const bool forwards = Same(solved.before, around.before) && Same(solved.after, around.after);
-    const bool backwards = Same(solved.before, around.after) && Same(solved.after, around.before);
+    if (!IsSame(solved.now, around.now)) continue;
+    const bool forwards = IsSame(solved.before, around.before) && IsSame(solved.after, around.after);
+    const bool backwards = IsSame(solved.before, around.after) && IsSame(solved.after, around.before);
     if (!forwards && !backwards) continue;
     if (MarkerError(PlaceOf(guess), solved_key.place) > kRecallMm) continue;
     key = solved_key;

@@ -9,6 +9,7 @@
 #include "sensing/simulation/played_scene.h"
 #include "sensing/simulation/scene.h"
 #include "sensing/simulation/simulated_skin.h"
+#include "sensing/simulation/skin_history.h"
 
 namespace taclink {
 
@@ -26,7 +27,9 @@ struct SolvedScene {
 };
 
 /// Solves the equilibria along a scene: keys are set where its inputs have kinks, and halfway between keys
-/// until what would be played there is what is solved. Deterministic. Errors: kFailedPrecondition (no
+/// until what would be played there is what is solved. A skin that creeps (LinkModel::relaxation) is instead
+/// followed in steps of time, from one on which the loads of the scene's beginning have acted for long; of a
+/// loop, each time anew. Deterministic. Errors: kFailedPrecondition (no
 /// equilibrium, or the skin snaps; with the contact's file and line and the time).
 class SceneSolver {
  public:
@@ -51,6 +54,7 @@ class SceneSolver {
     double either_side_s = 0;
   };
 
+  static bool IsSame(const SkinLoad& a, const SkinLoad& b);
   Result<void> SolveFreeSkins();
   Result<SkinKey> Begin(const PlayedPart* before, const ScenePart& part);
   Result<SkinBalance> Jump(const SkinLoad& from, const SkinLoad& to, SkinBalance balance, double time_s);
@@ -59,6 +63,12 @@ class SceneSolver {
   Result<void> Reach(const ScenePart& part, double time_s, Keys& keys);
   Result<void> Refine(const ScenePart& part, const SkinKey& from, const SkinKey& to, Keys& keys);
   Result<void> CheckLoop(const SolvedScene& solved) const;
+
+  Result<SolvedScene> SolveCreeping();
+  Result<SkinBalance> BeginCreeping(const PlayedPart* before, const ScenePart& part, SkinBalance balance);
+  Result<void> CreepThrough(PlayedPart& part, SkinBalance& balance);
+  bool CreepTo(const PlayedPart& part, double time_s, SkinBalance& balance);
+  SkinKey MakeCreepingKey(const ScenePart& part, double time_s, const SkinBalance& balance);
 
   SkinBalance BalanceBetween(const SkinKey& from, const SkinKey& to, double time_s) const;
   SkinBalance FromPlace(const Eigen::VectorXf& place) const;
@@ -81,6 +91,7 @@ class SceneSolver {
   SceneProgress progress_;
   DiscSkin skin_;
   SceneLoads loads_;
+  SkinHistory history_;
   ShellState rest_;
   std::vector<float> greatest_n_;  // force, by contact
   std::vector<std::pair<Around, SkinKey>> solved_;

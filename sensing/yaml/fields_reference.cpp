@@ -9,8 +9,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // The first that fits counts.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kUnits = {{{"_per_unit", ""},
+constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kUnits = {{{"_per_unit", ""},
                                                                                    {"_mm_s", "mm/s"},
+                                                                                   {"_kpa_s", "kPa/s"},
+                                                                                   {"_per_s", "1/s"},
                                                                                    {"_100us", "100 µs"},
                                                                                    {"_deg", "degrees"},
                                                                                    {"_kpa", "kPa"},

@@ -5,6 +5,7 @@
 #include "sensing/core/read_file.h"
 #include "sensing/core/similar_skin.h"
 #include "server/arm/link_names.h"
+#include "server/pressure/pressure_controller.h"
 
 namespace taclink::server {
 namespace {
@@ -22,6 +23,15 @@ std::unique_ptr<AcceptanceStore> MakeAcceptances(const std::vector<LinkDescripti
     };
   }
   return std::make_unique<AcceptanceStore>(std::move(accepted), folder, clock);
+}
+
+// Not accepted: the server closed the valve of its own accord.
+Operation ToOperation(const PressureTrip& trip) {
+  Operation operation{.who = "server", .accepted = false, .outcome = trip.text, .values = {}};
+  const double scale = TripUnitInSi(trip.cause);
+  if (trip.measured) operation.values["measured"] = scale * *trip.measured;
+  if (trip.limit) operation.values["limit"] = scale * *trip.limit;
+  return operation;
 }
 
 }  // namespace
@@ -59,6 +69,13 @@ Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, C
   }
   acceptances_ = MakeAcceptances(links_, options.acceptance_folder, clock);
   events_ = std::make_unique<EventEngine>(hub_, std::move(watched), options.events, clock);
+  for (size_t link = 0; link < links_.size(); ++link) {
+    const auto controller = regulator(link);
+    if (!controller) continue;
+    (*controller)->OnTrip([this, link](const PressureTrip& trip) {
+      events_->Post(EventKind::kPressureTrip, link, ToOperation(trip));
+    });
+  }
 }
 
 std::vector<std::string> Arm::link_names() const {
@@ -89,6 +106,9 @@ void Arm::Start() {
 }
 
 void Arm::Stop() {
+  // Before anything that may take long: skins are vented while there is somebody to say so.
+  for (size_t link = 0; link < links_.size(); ++link)
+    if (const auto controller = regulator(link)) (*controller)->Stop();
   watchdog_.Stop();
   for (const auto& worker : workers_) worker->RequestStop();  // all at once, then wait for each
   for (const auto& worker : workers_) worker->Stop();

@@ -76,6 +76,8 @@ class Arm {
   const LinkSupervisor& worker(size_t link) const { return *workers_[link]; }
   Watchdog& watchdog() { return watchdog_; }
   PressureSource& pressure(size_t link) { return *pressures_[link]; }
+  /// Errors: kFailedPrecondition (no regulator sets the link's pressure).
+  Result<PressureController*> regulator(size_t link) const { return pressures_[link]->Controller(); }
   /// Errors: kFailedPrecondition (the link is not simulated).
   Result<std::shared_ptr<SimulationDesk>> simulation(size_t link) const;
   AttitudeSource& attitude(size_t link) { return *attitudes_[link]; }

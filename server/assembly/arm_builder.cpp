@@ -43,14 +43,35 @@ class ChosenForceModel {
   std::optional<ForceModel> model_;  // guarded by mutex_; none: by tolerance, frame by frame
 };
 
+bool HasPressure(const Scene& scene) {
+  return std::ranges::any_of(scene.pressure, [](const PressureKey& key) { return key.kpa != 0; });
+}
+
+// A scene whose skin a simulated regulator can inflate.
+Result<void> CheckRegulated(const Scene& scene) {
+  if (scene.skin == SkinKind::kLinear)
+    return Error{ErrorCode::kInvalidArgument,
+                 "scene '" + scene.name +
+                     "' has a linear skin, which a simulated regulator cannot inflate; use "
+                     "a scene with a nonlinear one"};
+  if (HasPressure(scene))
+    return Error{ErrorCode::kInvalidArgument,
+                 "scene '" + scene.name +
+                     "' inflates the skin itself, and so does the link's regulator; use a "
+                     "scene without pressure"};
+  return {};
+}
+
 // Null: the link is not simulated.
-Result<std::shared_ptr<SimulationDesk>> MakeDesk(const LinkConfig& link, const LinkModel& model,
-                                                 Clock& clock) {
+Result<std::shared_ptr<SimulationDesk>> MakeDesk(const LinkConfig& link, const LinkModel& model, Clock& clock,
+                                                 std::shared_ptr<SimulatedRegulator> regulator) {
   const auto* simulated = std::get_if<SimulatedSourceConfig>(&link.source);
   if (simulated == nullptr) return std::shared_ptr<SimulationDesk>();
   auto scene = LoadScene(simulated->scene);
   if (!scene) return scene.error();
-  return std::make_shared<SimulationDesk>(model, *std::move(scene), clock);
+  if (regulator != nullptr)
+    if (const auto good = CheckRegulated(*scene); !good) return good.error();
+  return std::make_shared<SimulationDesk>(model, *std::move(scene), clock, std::move(regulator));
 }
 
 Result<bool> IsInflatedByScene(const LinkConfig& link) {
@@ -58,7 +79,7 @@ Result<bool> IsInflatedByScene(const LinkConfig& link) {
   if (simulated == nullptr) return false;
   const auto scene = LoadScene(simulated->scene);
   if (!scene) return scene.error();
-  return std::ranges::any_of(scene->pressure, [](const PressureKey& key) { return key.kpa != 0; });
+  return HasPressure(*scene);
 }
 
 // The joint that a simulated link's scene moves is one of the arm's, within its range.
@@ -102,7 +123,8 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
   if (const auto good = CheckForceModel(link, *inflated); !good)
     return Error{good.error().code, "force_model " + good.error().message};
   const auto chosen = std::make_shared<ChosenForceModel>(link.force_model);
-  const auto desk = MakeDesk(link, *model, clock);
+  const auto regulator = MakeSimulatedRegulator(link, clock);
+  const auto desk = MakeDesk(link, *model, clock, regulator);
   if (!desk) return desk.error();
   HandlingNow handling;
   if (*desk != nullptr) handling = [shared = *desk] { return shared->Now(); };
@@ -132,7 +154,7 @@ Result<LinkParts> BuildLink(const LinkConfig& link, Clock& clock) {
                                    .calibration = link.calibration.value_or("")},
                    .source = std::move(*source),
                    .processor = std::move(*processor),
-                   .pressure = MakePressure(link, clock),
+                   .pressure = MakePressure(link, clock, regulator),
                    .simulation = *desk,
                    .factories = factories,
                    .realtime = link.realtime};

@@ -44,6 +44,20 @@ void CheckCameras(const LinkConfig& link, std::map<std::string, std::string>& us
   }
 }
 
+// Two controllers of one regulator would contradict each other: the second one could not even open its line.
+void CheckRegulator(const LinkConfig& link, std::map<std::string, std::string>& users, ConfigFindings& out) {
+  const auto* regulator =
+      link.pressure ? std::get_if<RegulatorPressureConfig>(&link.pressure->source) : nullptr;
+  if (regulator == nullptr || !regulator->device) return;
+  const auto [user, fresh] = users.emplace(*regulator->device, link.name);
+  if (!fresh)
+    out.errors.push_back("link '" + link.name + "': the pressure regulator " + *regulator->device +
+                         " is used by link '" + user->second + "' already");
+  std::error_code ignored;
+  if (!fs::exists(*regulator->device, ignored))
+    out.notes.push_back("link '" + link.name + "': " + *regulator->device + " is not there now");
+}
+
 // A server with such a link would start, and wait for pictures for ever.
 void CheckPictures(const LinkConfig& link, ConfigFindings& out) {
   const auto* files = std::get_if<FileSourceConfig>(&link.source);
@@ -103,6 +117,7 @@ ConfigFindings CheckConfig(const Config& config, bool insecure_open) {
   std::map<std::string, std::string> users;  // camera: link
   for (const LinkConfig& link : config.links) {
     CheckCameras(link, users, out);
+    CheckRegulator(link, users, out);
     CheckPictures(link, out);
   }
   return out;

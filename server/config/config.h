@@ -15,12 +15,10 @@
 #include "sensing/pipeline/drift_options.h"
 #include "sensing/simulation/scene_pace.h"
 #include "server/config/options.h"
+#include "server/config/regulator_options.h"
 
 namespace taclink::server {
 
-/// What a serial line may be set to.
-inline constexpr std::array kBaudRates = {1200,  2400,  4800,   9600,   19200,
-                                          38400, 57600, 115200, 230400, 921600};
 inline constexpr Range kPressureKpa{-100, 100}, kSpecificForce{-100, 100}, kFrameRates{0.01, 1000},
     kNoLimits{};
 
@@ -48,13 +46,13 @@ struct ClientPressureConfig {};  ///< clients send it by UpdatePressure
 /// Where the gauge pressure inside a link's skin comes from.
 struct PressureConfig {
   std::variant<ConstantPressureConfig, SimulatedPressureConfig, FilePressureConfig, SerialPressureConfig,
-               ClientPressureConfig>
+               ClientPressureConfig, RegulatorPressureConfig>
       source;
   double kpa_per_unit = 1, offset_kpa = 0;  ///< kPa = kpa_per_unit * number + offset_kpa
   double stale_after_s = 1;                 ///< of sensors
   std::optional<double> sigma_pa = {};      ///< none: PressureSigma
   void Describe(FieldVisitor& visit) {
-    const Names names = {"constant", "simulated", "file", "serial", "grpc"};
+    const Names names = {"constant", "simulated", "file", "serial", "grpc", "regulator"};
     visit.Variant(Required("source"), source, names, "Origin.", [this](FieldVisitor& fields, size_t kind) {
       if (kind == 2 || kind == 3) {  // file, serial
         fields("kpa_per_unit", kpa_per_unit, kNoLimits, "Factor of the numbers read.");

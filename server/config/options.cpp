@@ -17,6 +17,20 @@ bool MayBeInflated(const LinkConfig& link) {
   return constant == nullptr || constant->kpa != 0;
 }
 
+// A simulated regulator inflates a simulated skin, a real one a real skin.
+void CheckRegulator(FieldVisitor& visit, const LinkConfig& link) {
+  const auto* regulator =
+      link.pressure ? std::get_if<RegulatorPressureConfig>(&link.pressure->source) : nullptr;
+  if (regulator == nullptr) return;
+  const auto* simulated = std::get_if<SimulatedSourceConfig>(&link.source);
+  visit.Check(regulator->device || simulated != nullptr, "pressure",
+              "with source 'regulator' needs the 'device' of the regulator", {"source"});
+  visit.Check(!regulator->device || simulated == nullptr, "pressure",
+              "has a 'device', which cannot inflate a simulated skin: leave it out", {"source"});
+  visit.Check(simulated == nullptr || simulated->pace == ScenePace::kClock, "pace",
+              "must be 'clock' on a link with a simulated regulator, which runs by the clock");
+}
+
 void DescribePressure(FieldVisitor& visit, LinkConfig& link) {
   std::optional<double> constant_kpa;  // is written as the other key
   visit("pressure_kpa", constant_kpa, kPressureKpa, "Short for a constant `pressure`.");
@@ -24,6 +38,7 @@ void DescribePressure(FieldVisitor& visit, LinkConfig& link) {
   visit.Check(!link.pressure || !std::holds_alternative<SimulatedPressureConfig>(link.pressure->source) ||
                   std::holds_alternative<SimulatedSourceConfig>(link.source),
               "pressure", "can only be 'simulated' where the link's source is", {"source"});
+  CheckRegulator(visit, link);
   if (!constant_kpa) return;
   visit.Check(!link.pressure, "pressure_kpa", "is short for a constant 'pressure'; give one of them");
   link.pressure = PressureConfig{.source = ConstantPressureConfig{*constant_kpa}};

@@ -4,6 +4,7 @@
 
 #include "server/messages/contacts_message.h"
 #include "server/messages/event_message.h"
+#include "server/messages/pressure_message.h"
 #include "wire/convert.h"
 #include "wire/units.h"
 
@@ -186,6 +187,8 @@ void Fill(const Arm& arm, v1::Arm& out) {
       Fill(report, link.rules, *message.add_force_levels());
     if (auto acceptance = arm.acceptances().Summary(i))
       *message.mutable_acceptance() = *std::move(acceptance);
+    if (const auto regulator = arm.regulator(i))
+      Fill((*regulator)->Status(), (*regulator)->options(), *message.mutable_regulator());
     message.set_status(v1::LINK_STATUS_STARTING);
     if (const auto latest = arm.hub().Latest(i)) {
       message.set_status(wire::ToWire(latest->state().status));

@@ -13,7 +13,7 @@
 namespace taclink::server {
 namespace {
 
-constexpr size_t kLongestLine = 256;
+constexpr size_t kLongestLine = 256, kMostLines = 64;
 constexpr std::string_view kBlanks = " \t\r\n";
 
 }  // namespace
@@ -41,14 +41,16 @@ LineReader& LineReader::operator=(LineReader&& other) noexcept {
   std::swap(descriptor_, other.descriptor_);
   std::swap(in_step_, other.in_step_);
   std::swap(text_, other.text_);
+  std::swap(lines_, other.lines_);
   return *this;
 }
 
-Result<std::string> LineReader::Next(std::chrono::milliseconds timeout) {
+// Returns the lines that have come already, else those of one read.
+Result<void> LineReader::Fill(std::chrono::milliseconds timeout) {
+  if (!lines_.empty()) return {};
   pollfd waiting{.fd = descriptor_, .events = POLLIN, .revents = 0};
   if (poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0)
     return Error{ErrorCode::kTimeout, "no line in time"};
-  std::optional<std::string> newest;
   std::array<char, 4096> buffer{};
   const ssize_t got = read(descriptor_, buffer.data(), buffer.size());
   if (got < 0 && (errno == EAGAIN || errno == EINTR)) return Error{ErrorCode::kTimeout, "no line in time"};
@@ -57,14 +59,37 @@ Result<std::string> LineReader::Next(std::chrono::milliseconds timeout) {
   for (const char c : std::string_view(buffer.data(), static_cast<size_t>(got))) {
     if (c == '\n') {
       if (text_.size() == kLongestLine) text_ += "...";  // not whole, so no number
-      if (std::exchange(in_step_, true)) newest = text_;
+      if (std::exchange(in_step_, true)) lines_.push_back(std::move(text_));
+      if (lines_.size() > kMostLines) lines_.pop_front();
       text_.clear();
     } else if (text_.size() < kLongestLine) {
       text_ += c;
     }
   }
-  if (newest) return *std::move(newest);
+  if (!lines_.empty()) return {};
   return Error{ErrorCode::kTimeout, "no whole line yet"};
+}
+
+Result<std::string> LineReader::Next(std::chrono::milliseconds timeout) {
+  if (const auto filled = Fill(timeout); !filled) return filled.error();
+  std::string newest = std::move(lines_.back());
+  lines_.clear();
+  return newest;
+}
+
+Result<std::string> LineReader::NextInTurn(std::chrono::milliseconds timeout) {
+  if (const auto filled = Fill(timeout); !filled) return filled.error();
+  std::string oldest = std::move(lines_.front());
+  lines_.pop_front();
+  return oldest;
+}
+
+Result<void> LineReader::Write(const std::string& line) {
+  const ssize_t put = write(descriptor_, line.data(), line.size());
+  if (put == static_cast<ssize_t>(line.size())) return {};
+  // The rest of a line that went out in part would be taken for the next one: the line is opened again.
+  return Error{ErrorCode::kUnavailable,
+               put >= 0 || errno == EAGAIN ? "its other end takes no more commands" : std::strerror(errno)};
 }
 
 }  // namespace taclink::server

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,17 +10,13 @@
 #include <cstring>
 #include <utility>
 
-#include "server/config/config.h"
 #include "server/pressure/line_reader.h"
+#include "server/pressure/serial_line.h"
 
 namespace taclink::server {
 namespace {
 
 using std::chrono::milliseconds;
-
-// In the order of kBaudRates.
-constexpr std::array<speed_t, kBaudRates.size()> kSpeeds = {B1200,  B2400,  B4800,   B9600,   B19200,
-                                                            B38400, B57600, B115200, B230400, B921600};
 
 Error Unavailable(const std::string& path, const std::string& what) {
   return {ErrorCode::kUnavailable, path + ": " + what};
@@ -40,9 +35,9 @@ class LinePressureReader : public PressureReader {
 
   Result<void> Open() override {
     lines_ = LineReader();
-    const int descriptor = OpenDescriptor();
-    if (descriptor < 0) return Unavailable(path_, std::string("cannot be opened: ") + std::strerror(errno));
-    lines_ = LineReader(descriptor);
+    const auto descriptor = OpenDescriptor();
+    if (!descriptor) return descriptor.error();
+    lines_ = LineReader(*descriptor);
     return {};
   }
 
@@ -58,7 +53,7 @@ class LinePressureReader : public PressureReader {
   }
 
  protected:
-  virtual int OpenDescriptor() = 0;
+  virtual Result<int> OpenDescriptor() = 0;
 
   // Constant after construction.
   const std::string path_;
@@ -70,28 +65,13 @@ class LinePressureReader : public PressureReader {
 
 class SerialPressureReader final : public LinePressureReader {
  public:
-  SerialPressureReader(std::string device, speed_t speed, Clock& clock)
-      : LinePressureReader(std::move(device), clock), speed_(speed) {}
+  SerialPressureReader(std::string device, int baud, Clock& clock)
+      : LinePressureReader(std::move(device), clock), baud_(baud) {}
 
  private:
-  int OpenDescriptor() override {
-    const int descriptor = open(path_.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (descriptor < 0) return -1;
-    termios settings{};
-    bool good = tcgetattr(descriptor, &settings) == 0;
-    if (good) {
-      cfmakeraw(&settings);
-      settings.c_cflag |= CLOCAL | CREAD;
-      good = cfsetspeed(&settings, speed_) == 0 && tcsetattr(descriptor, TCSANOW, &settings) == 0;
-    }
-    if (good) return descriptor;
-    const int error = errno;
-    close(descriptor);
-    errno = error;
-    return -1;
-  }
+  Result<int> OpenDescriptor() override { return OpenSerialLine(path_, baud_, SerialAccess::kRead); }
 
-  const speed_t speed_;
+  const int baud_;
 };
 
 class PipePressureReader final : public LinePressureReader {
@@ -100,7 +80,11 @@ class PipePressureReader final : public LinePressureReader {
 
  private:
   // Also for writing: else its end is reached whenever a writer goes.
-  int OpenDescriptor() override { return open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC); }
+  Result<int> OpenDescriptor() override {
+    const int descriptor = open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
+    if (descriptor >= 0) return descriptor;
+    return Unavailable(path_, std::string("cannot be opened: ") + std::strerror(errno));
+  }
 };
 
 /// The last line of a regular file, looked at from time to time.
@@ -191,10 +175,7 @@ std::unique_ptr<PressureReader> MakeFilePressureReader(std::string path, Clock& 
 }
 
 std::unique_ptr<PressureReader> MakeSerialPressureReader(std::string device, int baud, Clock& clock) {
-  speed_t speed = B9600;
-  for (size_t i = 0; i < kBaudRates.size(); ++i)
-    if (kBaudRates[i] == baud) speed = kSpeeds[i];
-  return std::make_unique<SerialPressureReader>(std::move(device), speed, clock);
+  return std::make_unique<SerialPressureReader>(std::move(device), baud, clock);
 }
 
 }  // namespace taclink::server

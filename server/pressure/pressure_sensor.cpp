@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <utility>
 
@@ -14,7 +13,6 @@
 namespace taclink::server {
 namespace {
 
-constexpr double kLargestMpa = 0.1;  // as the configuration's constant
 constexpr std::chrono::milliseconds kPoll{100};
 
 int64_t Ns(std::chrono::milliseconds duration) {
@@ -28,9 +26,10 @@ PressureSensor::PressureSensor(std::string name, std::unique_ptr<PressureReader>
     : name_(std::move(name)),
       reader_(std::move(reader)),
       options_(options),
-      stale_ns_(Ns(options.stale_after)),
       clock_(clock),
-      backoff_(options.first_backoff) {}
+      backoff_(options.first_backoff),
+      readings_(options.origin, options.stale_after, reader_ ? "the sensor" : "any client (UpdatePressure)") {
+}
 
 PressureSensor::~PressureSensor() {
   Stop();
@@ -71,7 +70,7 @@ void PressureSensor::Step(std::chrono::milliseconds timeout) {
   }
   backoff_ = options_.first_backoff;  // only a reading proves that the sensor works
   const double kpa = options_.kpa_per_unit * reading->value + options_.offset_kpa;
-  const auto added = Add(kpa * kMpaPerKpa, reading->time_ns);
+  const auto added = readings_.Add({.time_ns = reading->time_ns, .mpa = kpa * kMpaPerKpa});
   SetTrouble(added ? "" : added.error().message + "; check kpa_per_unit and offset_kpa");
 }
 
@@ -84,61 +83,15 @@ void PressureSensor::Failed(const Error& error) {
 
 Result<bool> PressureSensor::Tell(double mpa, int64_t time_ns) {
   if (reader_) return PressureSource::Tell(mpa, time_ns);
-  return Add(mpa, time_ns);
+  return readings_.Add({.time_ns = time_ns, .mpa = mpa});
 }
 
-Result<bool> PressureSensor::Add(double mpa, int64_t time_ns) {
-  if (!std::isfinite(mpa) || std::abs(mpa) > kLargestMpa) {
-    return Error{ErrorCode::kInvalidArgument,
-                 fmt::format("a pressure of {:g} kPa is not within -100 and 100 kPa", mpa / kMpaPerKpa)};
-  }
-  const std::lock_guard lock(mutex_);
-  if (readings_ > 0 && ring_[(readings_ - 1) % ring_.size()].time_ns >= time_ns) return false;
-  ring_[readings_++ % ring_.size()] = {time_ns, mpa};
-  return true;
-}
-
-void PressureSensor::SetTrouble(std::string trouble) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (trouble_ == trouble) return;
-    trouble_ = trouble;
-  }
+void PressureSensor::SetTrouble(const std::string& trouble) {
+  if (!readings_.SetTrouble(trouble)) return;
   if (trouble.empty()) {
     SPDLOG_INFO("link {}: the pressure sensor gives readings", name_);
   } else {
     SPDLOG_WARN("link {}: pressure sensor: {}", name_, trouble);
-  }
-}
-
-std::string PressureSensor::Silence(int64_t age_ns) const {
-  if (!trouble_.empty()) return trouble_;
-  const char* who = reader_ ? "the sensor" : "any client (UpdatePressure)";
-  if (age_ns < 0) return fmt::format("no reading yet from {}", who);
-  return fmt::format("no reading from {} for {:.1f} s", who, static_cast<double>(age_ns) * 1e-9);
-}
-
-// The newest reading before the exposure; a sensor that has only just begun has but later ones.
-void PressureSensor::Apply(StereoFrame& frame) {
-  PressureReport& report = frame.pressure;
-  const int64_t exposure_ns = frame.times.exposure_monotonic_ns;
-  report.origin = options_.origin;
-  report.age_ns = -1;
-  report.mpa = 0;
-  const std::lock_guard lock(mutex_);
-  const uint64_t kept = std::min<uint64_t>(readings_, ring_.size());
-  for (uint64_t i = 1; i <= kept; ++i) {
-    const Reading& reading = ring_[(readings_ - i) % ring_.size()];
-    report.mpa = reading.mpa;
-    report.age_ns = std::abs(exposure_ns - reading.time_ns);
-    if (reading.time_ns <= exposure_ns) break;
-  }
-  report.stale = report.age_ns < 0 || report.age_ns > stale_ns_;
-  frame.pressure_mpa = report.stale ? std::nullopt : std::optional(report.mpa);
-  if (report.stale) {
-    report.trouble = Silence(report.age_ns);
-  } else {
-    report.trouble.clear();
   }
 }
 

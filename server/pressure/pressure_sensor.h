@@ -1,14 +1,13 @@
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 
 #include "sensing/core/clock.h"
+#include "server/pressure/pressure_readings.h"
 #include "server/pressure/pressure_source.h"
 
 namespace taclink::server {
@@ -50,7 +49,7 @@ class PressureSensor final : public PressureSource {
 
   void Start() override;
   void Stop() override;
-  void Apply(StereoFrame& frame) override;
+  void Apply(StereoFrame& frame) override { readings_.Apply(frame); }
   Result<bool> Tell(double mpa, int64_t time_ns) override;
 
   /// Does one thing that is due: opens the sensor, waits before the next try, or for a reading; for about
@@ -58,21 +57,13 @@ class PressureSensor final : public PressureSource {
   void Step(std::chrono::milliseconds timeout);
 
  private:
-  struct Reading {
-    int64_t time_ns = 0;
-    double mpa = 0;
-  };
-
   void Failed(const Error& error);
-  Result<bool> Add(double mpa, int64_t time_ns);
-  void SetTrouble(std::string trouble);
-  std::string Silence(int64_t age_ns) const;
+  void SetTrouble(const std::string& trouble);
 
   // Constant after construction.
   const std::string name_;
   const std::unique_ptr<PressureReader> reader_;
   const PressureSensorOptions options_;
-  const int64_t stale_ns_;
   Clock& clock_;
 
   // Used by Step's thread only.
@@ -80,11 +71,7 @@ class PressureSensor final : public PressureSource {
   int64_t retry_at_ns_ = 0;
   std::chrono::milliseconds backoff_;
 
-  mutable std::mutex mutex_;
-  // Guarded by mutex_.
-  std::array<Reading, 64> ring_{};  // readings_ % size is the next place
-  uint64_t readings_ = 0;
-  std::string trouble_;  // empty: the sensor does well
+  PressureReadings readings_;
 
   std::jthread thread_;
 };

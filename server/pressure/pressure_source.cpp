@@ -29,6 +29,12 @@ Result<bool> PressureSource::Tell(double, int64_t) {
                "the link's pressure does not come from clients; configure pressure: {source: grpc}"};
 }
 
+Result<PressureController*> PressureSource::Controller() {
+  return Error{
+      ErrorCode::kFailedPrecondition,
+      "the link has no pressure regulator; configure pressure: {source: regulator} (docs/pressure.md)"};
+}
+
 std::unique_ptr<PressureSource> MakeAssumedPressure(std::optional<double> mpa) {
   return std::make_unique<AssumedPressure>(mpa);
 }

@@ -9,6 +9,8 @@
 
 namespace taclink::server {
 
+class PressureController;
+
 /// Says what the pressure inside a link's skin is.
 class PressureSource {
  public:
@@ -24,6 +26,10 @@ class PressureSource {
   /// What a client says; `time_ns` monotonic. False: not newer than what is known. Errors:
   /// kFailedPrecondition (this source is no client), kInvalidArgument (no such pressure).
   virtual Result<bool> Tell(double mpa, int64_t time_ns);
+
+  /// The controller of the regulator that sets this pressure; as long as this source. Errors:
+  /// kFailedPrecondition (there is no regulator).
+  virtual Result<PressureController*> Controller();
 };
 
 /// `mpa`: gauge pressure where the frames' source does not measure it; none: 0.

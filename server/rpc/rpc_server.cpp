@@ -52,7 +52,8 @@ class CallObserver final : public grpc::experimental::ServerInterceptorFactoryIn
 std::set<std::string> ServiceNames(bool records) {
   std::set<std::string> names = {
       v1::TactileService::service_full_name(), v1::OperationsService::service_full_name(),
-      v1::SimulationService::service_full_name(), v1::AcceptanceService::service_full_name()};
+      v1::PressureService::service_full_name(), v1::SimulationService::service_full_name(),
+      v1::AcceptanceService::service_full_name()};
   if (records) names.insert(v1::RecordingService::service_full_name());
   return names;
 }
@@ -64,6 +65,7 @@ RpcServer::RpcServer(Arm& arm, ServiceLimits limits, const std::shared_ptr<const
     : senders_(std::make_shared<boost::asio::thread_pool>(1)),
       service_(arm, limits, senders_, security),
       operations_(arm, security),
+      pressures_(arm, security),
       simulations_(arm),
       acceptances_(arm, security),
       health_(ServiceNames(recorder != nullptr), senders_, security) {
@@ -101,6 +103,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::Start(const std::string& listen, A
                                                                         MakeCredentials(listen, security));
   builder.RegisterService(&out->service_);
   builder.RegisterService(&out->operations_);
+  builder.RegisterService(&out->pressures_);
   builder.RegisterService(&out->simulations_);
   builder.RegisterService(&out->acceptances_);
   builder.RegisterService(&out->health_);

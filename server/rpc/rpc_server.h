@@ -14,6 +14,7 @@
 #include "server/rpc/services/acceptance_service.h"
 #include "server/rpc/services/health_service.h"
 #include "server/rpc/services/operations_service.h"
+#include "server/rpc/services/pressure_service.h"
 #include "server/rpc/services/recording_service.h"
 #include "server/rpc/services/simulation_service.h"
 #include "server/rpc/services/tactile_service.h"
@@ -21,8 +22,8 @@
 
 namespace taclink::server {
 
-/// gRPC over one arm: TactileService, OperationsService, AcceptanceService, SimulationService,
-/// RecordingService, health, reflection. The arm must outlive it.
+/// gRPC over one arm: TactileService, OperationsService, PressureService, SimulationService,
+/// AcceptanceService, RecordingService, health, reflection. The arm must outlive it.
 class RpcServer {
  public:
   /// Listens at once. `security` null: everybody may call, in the clear. `recorder` null: no
@@ -53,6 +54,7 @@ class RpcServer {
   const std::shared_ptr<boost::asio::thread_pool> senders_;
   TactileService service_;
   OperationsService operations_;
+  PressureService pressures_;
   SimulationService simulations_;
   AcceptanceService acceptances_;
   std::unique_ptr<RecordingService> recordings_;                              // null: none

@@ -22,6 +22,8 @@ constexpr AccessRule kTable[] = {
     {"/taclink.v1.TactileService/SetCamera", Role::kOperator},
     {"/taclink.v1.OperationsService/RestartLink", Role::kOperator},
     {"/taclink.v1.OperationsService/GetCaller", Role::kNobody},
+    {"/taclink.v1.PressureService/SetPressure", Role::kOperator},
+    {"/taclink.v1.PressureService/GetPressure", Role::kViewer},
     {"/taclink.v1.SimulationService/Press", Role::kOperator},
     {"/taclink.v1.SimulationService/Release", Role::kOperator},
     {"/taclink.v1.SimulationService/SetScenePressure", Role::kOperator},

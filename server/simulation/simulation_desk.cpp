@@ -5,10 +5,19 @@
 #include <string>
 #include <utility>
 
-namespace taclink::server {
+#include "sensing/core/units.h"
 
-SimulationDesk::SimulationDesk(LinkModel model, Scene scene, Clock& clock)
-    : model_(std::move(model)), scene_(std::move(scene)), clock_(clock) {}
+namespace taclink::server {
+namespace {
+
+// A vented skin is left to its scene, which needs no solving.
+constexpr double kVentedKpa = 1e-4;
+
+}  // namespace
+
+SimulationDesk::SimulationDesk(LinkModel model, Scene scene, Clock& clock,
+                               std::shared_ptr<SimulatedRegulator> regulator)
+    : model_(std::move(model)), scene_(std::move(scene)), clock_(clock), regulator_(std::move(regulator)) {}
 
 Result<void> SimulationDesk::Press(const PressedBody& body, double hold_s) {
   const std::lock_guard lock(mutex_);
@@ -45,6 +54,10 @@ Result<void> SimulationDesk::Release(uint64_t body_id) {
 }
 
 Result<void> SimulationDesk::SetPressure(std::optional<double> pressure_mpa) {
+  if (regulator_ != nullptr && pressure_mpa)
+    return Error{
+        ErrorCode::kFailedPrecondition,
+        "a simulated regulator sets the pressure of this link: use SetPressure (taclink pressure set)"};
   const std::lock_guard lock(mutex_);
   Handling changed = handling_;
   changed.pressure_mpa = pressure_mpa;
@@ -61,7 +74,13 @@ Result<void> SimulationDesk::MoveJoint(std::optional<double> joint_rad) {
 Handling SimulationDesk::Now() {
   const std::lock_guard lock(mutex_);
   DropExpired();
-  return handling_;
+  Handling now = handling_;
+  if (regulator_ == nullptr) return now;
+  const SimulatedRegulator::Air air = regulator_->AirNow();
+  if (air.kpa < kVentedKpa && air.kpa_per_s <= 0) return now;
+  now.pressure_mpa = kMpaPerKpa * air.kpa;
+  now.pressure_mpaps = kMpaPerKpa * air.kpa_per_s;
+  return now;
 }
 
 Result<void> SimulationDesk::Change(Handling changed) {

@@ -18,7 +18,7 @@ ln -s "$(realpath "$(dirname "$0")/../../deploy")" "$folder/deploy"
 cd "$folder"
 export PATH=$bin:$PATH XDG_STATE_HOME=$folder/state
 
-if grep -qE 'taclink (list|watch|poke|contacts|events|record|tare|set|thresholds|joints|restart)' page.sh; then
+if grep -qE 'taclink (list|watch|poke|contacts|events|record|tare|set|thresholds|joints|pressure|restart)' page.sh; then
   : >server.log  # it is read before the server may have opened it
   taclinkd "$@" --listen 127.0.0.1:0 --http-listen 127.0.0.1:0 >server.log 2>&1 &
   server=$!

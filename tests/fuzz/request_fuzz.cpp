@@ -49,7 +49,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
                                                            &Parse<v1::UpdatePressureRequest>,
                                                            &Parse<v1::UpdateAttitudeRequest>,
                                                            &Parse<v1::PressRequest>,
-                                                           &Parse<v1::SetScenePressureRequest>};
+                                                           &Parse<v1::SetScenePressureRequest>,
+                                                           &Parse<v1::SetPressureRequest>};
   constexpr size_t kCount = std::size(kParsers);
   const size_t call = data[0] % (kCount + 2);
   if (call < kCount) {

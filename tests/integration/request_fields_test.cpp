@@ -11,6 +11,7 @@
 
 #include "taclink/v1/acceptance.grpc.pb.h"
 #include "taclink/v1/operations.grpc.pb.h"
+#include "taclink/v1/pressure.grpc.pb.h"
 #include "taclink/v1/recording.grpc.pb.h"
 #include "taclink/v1/simulation.grpc.pb.h"
 #include "taclink/v1/tactile.grpc.pb.h"
@@ -208,6 +209,7 @@ class RequestFieldsTest : public ::testing::Test {
          {v1::GetArmRequest::descriptor()->file()->FindServiceByName("TactileService"),
           v1::StartRecordingRequest::descriptor()->file()->FindServiceByName("RecordingService"),
           v1::RestartLinkRequest::descriptor()->file()->FindServiceByName("OperationsService"),
+          v1::SetPressureRequest::descriptor()->file()->FindServiceByName("PressureService"),
           v1::PressRequest::descriptor()->file()->FindServiceByName("SimulationService"),
           v1::MeasureTrialRequest::descriptor()->file()->FindServiceByName("AcceptanceService")}) {
       EXPECT_NE(service, nullptr);

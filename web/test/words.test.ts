@@ -72,7 +72,7 @@ describe("events", () => {
   });
   test("every kind of operation has its name", () => {
     for (const { number } of EventKindSchema.values.slice(1)) {
-      if (number === EventKind.CLOCK_STEPPED) continue; // nobody asks for it
+      if (number === EventKind.CLOCK_STEPPED || number === EventKind.PRESSURE_TRIP) continue; // nobody asks for it
       const event = create(EventSchema, {
         kind: number,
         detail: { case: "operation", value: { who: "otto" } },
@@ -90,6 +90,17 @@ describe("events", () => {
       },
     });
     expect(eventText(event)).toBe("clock: UTC stepped by -60 s");
+  });
+  test("a trip of a pressure regulator says why", () => {
+    const trip = (accepted: boolean, outcome: string) =>
+      create(EventSchema, {
+        kind: EventKind.PRESSURE_TRIP,
+        detail: { case: "operation", value: { who: accepted ? "otto" : "server", accepted, outcome } },
+      });
+    expect(eventText(trip(false, "over-pressure: 2.1 kPa"))).toBe(
+      "pressure regulator closed its valve: over-pressure: 2.1 kPa",
+    );
+    expect(eventText(trip(true, "reset"))).toBe("pressure trip done by otto: reset");
   });
   test("the end of a contact tells its peak", () => {
     const event = create(EventSchema, {

@@ -35,6 +35,7 @@ void AddTare(const Arguments& app, Selected& selected);
 void AddEvents(const Arguments& app, Selected& selected);
 void AddSet(const Arguments& app, Selected& selected);
 void AddThresholds(const Arguments& app, Selected& selected);
+void AddPressure(const Arguments& app, Selected& selected);
 
 /// Likewise, below `record`.
 void AddPlay(const Arguments& record, Selected& selected);

@@ -16,6 +16,7 @@ void AddCommands(const taclink::command::Arguments& app, taclink::command::Selec
   AddPoke(app, selected);
   AddTare(app, selected);
   AddThresholds(app, selected);
+  AddPressure(app, selected);
   AddSet(app, selected);
   AddJoints(app, selected);
   AddRestart(app, selected);
@@ -32,8 +33,8 @@ void AddCommands(const taclink::command::Arguments& app, taclink::command::Selec
   AddToken(app, selected);
   AddDoctor(app, selected);
   AddCompletion(app, selected);
-  app.Group("Live", {"list", "watch", "contacts", "events", "poke", "tare", "thresholds", "set", "joints",
-                     "restart"});
+  app.Group("Live", {"list", "watch", "contacts", "events", "poke", "tare", "thresholds", "pressure", "set",
+                     "joints", "restart"});
   app.Group("Recordings", {"record", "log"});
   app.Group("Offline", {"detect", "solve", "simulate", "skin"});
   app.Group("Setup", {"cameras", "calibrate", "accept", "show", "token", "doctor", "completion"});

@@ -32,8 +32,15 @@ std::string ContactText(const v1::ContactEvent& contact) {
                      Place(contact.center_m()));
 }
 
-std::string OperationText(const v1::OperationEvent& operation) {
-  std::string text = fmt::format("{} by {}{}", operation.accepted() ? "done" : "refused", operation.who(),
+// A regulator that closes its valve refuses nothing.
+const char* End(const v1::Event& event) {
+  if (event.operation().accepted()) return "done";
+  return event.kind() == v1::EVENT_KIND_PRESSURE_TRIP ? "valve closed" : "refused";
+}
+
+std::string OperationText(const v1::Event& event) {
+  const v1::OperationEvent& operation = event.operation();
+  std::string text = fmt::format("{} by {}{}", End(event), operation.who(),
                                  operation.outcome().empty() ? "" : ": " + operation.outcome());
   for (const auto& [name, value] : Sorted(operation)) text += fmt::format(" {}={:.6g}", name, value);
   return text;
@@ -64,7 +71,7 @@ std::string Detail(const v1::Event& event) {
       return fmt::format("{} -> {}{}", client::Name(status.previous()), client::Name(status.status()),
                          status.reason().empty() ? "" : ": " + status.reason());
     case v1::Event::kOperation:
-      return OperationText(event.operation());
+      return OperationText(event);
     case v1::Event::kDrift:
       return fmt::format("the baseline has drifted by {:.3f} mm", event.drift().drift_m() * kMmPerMetre);
     case v1::Event::kFramesLost:

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "client/command/cli/svg.h"
+
 namespace taclink::command {
 namespace {
 
@@ -21,33 +23,6 @@ constexpr const char* kTotalStyle = "stroke=\"#1b3c68\" stroke-width=\"1.6\"";
 constexpr const char* kBeginStyle = "fill=\"#2e8b57\"";
 constexpr const char* kEndStyle = "fill=\"white\" stroke=\"#d1495b\"";
 
-std::string Escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else if (c == '>') {
-      out += "&gt;";
-    } else {
-      out += static_cast<unsigned char>(c) < ' ' ? '?' : c;  // XML has no control characters
-    }
-  }
-  return out;
-}
-
-std::string Text(double x, double y, const char* anchor, const std::string& text,
-                 const std::string& more = "") {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n", x, y, anchor, more,
-                     Escaped(text));
-}
-
-std::string Line(double x1, double y1, double x2, double y2, const std::string& style) {
-  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" {}/>\n", x1, y1, x2, y2,
-                     style);
-}
-
 /// Of a contact's begin: points up; of its end: points down.
 std::string Mark(double x, double top, bool begin) {
   constexpr double kHalf = 4, kHeight = 8;
@@ -55,31 +30,6 @@ std::string Mark(double x, double top, bool begin) {
   return fmt::format("<path class=\"{}\" d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}L{:.1f} {:.1f}Z\" {}/>\n",
                      begin ? "begin" : "end", x, tip, x - kHalf, base, x + kHalf, base,
                      begin ? kBeginStyle : kEndStyle);
-}
-
-/// 1, 2 or 5 times a power of ten: `span` has no more than `most` of them.
-double TickStep(double span, int most) {
-  const double rough = span / most;
-  const double power = std::pow(10, std::floor(std::log10(rough)));
-  for (const double step : {1.0, 2.0, 5.0}) {
-    if (step * power >= rough * (1 - 1e-9)) return step * power;
-  }
-  return 10 * power;
-}
-
-/// A tick's number, with as many decimals as its step has.
-std::string Plain(double value, double step) {
-  const int decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 9);
-  return fmt::format("{:.{}f}", std::abs(value) < step / 2 ? 0.0 : value, decimals);
-}
-
-/// Multiples of `step` between the two.
-std::vector<double> Ticks(double low, double high, double step) {
-  std::vector<double> ticks;
-  const double tolerance = 1e-9 * step;
-  for (double n = std::ceil((low - tolerance) / step); n * step <= high + tolerance; ++n)
-    ticks.push_back(n * step);
-  return ticks;
 }
 
 }  // namespace
@@ -90,7 +40,7 @@ struct ForcePlot::Place {
   double low = 0, high = 1, step = 1;
 
   Place(double curves_top, double least, double most) : top(curves_top) {
-    step = TickStep(std::max(most - least, 1e-6), 5);
+    step = svg::TickStep(std::max(most - least, 1e-6), 5);
     high = std::max(std::ceil(most / step - 1e-9), 1.0) * step;
     constexpr double kMargin =
         1.05;  // forces seldom are negative, and then by little: no whole step for them
@@ -159,52 +109,48 @@ void ForcePlot::AddContactEnd(const std::string& link, double time_s) {
 
 std::string ForcePlot::Head(double height) const {
   constexpr double kLegend = 48;
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-      "height=\"{1:.0f}\" "
-      "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-      kWidth, height);
-  svg += Text(kLeft, 24, "start", title_, " font-size=\"15\" font-weight=\"bold\"");
+  std::string svg = svg::Open(kWidth, height);
+  svg += svg::Text(kLeft, 24, "start", title_, " font-size=\"15\" font-weight=\"bold\"");
   double x = kLeft;
-  svg +=
-      Line(x, kLegend - 4, x + 24, kLegend - 4, kTotalStyle) + Text(x + 30, kLegend, "start", "total force");
+  svg += svg::Line(x, kLegend - 4, x + 24, kLegend - 4, kTotalStyle) +
+         svg::Text(x + 30, kLegend, "start", "total force");
   x += 130;
   for (size_t i = 0; i < 3; ++i) {
     const double left = x + 9 * static_cast<double>(i);
-    svg += Line(left, kLegend - 4, left + 8, kLegend - 4, fmt::format("stroke=\"{}\"", kColours[i]));
+    svg += svg::Line(left, kLegend - 4, left + 8, kLegend - 4, fmt::format("stroke=\"{}\"", kColours[i]));
   }
-  svg += Text(x + 32, kLegend, "start", "normal force of each contact");
+  svg += svg::Text(x + 32, kLegend, "start", "normal force of each contact");
   x += 230;
-  svg += Mark(x, kLegend - 9, true) + Text(x + 10, kLegend, "start", "a contact begins");
+  svg += Mark(x, kLegend - 9, true) + svg::Text(x + 10, kLegend, "start", "a contact begins");
   x += 140;
-  return svg + Mark(x, kLegend - 9, false) + Text(x + 10, kLegend, "start", "a contact ends");
+  return svg + Mark(x, kLegend - 9, false) + svg::Text(x + 10, kLegend, "start", "a contact ends");
 }
 
 std::string ForcePlot::TimeAxis(const Place& place, bool labelled) const {
   std::string svg;
-  const double step = TickStep(end_s_ - start_s_, 12);
-  for (const double time_s : Ticks(start_s_, end_s_, step)) {
+  const double step = svg::TickStep(end_s_ - start_s_, 12);
+  for (const double time_s : svg::Ticks(start_s_, end_s_, step)) {
     const double x = XOf(time_s), bottom = place.bottom() + kMarkStrip;
-    svg += Line(x, place.top, x, bottom, "stroke=\"#e4e4e4\"");
-    if (labelled) svg += Text(x, bottom + 16, "middle", Plain(time_s, step));
+    svg += svg::Line(x, place.top, x, bottom, "stroke=\"#e4e4e4\"");
+    if (labelled) svg += svg::Text(x, bottom + 16, "middle", svg::TickText(time_s, step));
   }
   if (labelled)
-    svg += Text(kLeft + kPlotWidth / 2, place.bottom() + kMarkStrip + 36, "middle",
-                "time since the log's start, s");
+    svg += svg::Text(kLeft + kPlotWidth / 2, place.bottom() + kMarkStrip + 36, "middle",
+                     "time since the log's start, s");
   return svg;
 }
 
 std::string ForcePlot::ForceAxis(const Place& place) const {
   std::string svg;
-  for (const double force : Ticks(place.low, place.high, place.step)) {
+  for (const double force : svg::Ticks(place.low, place.high, place.step)) {
     const double y = place.Y(force);
-    svg += Line(kLeft, y, kWidth - kRight, y,
-                std::abs(force) < 1e-12 ? "stroke=\"#999\"" : "stroke=\"#e4e4e4\"");
-    svg += Text(kLeft - 6, y + 4, "end", Plain(force, place.step));
+    svg += svg::Line(kLeft, y, kWidth - kRight, y,
+                     std::abs(force) < 1e-12 ? "stroke=\"#999\"" : "stroke=\"#e4e4e4\"");
+    svg += svg::Text(kLeft - 6, y + 4, "end", svg::TickText(force, place.step));
   }
   const double middle = place.top + kCurves / 2;
-  return svg +
-         Text(20, middle, "middle", "force, N", fmt::format(" transform=\"rotate(-90 20 {:.1f})\"", middle));
+  return svg + svg::Text(20, middle, "middle", "force, N",
+                         fmt::format(" transform=\"rotate(-90 20 {:.1f})\"", middle));
 }
 
 std::string ForcePlot::Curve(const Trace& trace, const Place& place, const std::string& style) const {
@@ -237,9 +183,9 @@ std::string ForcePlot::Draw(const std::string& link, const Panel& panel, const P
   if (!panel.not_drawn.empty())
     name += fmt::format(" ({}{} more contacts are not drawn; cut the log)",
                         panel.not_drawn.size() == kMostContacts ? "at least " : "", panel.not_drawn.size());
-  svg += Text(kLeft, place.top - 8, "start", name, " font-weight=\"bold\"");
+  svg += svg::Text(kLeft, place.top - 8, "start", name, " font-weight=\"bold\"");
   if (panel.total.empty())
-    svg += Text(kLeft + kPlotWidth / 2, place.top + kCurves / 2, "middle", "nothing was measured");
+    svg += svg::Text(kLeft + kPlotWidth / 2, place.top + kCurves / 2, "middle", "nothing was measured");
   for (const auto& [id, contact] : panel.contacts)
     svg += Curve(contact.trace, place,
                  fmt::format("class=\"contact\" stroke=\"{}\"", kColours[id % kColours.size()]));

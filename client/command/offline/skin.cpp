@@ -6,6 +6,7 @@
 #include "client/command/cli/commands.h"
 #include "client/command/cli/json.h"
 #include "client/command/offline/gravity.h"
+#include "client/command/offline/skin_commands.h"
 #include "sensing/model/model_file.h"
 #include "sensing/shell/skin_push.h"
 
@@ -91,6 +92,8 @@ void AddSkin(const Arguments& app, Selected& selected) {
       .Must(OneOf({"nonlinear", "linear"}));
   push.AddFlag("--json", options->json, "One JSON object");
   push.OnChosen([options, &selected] { selected = [options] { return Push(*options); }; });
+  AddSkinStiffness(skin, selected);
+  AddSkinCheck(skin, selected);
 }
 
 }  // namespace taclink::command

@@ -9,6 +9,7 @@
 #include "taclink/result.h"
 #include "taclink/v1/arm.pb.h"
 #include "taclink/v1/frame.pb.h"
+#include "taclink/v1/pressure.pb.h"
 #include "taclink/v1/simulation.pb.h"
 #include "taclink/v1/tactile.pb.h"
 #include "taclink/v1/tare.pb.h"
@@ -119,6 +120,16 @@ class Client {
                                 std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
   Result<void> MoveSceneJoint(const v1::MoveSceneJointRequest& request,
                               std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
+
+  /// Sets the pressure inside a skin that a regulator inflates, or vents it; returns its state after that, at
+  /// once. Errors: kNotFound, kInvalidArgument (outside the limits), kFailedPrecondition (no regulator; it
+  /// has tripped; no reading).
+  Result<v1::PressureRegulator> SetPressure(
+      const v1::SetPressureRequest& request,
+      std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
+  /// Errors: kNotFound, kFailedPrecondition (no regulator).
+  Result<v1::PressureRegulator> GetPressure(
+      const std::string& link, std::chrono::milliseconds timeout = Patience(std::chrono::seconds(10)));
 
   /// Sets exposure and gain; absent fields stay as they are. The settings hold until the server ends. Errors:
   /// kNotFound, kInvalidArgument (with the range of the camera), kUnsupported (nothing to set), kUnavailable

@@ -11,7 +11,7 @@ import { patienceS } from "./patience.mjs";
 
 /** Folder of the .proto files. */
 export const PROTO = fileURLToPath(new URL("../../../proto", import.meta.url));
-const FILES = ["tactile", "recording", "operations", "simulation"].map((name) => `taclink/v1/${name}.proto`);
+const FILES = ["tactile", "recording", "operations", "pressure", "simulation"].map((name) => `taclink/v1/${name}.proto`);
 const definition = protoLoader.loadSync(FILES, {
   includeDirs: [PROTO],
   keepCase: true,
@@ -57,7 +57,7 @@ function noServer(server, error) {
 }
 
 /**
- * A connection with the services `tactile`, `recording`, `operations` and `simulation`, the `caller` that the server takes this
+ * A connection with the services `tactile`, `recording`, `operations`, `pressure` and `simulation`, the `caller` that the server takes this
  * client for, and `close()`. A token goes with every call, never in the clear to another machine. Files are PEM. It
  * waits 3 s for the server, and calls wait 10 s, or what TACLINK_PATIENCE_S says where that is more.
  */
@@ -73,6 +73,7 @@ export async function connect({ server = "127.0.0.1:50051", ...secrets } = {}) {
     tactile: callsOf(v1.TactileService, server, channel, metadata),
     recording: callsOf(v1.RecordingService, server, channel, metadata),
     operations: callsOf(v1.OperationsService, server, channel, metadata),
+    pressure: callsOf(v1.PressureService, server, channel, metadata),
     simulation: callsOf(v1.SimulationService, server, channel, metadata),
     close: () => channel.close(),
   };

@@ -70,6 +70,7 @@ from taclink.messages.others import (
     Preview,
     ReplayPictures,
 )
+from taclink.messages.pressure import PressureTrip, Regulator
 from taclink.messages.recording import (
     Log,
     LogAttachment,
@@ -97,8 +98,10 @@ from taclink.names import (
     MarkerSource,
     PoseValidity,
     PressureOrigin,
+    PressureTripCause,
     Reason,
     RecorderState,
+    RegulatorState,
     Role,
     SourceKind,
     Supervision,
@@ -191,6 +194,8 @@ __all__ = [
     "PressureOrigin",
     "PressureReport",
     "PressureSummary",
+    "PressureTrip",
+    "PressureTripCause",
     "PressureWriter",
     "Preview",
     "PreviewStream",
@@ -199,6 +204,8 @@ __all__ = [
     "RecorderStatus",
     "RecordingLoss",
     "Refused",
+    "Regulator",
+    "RegulatorState",
     "Replay",
     "ReplayMessage",
     "ReplayPictures",

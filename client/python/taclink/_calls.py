@@ -21,15 +21,25 @@ from taclink.messages.recording import (
     logs_from,
     recorder_from,
 )
+from taclink.messages.pressure import Regulator, regulator_from
 from taclink.names import BodyShape, ForceModel, LogCompression, number_of
-from taclink.v1 import events_pb2, history_pb2, operations_pb2, recording_pb2, simulation_pb2, tactile_pb2, tare_pb2
+from taclink.v1 import (
+    events_pb2,
+    history_pb2,
+    operations_pb2,
+    pressure_pb2,
+    recording_pb2,
+    simulation_pb2,
+    tactile_pb2,
+    tare_pb2,
+)
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Call(Generic[T]):
-    """`method` of `service` (tactile, operations, recording or simulation), and what its answer means."""
+    """`method` of `service` (tactile, operations, pressure, recording or simulation), and what its answer means."""
 
     service: str
     method: str
@@ -104,6 +114,26 @@ def set_scene_pressure(link: str, pressure_pa: float | None) -> Call[None]:
 def move_scene_joint(link: str, position_rad: float | None) -> Call[None]:
     request = simulation_pb2.MoveSceneJointRequest(link=link, position_rad=position_rad)
     return Call("simulation", "MoveSceneJoint", request, _nothing)
+
+
+def _regulator_of(answer: Any) -> Regulator:
+    return regulator_from(answer.regulator)
+
+
+def set_pressure(link: str, pressure_pa: float, ramp_pa_per_s: float | None, reset_trip: bool) -> Call[Regulator]:
+    request = pressure_pb2.SetPressureRequest(
+        link=link, pressure_pa=pressure_pa, ramp_pa_per_s=ramp_pa_per_s, reset_trip=reset_trip
+    )
+    return Call("pressure", "SetPressure", request, _regulator_of)
+
+
+def vent(link: str, reset_trip: bool) -> Call[Regulator]:
+    request = pressure_pb2.SetPressureRequest(link=link, vent=True, reset_trip=reset_trip)
+    return Call("pressure", "SetPressure", request, _regulator_of)
+
+
+def regulator(link: str) -> Call[Regulator]:
+    return Call("pressure", "GetPressure", pressure_pb2.GetPressureRequest(link=link), _regulator_of)
 
 
 def tare(

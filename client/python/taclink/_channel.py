@@ -13,7 +13,13 @@ import grpc
 from taclink._patience import patience_s
 from taclink._process import check
 from taclink.errors import InvalidArgument, NotFound
-from taclink.v1 import operations_pb2_grpc, recording_pb2_grpc, simulation_pb2_grpc, tactile_pb2_grpc
+from taclink.v1 import (
+    operations_pb2_grpc,
+    pressure_pb2_grpc,
+    recording_pb2_grpc,
+    simulation_pb2_grpc,
+    tactile_pb2_grpc,
+)
 
 DEFAULT_ADDRESS = "127.0.0.1:50051"
 FilePath = Union[str, "os.PathLike[str]"]
@@ -52,6 +58,7 @@ def stubs(channel: Any) -> dict[str, Any]:
     return {
         "tactile": tactile_pb2_grpc.TactileServiceStub(channel),
         "operations": operations_pb2_grpc.OperationsServiceStub(channel),
+        "pressure": pressure_pb2_grpc.PressureServiceStub(channel),
         "recording": recording_pb2_grpc.RecordingServiceStub(channel),
         "simulation": simulation_pb2_grpc.SimulationServiceStub(channel),
     }

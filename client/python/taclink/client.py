@@ -20,6 +20,7 @@ from taclink.messages.events import EventPlace
 from taclink.messages.force_level import ForceLevelState
 from taclink.messages.history import ForceHistory
 from taclink.messages.others import Caller
+from taclink.messages.pressure import Regulator
 from taclink.messages.recording import Log, LogDescription, RecorderStatus
 from taclink.streams import (
     AttitudeWriter,
@@ -307,6 +308,25 @@ class Client:
     def move_scene_joint(self, link: str, position_rad: float | None) -> None:
         """Moves the joint of a simulated link's scene; None: as the scene swings it. Errors: as press()."""
         self._connection.ask(_calls.move_scene_joint(link, position_rad))
+
+    def set_pressure(
+        self, link: str, pressure_pa: float, *, ramp_pa_per_s: float | None = None, reset_trip: bool = False
+    ) -> Regulator:
+        """Moves the setpoint of a link's pressure regulator (Pa, gauge) along a ramp, and returns at once.
+
+        ramp_pa_per_s: at most the configured one, which None means. reset_trip: of a regulator that closed its valve
+        because a limit was exceeded. Errors: NotFound, InvalidArgument (outside the limits), Refused (the link has no
+        regulator, it has tripped, or it gives no reading).
+        """
+        return self._connection.ask(_calls.set_pressure(link, pressure_pa, ramp_pa_per_s, reset_trip))
+
+    def vent(self, link: str, *, reset_trip: bool = False) -> Regulator:
+        """Closes the valve of a link's pressure regulator and vents the skin, at once. Errors: NotFound, Refused."""
+        return self._connection.ask(_calls.vent(link, reset_trip))
+
+    def regulator(self, link: str) -> Regulator:
+        """The state of a link's pressure regulator. Errors: NotFound, Refused (the link has none)."""
+        return self._connection.ask(_calls.regulator(link))
 
     def update_joint_states(self) -> JointStateWriter:
         """Begins to tell the server where the arm's joints are."""

@@ -62,6 +62,8 @@ constexpr std::array kBounds = {
     Bounds{"UpdatePressureRequest.pressure_pa", -kMostVacuumPa, kMostPressurePa, "Pa above the surroundings"},
     Bounds{"UpdatePressureRequest.utc_ns", 0, kNoLimit, "ns since 1970"},
     Bounds{"UpdatePressureRequest.monotonic_ns", 0, kNoLimit, "ns of the server's clock"},
+    Bounds{"SetPressureRequest.pressure_pa", 0, kMostPressurePa, "Pa above the surroundings"},
+    Bounds{"SetPressureRequest.ramp_pa_per_s", 0, kMostPressurePa, "Pa/s"},
     Bounds{"PressRequest.diameter_m", 0, kMostLengthM, "m; 0: 0.011"},
     Bounds{"PressRequest.angle_rad", -kMostPosition, kMostPosition, "rad"},
     Bounds{"PressRequest.z_m", 0, kMostLengthM, "m"},

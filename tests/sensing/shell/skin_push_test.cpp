@@ -170,6 +170,63 @@ TEST_F(SkinPushTest, DiscThatDoesNotTouchFeelsNothing) {
   EXPECT_GT(ForceN(1.5, -1), 0);  // inflated by more than 1 mm
 }
 
+// Each disc begins from the same skin, whatever was pressed before it.
+TEST_F(SkinPushTest, ALoadedSkinAnswersAsAFreshOne) {
+  constexpr double kPressureMpa = 1e-3, kDiscMm = 5.5;
+  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, {}}, 1);
+  ASSERT_TRUE(loaded.ok());
+  for (const int ring : {4, 0, 4}) {
+    const int marker = model_.MarkerIndex(2, ring);
+    for (const double depth_mm : {6.0, 2.0}) {
+      const auto fresh = PushSkin(
+          model_, {.marker = marker, .depth_mm = depth_mm, .pressure_mpa = kPressureMpa, .refinement = 1});
+      const auto again = loaded->Push(marker, {&depth_mm, 1}, kDiscMm);
+      ASSERT_TRUE(fresh.ok() && again.ok());
+      EXPECT_NEAR(again->front().force_n, fresh->force_n, 1e-4 * fresh->force_n) << ring << " " << depth_mm;
+    }
+  }
+}
+
+TEST_F(SkinPushTest, SecantStiffnessIsThatOfAPushFromTheInflatedSurface) {
+  constexpr double kPressureMpa = 1.2e-3, kIndentationMm = 4;
+  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, {}}, 1);
+  ASSERT_TRUE(loaded.ok());
+  const int marker = model_.MarkerIndex(0, 3);
+  const auto stiffness = loaded->Stiffness(marker, kIndentationMm, 5.5);
+  ASSERT_TRUE(stiffness.ok());
+  EXPECT_GT(stiffness->inflation_mm, 3);
+  const auto push = PushSkin(model_, {.marker = marker,
+                                      .depth_mm = kIndentationMm - stiffness->inflation_mm,
+                                      .pressure_mpa = kPressureMpa,
+                                      .refinement = 1});
+  ASSERT_TRUE(push.ok());
+  EXPECT_NEAR(stiffness->force_n, push->force_n, 2e-3 * push->force_n);
+  EXPECT_DOUBLE_EQ(stiffness->secant_n_per_mm, stiffness->force_n / kIndentationMm);
+}
+
+// The linear shell, another element, pushed at one node. Its load is more concentrated than the disc's, which
+// makes it softer; the wall under the disc gives way, which makes the other one softer.
+TEST_F(SkinPushTest, OnsetStiffnessIsThatOfTheLinearShell) {
+  auto loaded = LoadedSkin::Make(model_, {}, 3);
+  ASSERT_TRUE(loaded.ok());
+  for (const int ring : {0, 4}) {
+    const int marker = model_.MarkerIndex(6, ring);
+    const auto linear = PushSkin(
+        model_, {.marker = marker, .depth_mm = 1, .refinement = 3, .force_model = ForceModel::kLinear});
+    const auto stiffness = loaded->Stiffness(marker, 5, 5.5);
+    ASSERT_TRUE(linear.ok() && stiffness.ok());
+    EXPECT_NEAR(stiffness->onset_n_per_mm, linear->force_n, 0.12 * linear->force_n) << ring;
+  }
+}
+
+TEST_F(SkinPushTest, StiffnessNeedsAnIndentationAndAPlace) {
+  auto loaded = LoadedSkin::Make(model_, {}, 1);
+  ASSERT_TRUE(loaded.ok());
+  EXPECT_FALSE(loaded->Stiffness(0, 0, 5.5).ok());
+  EXPECT_FALSE(loaded->Stiffness(240, 1, 5.5).ok());
+  EXPECT_FALSE(loaded->Stiffness(0, 25, 5.5).ok()) << "beyond the tube";
+}
+
 TEST_F(SkinPushTest, RefusesWhatCannotBe) {
   const auto message = [&](const SkinPush& push) {
     const auto result = PushSkin(model_, push);

@@ -79,7 +79,7 @@ TEST_P(PlayedTest, IsTheEquilibriumAtAnyTime) {
       SkinKey key;
       ASSERT_TRUE(solver.SolveAt(part.part, t, balance, key));
       const SkinLoad load = solver.loads().At(part.part, t);
-      worst_residual = std::max(worst_residual, solver.skin().Residual(load, balance));
+      worst_residual = std::max(worst_residual, solver.skin().Residual(load, balance).cwiseAbs().maxCoeff());
       SkinTruth truth;
       skin->Evaluate(t, truth);
       worst_mm = std::max(worst_mm, Apart(truth.marker_mm, MarkersOf(model, solver.mesh(), balance.state)));

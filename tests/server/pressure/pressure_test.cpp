@@ -1,11 +1,8 @@
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <termios.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <deque>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +10,7 @@
 #include "server/pressure/line_reader.h"
 #include "server/pressure/pressure_readers.h"
 #include "server/pressure/pressure_sensor.h"
+#include "tests/server/pressure/pseudo_terminal.h"
 #include "tests/server/support.h"
 #include "tests/support/times.h"
 
@@ -241,28 +239,6 @@ TEST_F(ReaderTest, APipeGivesANumberALine) {
   }
   EXPECT_FALSE(MakeFilePressureReader("/dev/null", SystemClock())->Open().ok());
 }
-
-/// A serial line: the test is the sensor.
-class PseudoTerminal {
- public:
-  PseudoTerminal() : master_(posix_openpt(O_RDWR | O_NOCTTY)) {
-    EXPECT_GE(master_, 0);
-    EXPECT_EQ(grantpt(master_), 0);
-    EXPECT_EQ(unlockpt(master_), 0);
-  }
-  ~PseudoTerminal() { Close(); }
-  std::string device() const { return ptsname(master_); }
-  void Send(const std::string& text) const {
-    EXPECT_EQ(write(master_, text.data(), text.size()), static_cast<ssize_t>(text.size()));
-  }
-  void Close() {
-    if (master_ >= 0) close(master_);
-    master_ = -1;
-  }
-
- private:
-  int master_;
-};
 
 TEST_F(ReaderTest, ASerialLineIsReadLineByLine) {
   PseudoTerminal line;

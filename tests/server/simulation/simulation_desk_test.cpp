@@ -68,5 +68,21 @@ TEST_F(SimulationDeskTest, WhatIsRefusedChangesNothing) {
   EXPECT_FALSE(desk_.Now().pressure_mpa.has_value());
 }
 
+TEST_F(SimulationDeskTest, ARegulatorSetsThePressure) {
+  const auto regulator = std::make_shared<SimulatedRegulator>(SimulatedRegulatorOptions{}, 1, clock_);
+  SimulationDesk desk(LoadLinkModel("cylinder").value(), LoadScene("rest").value(), clock_, regulator);
+  EXPECT_FALSE(desk.Now().any()) << "a vented skin is left to its scene";
+  ASSERT_TRUE(regulator->Command(1.0).ok());
+  clock_.Advance(std::chrono::milliseconds(300));
+  const Handling now = desk.Now();
+  EXPECT_NEAR(now.pressure_mpa.value(), 0.3e-3, 0.01e-3) << "at its highest rate, 1 kPa/s";
+  EXPECT_NEAR(now.pressure_mpaps, 1e-3, 0.01e-3);
+  const auto refused = desk.SetPressure(0.0005);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::kFailedPrecondition);
+  EXPECT_TRUE(desk.SetPressure(std::nullopt).ok()) << "as 'poke --release' does for all links";
+  EXPECT_TRUE(desk.Now().pressure_mpa.has_value());
+}
+
 }  // namespace
 }  // namespace taclink::server

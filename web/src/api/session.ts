@@ -1,7 +1,9 @@
 import { Code, ConnectError, createClient, type Client, type Interceptor } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { computed, signal } from "@preact/signals";
+import { AcceptanceService } from "./gen/taclink/v1/acceptance_pb";
 import { OperationsService, Role, type GetCallerResponse } from "./gen/taclink/v1/operations_pb";
+import { PressureService } from "./gen/taclink/v1/pressure_pb";
 import { RecordingService } from "./gen/taclink/v1/recording_pb";
 import { SimulationService } from "./gen/taclink/v1/simulation_pb";
 import { TactileService } from "./gen/taclink/v1/tactile_pb";
@@ -13,6 +15,8 @@ export class Session {
   readonly tactile: Client<typeof TactileService>;
   readonly recording: Client<typeof RecordingService>;
   readonly operations: Client<typeof OperationsService>;
+  readonly acceptance: Client<typeof AcceptanceService>;
+  readonly pressure: Client<typeof PressureService>;
   readonly simulation: Client<typeof SimulationService>;
 
   /** As the server sees the user; undefined: not asked yet. */
@@ -33,6 +37,8 @@ export class Session {
     this.tactile = createClient(TactileService, transport);
     this.recording = createClient(RecordingService, transport);
     this.operations = createClient(OperationsService, transport);
+    this.acceptance = createClient(AcceptanceService, transport);
+    this.pressure = createClient(PressureService, transport);
     this.simulation = createClient(SimulationService, transport);
   }
 

@@ -1,5 +1,7 @@
 const DASH = "–";
 
+export const PASCALS_PER_KPA = 1e3;
+
 /** With so many digits after the point; a dash where there is no number. */
 export function fixed(value: number | undefined, digits: number): string {
   return value === undefined || !Number.isFinite(value) ? DASH : value.toFixed(digits);

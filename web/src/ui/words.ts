@@ -108,6 +108,8 @@ function detailText(event: Event): string {
       return `${STATUS_WORDS[detail.value.status]}${detail.value.reason ? `: ${detail.value.reason}` : ""}`;
     case "operation": {
       if (event.kind === EventKind.CLOCK_STEPPED) return `clock: ${detail.value.outcome}`;
+      if (event.kind === EventKind.PRESSURE_TRIP && !detail.value.accepted)
+        return `pressure regulator closed its valve: ${detail.value.outcome}`;
       const end = detail.value.accepted ? "done" : "refused";
       return `${nameOf(EventKindSchema, event.kind)} ${end} by ${detail.value.who}${detail.value.outcome ? `: ${detail.value.outcome}` : ""}`;
     }

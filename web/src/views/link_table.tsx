@@ -6,13 +6,11 @@ import { LinkStatus, Reason } from "../api/gen/taclink/v1/frame_pb";
 import type { Baseline } from "../api/gen/taclink/v1/tare_pb";
 import { selectedLink, useApp } from "../app_state";
 import { totalMagnitudeN } from "../model/magnitude";
-import { duration, fixed, milliseconds, newtons } from "../ui/format";
+import { duration, fixed, milliseconds, newtons, PASCALS_PER_KPA } from "../ui/format";
 import { OperatorButton } from "../ui/operator_button";
 import { LEVEL_WORDS, MODEL_WORDS, severity, STATUS_SIGNS, STATUS_WORDS, statusOf } from "../ui/words";
 
 import { TareDialog } from "./tare_dialog";
-
-const PASCALS_PER_KPA = 1e3;
 
 /** A row for each link; what needs attention is above. */
 export function LinkTable() {

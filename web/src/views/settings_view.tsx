@@ -12,7 +12,9 @@ import { duration, fixed, newtons } from "../ui/format";
 import { NumberField } from "../ui/number_field";
 import { OperatorButton } from "../ui/operator_button";
 import { MODEL_NOTES, MODEL_WORDS } from "../ui/words";
+import { AcceptanceForm } from "./acceptance_form";
 import { CameraView } from "./camera_view";
+import { PressureForm } from "./pressure_form";
 import { Steps, TareDialog, TouchLine } from "./tare_dialog";
 
 /** All that can be chosen, the most exact ones first. */
@@ -28,6 +30,8 @@ export function SettingsView({ link }: { link: Link }) {
   return (
     <div class="settings">
       <Baseline link={link} />
+      {link.regulator && <PressureForm link={link.name} last={link.regulator} />}
+      <AcceptanceForm link={link} />
       <Model link={link} />
       {link.forceLevels.map((state) => (
         <ThresholdForm key={`${link.name}\n${state.region}`} link={link} state={state} />

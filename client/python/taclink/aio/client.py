@@ -33,6 +33,7 @@ from taclink.messages.events import EventPlace
 from taclink.messages.force_level import ForceLevelState
 from taclink.messages.history import ForceHistory
 from taclink.messages.others import Caller
+from taclink.messages.pressure import Regulator
 from taclink.messages.recording import Log, LogDescription, RecorderStatus
 from taclink.v1 import contacts_pb2, preview_pb2
 
@@ -228,6 +229,17 @@ class Client:
 
     async def move_scene_joint(self, link: str, position_rad: float | None) -> None:
         await self._connection.ask(_calls.move_scene_joint(link, position_rad))
+
+    async def set_pressure(
+        self, link: str, pressure_pa: float, *, ramp_pa_per_s: float | None = None, reset_trip: bool = False
+    ) -> Regulator:
+        return await self._connection.ask(_calls.set_pressure(link, pressure_pa, ramp_pa_per_s, reset_trip))
+
+    async def vent(self, link: str, *, reset_trip: bool = False) -> Regulator:
+        return await self._connection.ask(_calls.vent(link, reset_trip))
+
+    async def regulator(self, link: str) -> Regulator:
+        return await self._connection.ask(_calls.regulator(link))
 
     def update_joint_states(self) -> JointStateWriter:
         return JointStateWriter(self._connection)

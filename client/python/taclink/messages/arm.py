@@ -9,6 +9,7 @@ import numpy as np
 from taclink.messages.arrays import FloatArray, alike, numbers, optional, rows, vector
 from taclink.messages.baseline import Baseline, baseline_from
 from taclink.messages.force_level import ForceLevelState, force_level_state_from
+from taclink.messages.pressure import Regulator, regulator_from
 from taclink.names import JointKind, LinkStatus, PoseValidity, SourceKind, Supervision, name_of
 from taclink.v1 import arm_pb2, camera_pb2, geometry_pb2, joints_pb2
 
@@ -144,6 +145,7 @@ class Link:
     baseline: Baseline
     supervision: Supervision
     supervision_reason: str  # empty while the worker runs
+    regulator: Regulator | None  # None: no regulator sets its pressure
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, slots=True)
@@ -223,6 +225,7 @@ def _link_from(message: arm_pb2.Link) -> Link:
         force_levels=tuple(map(force_level_state_from, message.force_levels)),
         baseline=baseline_from(message.baseline),
         supervision=name_of(Supervision, message.supervision),
+        regulator=regulator_from(message.regulator) if message.HasField("regulator") else None,
     )
 
 

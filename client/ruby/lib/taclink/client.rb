@@ -20,7 +20,7 @@ module Taclink
     UNREACHABLE = [GRPC::Unavailable, GRPC::DeadlineExceeded].freeze
 
     # Services, and whom the server takes this client for.
-    attr_reader :tactile, :recording, :operations, :simulation, :caller
+    attr_reader :tactile, :recording, :operations, :pressure, :simulation, :caller
 
     # A token goes with every call, never in the clear to another machine. It waits 3 s for the server, and calls wait
     # 10 s, or what TACLINK_PATIENCE_S says where that is more.
@@ -32,8 +32,9 @@ module Taclink
       options = { 'grpc.enable_http_proxy' => 0, 'grpc.use_local_subchannel_pool' => 1,
                   'grpc.min_reconnect_backoff_ms' => (1000 * Patience.seconds(ATTEMPT_S)).round }
       @channel = GRPC::Core::Channel.new(server, options, credentials.for_channel)
-      services = [V1::TactileService, V1::RecordingService, V1::OperationsService, V1::SimulationService]
-      @tactile, @recording, @operations, @simulation = services.map do |service|
+      services = [V1::TactileService, V1::RecordingService, V1::OperationsService, V1::PressureService,
+                  V1::SimulationService]
+      @tactile, @recording, @operations, @pressure, @simulation = services.map do |service|
         Calls.new(service, server, @channel, metadata)
       end
       greet(server)

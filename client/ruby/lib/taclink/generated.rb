@@ -50,7 +50,7 @@ module Taclink
       made = folder
       make(made) unless File.directory?(made)
       $LOAD_PATH.unshift(made) unless $LOAD_PATH.include?(made)
-      %w[tactile recording operations simulation].each { |name| require "taclink/v1/#{name}_services_pb" }
+      %w[tactile recording operations pressure simulation].each { |name| require "taclink/v1/#{name}_services_pb" }
     end
   end
 end
