@@ -173,7 +173,7 @@ TEST_F(SkinPushTest, DiscThatDoesNotTouchFeelsNothing) {
 // Each disc begins from the same skin, whatever was pressed before it.
 TEST_F(SkinPushTest, ALoadedSkinAnswersAsAFreshOne) {
   constexpr double kPressureMpa = 1e-3, kDiscMm = 5.5;
-  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, {}}, {.refinement = 1});
+  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, Vec3::Zero()}, {.refinement = 1});
   ASSERT_TRUE(loaded.ok());
   for (const int ring : {4, 0, 4}) {
     const int marker = model_.MarkerIndex(2, ring);
@@ -189,7 +189,7 @@ TEST_F(SkinPushTest, ALoadedSkinAnswersAsAFreshOne) {
 
 TEST_F(SkinPushTest, SecantStiffnessIsThatOfAPushFromTheInflatedSurface) {
   constexpr double kPressureMpa = 1.2e-3, kIndentationMm = 4;
-  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, {}}, {.refinement = 1});
+  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, Vec3::Zero()}, {.refinement = 1});
   ASSERT_TRUE(loaded.ok());
   const int marker = model_.MarkerIndex(0, 3);
   const auto stiffness = loaded->Stiffness(marker, kIndentationMm, 5.5);
