@@ -14,7 +14,8 @@ constexpr int kScan = 20;                   // steps from no pressure to the mos
 constexpr int kBisections = 7;              // of one step
 constexpr double kMostGrowth = 0.5;         // of the radius
 constexpr double kPressureSigmaMpa = 5e-5;  // as the server assumes of a pressure sensor
-constexpr int kPushRefinement = 1;
+// Coarser along, forces beside a clamp come out a quarter too high.
+constexpr int kPushRefinement = 1, kPushRefinementAlong = 2;
 constexpr double kPushStepMm = 3;                                               // in length units
 constexpr std::array<double, 6> kDepthShares = {0.15, 0.3, 0.45, 0.6, 0.8, 1};  // of the way to the tube
 
@@ -190,7 +191,10 @@ SkinForces FindForces(SkinEstimator& estimator, const KnownLoads& loads,
   forces.growth_mm = LongestOutward(model, untouched->markers_mm);
   forces.by_ring.resize(static_cast<size_t>(model.markers.rings()));
   FindLeastForces(estimator, resolutions, forces);
-  auto skin = LoadedSkin::Make(model, loads, kPushRefinement, kPushStepMm * LengthUnit(model));
+  auto skin = LoadedSkin::Make(model, loads,
+                               {.refinement = kPushRefinement,
+                                .refinement_along = kPushRefinementAlong,
+                                .step_mm = kPushStepMm * LengthUnit(model)});
   for (int ring = 0; ring < model.markers.rings(); ++ring) {
     RingForce& force = forces.by_ring[static_cast<size_t>(ring)];
     force.room_mm = RoomBehindMm(model, model.MarkerIndex(0, ring)) - model.markers.diameter_mm / 2;

@@ -98,6 +98,9 @@ void AddLeastForce(const SkinDesign& design, const SkinForces& forces, std::vect
                      " mm, or a modulus of at most " + Digits(model.material.youngs_modulus_mpa * factor) +
                      " MPa";
     if (!is_slack) finding.change += ", or less pressure";
+    // Beside a clamp the skin moves little, however thin it is.
+    if (weak <= 2 && (worst == 0 || worst + 1 == model.markers.rings()))
+      finding.change = "that ring further from the clamped end; or " + finding.change;
   }
   findings.push_back(AtMarker(model, model.MarkerIndex(0, worst), std::move(finding)));
 }

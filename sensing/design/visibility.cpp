@@ -101,10 +101,10 @@ MarkerView ViewOf(const Projector& camera, const SkinGeometry& geometry, int mar
   view.margin_px = MarginPx(camera, *outline);
   const Vec3 center = geometry.OnDome(marker, kCenterHeight * geometry.dome_radius_mm);
   view.clearance_mm = ClearanceMm(geometry, center, eye);
-  if ((eye - geometry.feet[m]).dot(geometry.inward[m]) <= 0) {
-    view.sight = Sight::kTurnedAway;
-  } else if (view.clearance_mm < -kGrazingMm) {
+  if (view.clearance_mm < -kGrazingMm) {
     view.sight = Sight::kBehindWall;
+  } else if ((eye - geometry.feet[m]).dot(geometry.inward[m]) <= 0) {
+    view.sight = Sight::kTurnedAway;
   } else if (IsBehindTube(geometry, center, eye)) {
     view.sight = Sight::kBehindTube;
   } else {

@@ -35,6 +35,12 @@ double RadiusAtMid(const LinkModel& model) {
   return model.PointAtDepth(0, model.length_mm / 2, model.thickness_mm / 2).head<2>().norm();
 }
 
+ShellMesh MeshOf(const LinkModel& model, const PressedSkinOptions& options) {
+  ShellMesh mesh = MakeShellMesh(model, options.refinement);
+  if (options.refinement_along == 0) return mesh;
+  return MakeShellMesh(model, MeshRefinement{mesh.refinement, options.refinement_along});
+}
+
 // By how far a specific force across the axis moves the middle of a linear skin: as a beam between its
 // clamps, w L^4 / 384 E I, and by shear, w L^2 / 8 k G A with k = 1/2 of a thin tube [timoshenko1921]. Along
 // the axis it moves the skin less.
@@ -69,7 +75,7 @@ std::string PressSummary::Text() const {
 PressedSkin::PressedSkin(const LinkModel& model, const PressedSkinOptions& options)
     : model_(model),
       options_(options),
-      mesh_(MakeShellMesh(model, options.refinement)),
+      mesh_(MeshOf(model, options)),
       markers_(model, mesh_),
       shell_(SkinSurface(mesh_), model.material),
       solver_(shell_, SolverOptions(model)),

@@ -24,6 +24,7 @@ inline constexpr double kPressureStep = 0.044;
 
 struct PressedSkinOptions {
   int refinement = 2;           ///< elements per interval of the marker grid
+  int refinement_along = 0;     ///< of those between rings; 0: as many as between paths
   double step_mm = 1;           ///< longest motion of a body from one equilibrium to the next
   double least_step_mm = 0.01;  ///< gives up below
   /// Longest change of pressure, of PressureScale; of weight, what moves a skin as far.

@@ -144,11 +144,10 @@ LoadedSkin::LoadedSkin(LoadedSkin&&) noexcept = default;
 LoadedSkin& LoadedSkin::operator=(LoadedSkin&&) noexcept = default;
 LoadedSkin::~LoadedSkin() = default;
 
-Result<LoadedSkin> LoadedSkin::Make(const LinkModel& model, const KnownLoads& loads, int refinement,
-                                    double step_mm) {
-  if (auto good = CheckLoads(loads, refinement); !good) return good.error();
-  auto skin =
-      std::make_unique<PressedSkin>(model, PressedSkinOptions{.refinement = refinement, .step_mm = step_mm});
+Result<LoadedSkin> LoadedSkin::Make(const LinkModel& model, const KnownLoads& loads,
+                                    const PressedSkinOptions& options) {
+  if (auto good = CheckLoads(loads, options.refinement); !good) return good.error();
+  auto skin = std::make_unique<PressedSkin>(model, options);
   const PressSummary inflated = skin->Load(loads);
   if (!inflated.ok()) {
     const bool is_weightless = loads.specific_force_mps2.isZero(0);
@@ -246,7 +245,7 @@ Result<SkinPushResult> PushSkin(const LinkModel& model, const SkinPush& push) {
         ErrorCode::kUnsupported,
         std::string("a push is solved with force model linear or nonlinear, not ") + Name(push.force_model)};
   }
-  auto skin = LoadedSkin::Make(model, loads, push.refinement);
+  auto skin = LoadedSkin::Make(model, loads, {.refinement = push.refinement});
   if (!skin) return skin.error();
   const auto pushed = skin->Push(push.marker, {&push.depth_mm, 1}, push.patch_diameter_mm);
   if (!pushed) return pushed.error();

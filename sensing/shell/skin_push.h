@@ -11,6 +11,7 @@
 #include "sensing/core/link_model.h"
 #include "sensing/core/result.h"
 #include "sensing/shell/nonlinear_shell.h"
+#include "sensing/shell/pressed_skin.h"
 
 namespace taclink {
 
@@ -52,15 +53,13 @@ struct SkinStiffness {
   double onset_n_per_mm = 0;
 };
 
-class PressedSkin;
-
 /// A skin in equilibrium under pressure and weight, against which discs are pressed one after another; each
 /// disc begins from that same equilibrium. The nonlinear shell. One thread.
 class LoadedSkin {
  public:
-  /// `refinement`, `step_mm`: as in PressedSkinOptions. Errors: those of PushSkin.
-  static Result<LoadedSkin> Make(const LinkModel& model, const KnownLoads& loads, int refinement = 3,
-                                 double step_mm = 1);
+  /// Errors: those of PushSkin.
+  static Result<LoadedSkin> Make(const LinkModel& model, const KnownLoads& loads,
+                                 const PressedSkinOptions& options = {.refinement = 3});
   LoadedSkin(LoadedSkin&&) noexcept;
   LoadedSkin& operator=(LoadedSkin&&) noexcept;
   ~LoadedSkin();

@@ -79,7 +79,8 @@ Result<StiffnessReport> Evaluate(const StiffnessOptions& options, const LinkMode
   const size_t all = options.pressures_kpa.size() * places->size();
   bool any = false;
   for (const double pressure_kpa : options.pressures_kpa) {
-    auto skin = LoadedSkin::Make(model, {pressure_kpa * kMpaPerKpa, specific_force_mps2}, options.refinement);
+    auto skin = LoadedSkin::Make(model, {pressure_kpa * kMpaPerKpa, specific_force_mps2},
+                                 {.refinement = options.refinement});
     for (const auto& [path, ring] : *places) {
       StiffnessRow& row = report.rows.emplace_back();
       row.path = path + 1;
@@ -111,7 +112,8 @@ Result<std::vector<ComparedRow>> CompareForces(const StiffnessOptions& options, 
   Progress progress("the rows");
   double done = 0;
   for (const double pressure_mpa : pressures_mpa) {
-    auto skin = LoadedSkin::Make(model, {pressure_mpa, specific_force_mps2}, options.refinement);
+    auto skin =
+        LoadedSkin::Make(model, {pressure_mpa, specific_force_mps2}, {.refinement = options.refinement});
     for (ComparedRow& row : rows) {
       if (row.measured.pressure_mpa != pressure_mpa) continue;
       if (!skin) return Error{skin.error().code, row.measured.name + ": " + skin.error().message};

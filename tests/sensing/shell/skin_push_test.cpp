@@ -173,7 +173,7 @@ TEST_F(SkinPushTest, DiscThatDoesNotTouchFeelsNothing) {
 // Each disc begins from the same skin, whatever was pressed before it.
 TEST_F(SkinPushTest, ALoadedSkinAnswersAsAFreshOne) {
   constexpr double kPressureMpa = 1e-3, kDiscMm = 5.5;
-  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, {}}, 1);
+  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, Vec3::Zero()}, {.refinement = 1});
   ASSERT_TRUE(loaded.ok());
   for (const int ring : {4, 0, 4}) {
     const int marker = model_.MarkerIndex(2, ring);
@@ -189,7 +189,7 @@ TEST_F(SkinPushTest, ALoadedSkinAnswersAsAFreshOne) {
 
 TEST_F(SkinPushTest, SecantStiffnessIsThatOfAPushFromTheInflatedSurface) {
   constexpr double kPressureMpa = 1.2e-3, kIndentationMm = 4;
-  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, {}}, 1);
+  auto loaded = LoadedSkin::Make(model_, {kPressureMpa, Vec3::Zero()}, {.refinement = 1});
   ASSERT_TRUE(loaded.ok());
   const int marker = model_.MarkerIndex(0, 3);
   const auto stiffness = loaded->Stiffness(marker, kIndentationMm, 5.5);
@@ -207,7 +207,7 @@ TEST_F(SkinPushTest, SecantStiffnessIsThatOfAPushFromTheInflatedSurface) {
 // The linear shell, another element, pushed at one node. Its load is more concentrated than the disc's, which
 // makes it softer; the wall under the disc gives way, which makes the other one softer.
 TEST_F(SkinPushTest, OnsetStiffnessIsThatOfTheLinearShell) {
-  auto loaded = LoadedSkin::Make(model_, {}, 3);
+  auto loaded = LoadedSkin::Make(model_, {}, {.refinement = 3});
   ASSERT_TRUE(loaded.ok());
   for (const int ring : {0, 4}) {
     const int marker = model_.MarkerIndex(6, ring);
@@ -220,7 +220,7 @@ TEST_F(SkinPushTest, OnsetStiffnessIsThatOfTheLinearShell) {
 }
 
 TEST_F(SkinPushTest, StiffnessNeedsAnIndentationAndAPlace) {
-  auto loaded = LoadedSkin::Make(model_, {}, 1);
+  auto loaded = LoadedSkin::Make(model_, {}, {.refinement = 1});
   ASSERT_TRUE(loaded.ok());
   EXPECT_FALSE(loaded->Stiffness(0, 0, 5.5).ok());
   EXPECT_FALSE(loaded->Stiffness(240, 1, 5.5).ok());
