@@ -33,8 +33,19 @@ struct MeasuredLoads {
   double pressure_mpa = 0, pressure_sigma_mpa = 0;
   Vec3 specific_force_mps2 = Vec3::Zero();
   Mat3 specific_force_covariance = Mat3::Zero();  ///< (m/s^2)^2; zero: it is taken as exact
+  /// What makes them the loads under which the elastic skin has the shape of one that creeps (CreepHistory):
+  /// they are the measured ones and this. As KnownLoads::Stacked().
+  Vec4 by_creep = Vec4::Zero();
 
   KnownLoads Loads() const { return {pressure_mpa, specific_force_mps2}; }
+  /// As measured.
+  MeasuredLoads Real() const {
+    MeasuredLoads real = *this;
+    real.pressure_mpa -= by_creep[0];
+    real.specific_force_mps2 -= by_creep.tail<3>();
+    real.by_creep.setZero();
+    return real;
+  }
   /// Of a link that rests in any attitude: gravity of any direction, so that each component has a third of
   /// its square.
   void ForgetAttitude() {

@@ -106,7 +106,7 @@ void BaselineKeeper::Apply(const MeasuredLoads& loads, const SkinEstimate& estim
 void BaselineKeeper::Learn(const FrameTimes& times, LinkState& state, const LabelledMarkers& labels,
                            SkinStage& skin, StateEstimator& estimator, const Clock& clock) {
   waits_since_ns_.reset();
-  if (drift_) FollowDrift(times, state, clock);
+  if (drift_) FollowDrift(times, state, estimator.IsRecovering(), clock);
   Tell(times, state, clock);
   if (tare_) TakeTareFrame(times, state, labels, skin, estimator, clock);
 }
@@ -128,12 +128,15 @@ void BaselineKeeper::Tell(const FrameTimes& times, LinkState& state, const Clock
   state.baseline_age_s = AgeS(times, clock);
 }
 
-void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock) {
+// A dent that recovers is no drift: it would be taken off twice.
+void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state, bool is_recovering,
+                                 const Clock& clock) {
   // Degraded by nothing but the drift itself.
   const bool good = state.status == LinkStatus::kOk || (state.measured() && state.reasons.size() == 1 &&
                                                         state.reasons[0].id == ReasonId::kDrift);
   const bool sure =
-      good && std::abs(frame_loads_.pressure_mpa - loads_.pressure_mpa) <= kSamePressureMpa &&
+      good && !is_recovering &&
+      std::abs(frame_loads_.pressure_mpa - loads_.pressure_mpa) <= kSamePressureMpa &&
       (frame_loads_.specific_force_mps2 - loads_.specific_force_mps2).norm() <= kSameSpecificForceMps2;
   follower_.Update(MonotonicNs(times, clock), sure ? std::optional(StrongestLoad(state)) : std::nullopt,
                    off_mm_);
@@ -155,7 +158,9 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
     const MeasuredLoads loads = tare_->loads();
     const auto untouched = estimator.UntouchedAt(loads.Loads());
     Replaced before{skin, baseline_, taken_ns_, loads_, follower_, tare_->shift_mm()};
-    skin.Tare(tare_->markers(), loads, untouched.value_or(estimator.estimate().baseline_mm));
+    if (tare_->forced()) estimator.ForgetContacts();
+    skin.Tare(tare_->markers(), loads, untouched.value_or(estimator.estimate().baseline_mm),
+              estimator.ResidualMm(loads.Loads()));
     Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare,
          tare_->markers(), loads.Loads(), times, clock);
     replaced_.emplace(std::move(before));

@@ -60,7 +60,7 @@ class BaselineKeeper {
   bool is_forced() const { return baseline_.origin == BaselineOrigin::kForcedTare; }
 
  private:
-  void FollowDrift(const FrameTimes& times, const LinkState& state, const Clock& clock);
+  void FollowDrift(const FrameTimes& times, const LinkState& state, bool is_recovering, const Clock& clock);
   void TakeTareFrame(const FrameTimes& times, const LinkState& state, const LabelledMarkers& labels,
                      SkinStage& skin, StateEstimator& estimator, const Clock& clock);
   double AgeS(const FrameTimes& times, const Clock& clock) const;

@@ -51,7 +51,7 @@ std::string CalibrationAdvice(const MeasuredLoads& loads) {
 // A baseline that is taken in this frame has the specific force that was estimated in it.
 MeasuredLoads WithEstimate(MeasuredLoads loads, const LinkState& state) {
   if (const auto& estimate = state.specific_force_estimate) {
-    loads.specific_force_mps2 = estimate->mps2;
+    loads.specific_force_mps2 = estimate->mps2 + loads.by_creep.tail<3>();
     loads.specific_force_covariance = estimate->covariance;
   }
   return loads;
@@ -229,7 +229,7 @@ struct LinkPipeline::Stages {
     rest_progress.taken = rest->taken();
     rest_progress.refusal = complete ? std::nullopt : std::optional(complete.error());
     if (!complete) {
-      if (calibrates) rest_progress.refusal->message += CalibrationAdvice(loads);
+      if (calibrates) rest_progress.refusal->message += CalibrationAdvice(loads.Real());
       last_refusal = rest_progress.refusal->message;
       rest_loads.Clear();
       ++refusals;
@@ -271,7 +271,8 @@ struct LinkPipeline::Stages {
     MeasuredLoads loads = found.loads;
     // Whatever it is, it stays, and is no difference to any frame.
     if (NeverMoves(frame)) loads.specific_force_covariance.setZero();
-    skin->SetBaseline(found.markers, loads, *estimator->UntouchedAt(loads.Loads()));
+    skin->SetBaseline(found.markers, loads, *estimator->UntouchedAt(loads.Loads()),
+                      estimator->ResidualMm(loads.Loads()));
     for (size_t i = 0; i < kCameraCount; ++i) contrasts[i].SetRest(pictures[i], found.markers.cameras[i]);
     keeper.Take(rest_origin, found.markers, loads.Loads(), frame.times, clock);
     attitude.Restart();
@@ -282,7 +283,8 @@ struct LinkPipeline::Stages {
   // Nobody tells the specific force: the link keeps the attitude in which its rest images were taken.
   static bool NeverMoves(const StereoFrame& frame) { return !frame.specific_force; }
 
-  MeasuredLoads MeasuredAt(const StereoFrame& frame) const {
+  // Once a frame.
+  MeasuredLoads TakeLoads(const StereoFrame& frame) {
     MeasuredLoads measured{
         .pressure_mpa = frame.pressure.stale ? frame.pressure.mpa
                                              : frame.pressure_mpa.value_or(options.pressure_mpa.value_or(0)),
@@ -293,7 +295,9 @@ struct LinkPipeline::Stages {
     } else if (skin && !rest) {
       measured.specific_force_mps2 = skin->baseline_loads().specific_force_mps2;
     }
-    return measured;
+    const int64_t exposure_ns = frame.times.exposure_monotonic_ns;
+    return estimator->BeginFrame(measured, frame.specific_force.has_value(),
+                                 exposure_ns != 0 ? exposure_ns : clock.MonotonicNs());
   }
 
   // Labels that contradict the shape are no labels.
@@ -365,6 +369,7 @@ void LinkPipeline::Restart() {
 }
 
 void LinkPipeline::UseEstimator(std::shared_ptr<StateEstimator> estimator) {
+  estimator->TakeHistory(*stages_->estimator);
   stages_->estimator = std::move(estimator);
 }
 
@@ -416,7 +421,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   state.simulation = frame.simulation;
   state.stage_ms = {};
   const bool stale = frame.pressure.stale;
-  const MeasuredLoads measured = s.MeasuredAt(frame);
+  const MeasuredLoads measured = s.TakeLoads(frame);
   // Without a sensor, or when it fell silent, the pressure is estimated from the shape.
   const bool is_pressure_measured = !stale && (frame.pressure_mpa || s.options.pressure_mpa ||
                                                frame.pressure.origin != PressureOrigin::kNone);
@@ -469,9 +474,9 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
          .attitude_error_mm = s.estimator->AttitudeErrorMm(),
          .drift = s.keeper.DriftReason(),
          .is_baseline_forced = s.keeper.is_forced(),
-         .measured = loads,
+         .measured = loads.Real(),
          .is_pressure_measured = is_pressure_measured,
-         .baseline = s.skin->baseline_loads(),
+         .baseline = s.skin->baseline_loads().Real(),
          .estimate = estimate},
         state);
   s.diagnosis.Observe(state, {.images = s.pictures,

@@ -30,20 +30,24 @@ SkinStage::SkinStage(const LinkModel& model, const CalibrationSummary& calibrati
       baseline_mm_(Eigen::VectorXd::Zero(3 * model.markers.count())),
       about_mm_(baseline_mm_) {}
 
-void SkinStage::SetBaseline(const LabelledMarkers& rest, const MeasuredLoads& loads,
-                            const Eigen::VectorXd& untouched_mm) {
+void SkinStage::TakeBaseline(const LabelledMarkers& markers, const MeasuredLoads& loads,
+                             const Eigen::VectorXd& untouched_mm, const Eigen::VectorXd& residual_mm,
+                             bool keep_unseen) {
   baseline_loads_ = loads;
   baseline_mm_ = about_mm_ = untouched_mm;
-  evidence_.SetBaseline(rest, untouched_mm);
-  rest_.SetBaseline(rest);
+  if (residual_mm.size() == untouched_mm.size()) about_mm_ += residual_mm;
+  evidence_.SetBaseline(markers, about_mm_, keep_unseen);
+  rest_.SetBaseline(markers);
+}
+
+void SkinStage::SetBaseline(const LabelledMarkers& rest, const MeasuredLoads& loads,
+                            const Eigen::VectorXd& untouched_mm, const Eigen::VectorXd& residual_mm) {
+  TakeBaseline(rest, loads, untouched_mm, residual_mm, false);
 }
 
 void SkinStage::Tare(const LabelledMarkers& now, const MeasuredLoads& loads,
-                     const Eigen::VectorXd& untouched_mm) {
-  baseline_loads_ = loads;
-  baseline_mm_ = about_mm_ = untouched_mm;
-  evidence_.SetBaseline(now, untouched_mm, true);
-  rest_.SetBaseline(now);
+                     const Eigen::VectorXd& untouched_mm, const Eigen::VectorXd& residual_mm) {
+  TakeBaseline(now, loads, untouched_mm, residual_mm, true);
 }
 
 void SkinStage::Measure(const Eigen::VectorXd& about_mm, std::span<const Vec3> drift_mm, SkinShape& shape) {

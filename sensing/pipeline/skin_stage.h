@@ -22,11 +22,13 @@ class SkinStage {
             const CameraEvidenceOptions& options, double noise_px = 0);
 
   /// Takes the markers of the untouched skin (means over frames, with the means' covariances), under known
-  /// loads; `untouched_mm`: what these do, stacked.
+  /// loads; `untouched_mm`: what these do, stacked; `residual_mm`: how far the dents of former contacts
+  /// put markers off that, which is no part of the baseline; empty: not.
   void SetBaseline(const LabelledMarkers& rest, const MeasuredLoads& loads,
-                   const Eigen::VectorXd& untouched_mm);
+                   const Eigen::VectorXd& untouched_mm, const Eigen::VectorXd& residual_mm = {});
   /// Takes what is seen now as the untouched skin; markers that `now` does not show keep their baseline.
-  void Tare(const LabelledMarkers& now, const MeasuredLoads& loads, const Eigen::VectorXd& untouched_mm);
+  void Tare(const LabelledMarkers& now, const MeasuredLoads& loads, const Eigen::VectorXd& untouched_mm,
+            const Eigen::VectorXd& residual_mm = {});
   /// In the frame that was run last.
   CameraAgreement agreement() const { return evidence_.Agreement(); }
   /// Likewise, where there was an answer: the camera that alone shows the skin elsewhere than pressure moves
@@ -47,6 +49,9 @@ class SkinStage {
  private:
   void CompareWithRest(const LabelledMarkers& markers, std::span<const Vec3> drift_mm,
                        const SkinEstimate& estimate);
+  void TakeBaseline(const LabelledMarkers& markers, const MeasuredLoads& loads,
+                    const Eigen::VectorXd& untouched_mm, const Eigen::VectorXd& residual_mm,
+                    bool keep_unseen);
   void FindResiduals(std::span<const Vec3> drift_mm, const SkinEstimate& estimate);
   void Measure(const Eigen::VectorXd& about_mm, std::span<const Vec3> drift_mm, SkinShape& shape);
 

@@ -39,7 +39,11 @@ SkinEstimatorOptions SkinOptions(const ForceOptions& options) {
 }  // namespace
 
 StateEstimator::StateEstimator(const LinkModel& model, const ForceOptions& options)
-    : model_(model), rest_mm_(model.RestMarkers()), options_(options), skin_(model, SkinOptions(options)) {
+    : model_(model),
+      rest_mm_(model.RestMarkers()),
+      options_(options),
+      skin_(model, SkinOptions(options)),
+      creep_(model) {
   if (options.model == ForceModel::kLiteral)
     thesis_ = std::make_unique<ThesisForce>(model, std::max(1, options.refinement));
   const SkinMechanics& mechanics = skin_.mechanics();
@@ -67,6 +71,14 @@ std::optional<RestShape> StateEstimator::RestShapeUnder(const MeasuredLoads& loa
   if (!loads.specific_force_covariance.isZero(0))
     errors_mm = skin->markers_by_loads.rightCols<3>() * SpecificForceErrors(loads);
   return RestShape(model_, skin->markers_mm, std::move(errors_mm));
+}
+
+Eigen::VectorXd StateEstimator::ResidualMm(const KnownLoads& loads) {
+  const Eigen::VectorXd inward_n = creep_.ResidualInward();
+  if (inward_n.size() == 0) return {};
+  const auto responses = TouchResponses(skin_.mechanics(), loads);
+  if (!responses) return {};
+  return (*responses * inward_n.cast<float>()).cast<double>();
 }
 
 RestSkin StateEstimator::AtRest() {
@@ -172,6 +184,22 @@ void StateEstimator::WriteLimits(NodalForces& forces) {
   }
 }
 
+void StateEstimator::MakeLoadsReal() {
+  if (!creep_.any() || estimate_.failure != EstimateFailure::kNone) return;
+  ContactWriter writer(skin_, estimate_);
+  CreepHistory::LumpedForces elastic_n;
+  NodalForces lumped;
+  for (const EstimatedLoad& load : estimate_.loads.loads) {
+    lumped.forces_n.assign(rest_mm_.size(), Vec3::Zero());
+    lumped.sigmas_n.assign(rest_mm_.size(), 0);
+    writer.Lump(load, lumped);
+    Eigen::VectorXd& forces_n = elastic_n.emplace_back(3 * static_cast<Eigen::Index>(rest_mm_.size()));
+    for (size_t m = 0; m < rest_mm_.size(); ++m)
+      forces_n.segment<3>(3 * static_cast<Eigen::Index>(m)) = lumped.forces_n[m];
+  }
+  creep_.MakeReal(elastic_n, estimate_.loads.loads);
+}
+
 void StateEstimator::Estimate(const LoadsPair& loads, SkinShape& shape, NodalForces& forces) {
   const size_t markers = rest_mm_.size();
   observation_.markers.displacement_mm.resize(markers);
@@ -185,6 +213,7 @@ void StateEstimator::Estimate(const LoadsPair& loads, SkinShape& shape, NodalFor
   observation_.loads = loads.now;
   observation_.baseline_loads = loads.baseline;
   skin_.Estimate(observation_, estimate_);
+  MakeLoadsReal();
   WriteShape(shape);
   if (!thesis_) return WriteForces(forces);
   Eigen::VectorXd moved(3 * static_cast<Eigen::Index>(markers));
@@ -210,7 +239,8 @@ void StateEstimator::WriteKnownLoads(LinkState& state) const {
   state.pressure_estimate.reset();
   state.specific_force_estimate.reset();
   if (estimate_.failure != EstimateFailure::kNone) return;
-  const KnownLoads& loads = estimate_.known_loads;
+  const KnownLoads loads =
+      KnownLoads::FromStacked(estimate_.known_loads.Stacked() - observation_.loads.by_creep);
   const Mat4& covariance = estimate_.loads.known_covariance;
   state.pressure_estimate = {loads.pressure_mpa, std::sqrt(covariance(0, 0))};
   const Mat3 of_force = covariance.bottomRightCorner<3, 3>();
@@ -243,6 +273,7 @@ void StateEstimator::FindContacts(ContactFinder& finder, const SkinShape& shape,
   else
     finder.Find(skin_, estimate_, contacts);
   AddEncirclementVariance(model_, forces.limit_around_n, contacts);
+  if (forces.converged) creep_.Advance();
 }
 
 std::unique_ptr<StateEstimator> MakeStateEstimator(const LinkModel& model, const ForceOptions& options) {

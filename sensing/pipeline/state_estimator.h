@@ -11,6 +11,7 @@
 #include "sensing/core/link_state.h"
 #include "sensing/estimation/skin_estimator.h"
 #include "sensing/estimation/thesis_force.h"
+#include "sensing/pipeline/creep_history.h"
 #include "sensing/pipeline/rest_loads.h"
 
 namespace taclink {
@@ -34,6 +35,12 @@ class StateEstimator {
  public:
   StateEstimator(const LinkModel& model, const ForceOptions& options);
 
+  /// Begins a frame of a link that is followed in time, once, before Estimate: the measured loads become
+  /// those that Estimate takes (CreepHistory::Elastic). Without it forces are those of the elastic skin,
+  /// E(0).
+  MeasuredLoads BeginFrame(const MeasuredLoads& measured, bool is_attitude_known, int64_t exposure_ns) {
+    return creep_.Elastic(measured, is_attitude_known, exposure_ns);
+  }
   /// Uses `shape`'s measured displacements, from the baseline, and its sources; sets the rest of it, where it
   /// can. Where it can't, the forces are not converged, and the shape is what is measured: what was not stays
   /// at the untouched skin's, with a covariance that says so. A frame may be looked at several times
@@ -45,13 +52,25 @@ class StateEstimator {
   /// them the ids of those of the call before.
   void FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,
                     std::vector<Contact>& contacts);
-  /// Writes what was estimated of the known loads last; nothing where there is no answer.
+  /// Writes what was estimated of the real known loads last; nothing where there is no answer.
   void WriteKnownLoads(LinkState& state) const;
   /// How far what is not known of the specific force may put a marker off, one standard deviation, of the
   /// marker that it puts off most, mm; of the last estimate. 0: it is known, or there is no answer.
   double AttitudeErrorMm();
-  /// Forgets the frames before.
-  void Restart() { skin_.Restart(); }
+  /// Forgets the frames before, and what has acted on the skin.
+  void Restart() {
+    skin_.Restart();
+    creep_.Forget();
+  }
+  /// Goes on with what another estimator of the same model knows to have acted on the skin.
+  void TakeHistory(const StateEstimator& other) { creep_ = other.creep_; }
+  /// See CreepHistory::ForgetContacts.
+  void ForgetContacts() { creep_.ForgetContacts(); }
+  /// Dents of former contacts remain that would be drift to who does not know of them.
+  bool IsRecovering() const { return creep_.ResidualInward().size() > 0; }
+  /// How far these put the markers off the untouched skin under these loads, stacked, mm, to first order.
+  /// Empty: by nothing that matters, or there is no such skin.
+  Eigen::VectorXd ResidualMm(const KnownLoads& loads);
 
   /// Of the last call.
   const SkinEstimate& estimate() const { return estimate_; }
@@ -67,6 +86,7 @@ class StateEstimator {
   MeasuredLoads PressureFromShape(const MarkerObservations& observed, const LoadsPair& loads);
 
  private:
+  void MakeLoadsReal();
   void WriteShape(SkinShape& shape) const;
   void WriteForces(NodalForces& forces);
   void WriteLimits(NodalForces& forces);
@@ -75,6 +95,7 @@ class StateEstimator {
   const std::vector<Vec3> rest_mm_;
   const ForceOptions options_;
   SkinEstimator skin_;
+  CreepHistory creep_;
   std::vector<size_t> marker_of_site_;  // the nearest
   std::unique_ptr<ThesisForce> thesis_;
   SkinObservation observation_;

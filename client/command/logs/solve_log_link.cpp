@@ -119,9 +119,9 @@ Result<std::string> LogLinkSolver::Solve(const std::string& recorded_bytes,
   if (recorded_.times.exposure_monotonic_ns == 0) return recorded_bytes;  // a report
   NoteFrame();
   const bool solvable = report_.from_pictures ? HasPicture(pictures) : recorded_.measured();
+  Begin();
   if (!report_.from_pictures) FollowLoads();
   if (!solvable) return recorded_bytes;
-  Begin();
   v1::LinkFrame solved = recorded;
   const auto done = report_.from_pictures ? SolvePictures(pictures, solved) : SolveMarkers(solved);
   if (!done) return done.error();
@@ -195,9 +195,7 @@ double LogLinkSolver::FramePressure() const {
   return recorded_.pressure_mpa.value_or(settings_.options.pressure_mpa.value_or(0));
 }
 
-// The known loads as the frame was solved with; what a frame's estimate found is what a baseline taken in it
-// has.
-MeasuredLoads LogLinkSolver::FrameLoads() const {
+MeasuredLoads LogLinkSolver::MeasuredInFrame() const {
   MeasuredLoads loads{.pressure_mpa = FramePressure(),
                       .pressure_sigma_mpa = settings_.options.pressure_sigma_mpa.value_or(
                           PressureSigma(recorded_.pressure.origin))};
@@ -207,12 +205,15 @@ MeasuredLoads LogLinkSolver::FrameLoads() const {
   return loads;
 }
 
-// A baseline is taken with the frame before the first that is measured against it.
+// The known loads as the frame was solved with; what a frame's estimate found is what a baseline taken in it
+// has. A baseline is taken with the frame before the first that is measured against it.
 void LogLinkSolver::FollowLoads() {
-  MeasuredLoads now = FrameLoads();
+  loads_.now = estimator_->BeginFrame(MeasuredInFrame(), recorded_.specific_force.has_value(),
+                                      recorded_.times.exposure_monotonic_ns);
+  MeasuredLoads now = loads_.now;
   if (recorded_.measured() && recorded_.baseline.taken_utc_ns != baseline_utc_ns_) {
     baseline_utc_ns_ = recorded_.baseline.taken_utc_ns;
-    baseline_loads_ = before_.value_or(now);
+    loads_.baseline = before_.value_or(now);
     if (!before_ && (recorded_.pressure_mpa || recorded_.specific_force)) {
       report_.warnings.emplace_back(
           "the pressure and attitude in which the baseline was taken are not in the log: those of the first "
@@ -220,7 +221,7 @@ void LogLinkSolver::FollowLoads() {
     }
   }
   if (const auto& estimate = recorded_.specific_force_estimate; estimate && recorded_.specific_force) {
-    now.specific_force_mps2 = estimate->mps2;
+    now.specific_force_mps2 = estimate->mps2 + now.by_creep.tail<3>();
     now.specific_force_covariance = estimate->covariance;
   }
   before_ = now;
@@ -243,19 +244,18 @@ Result<void> LogLinkSolver::SolveMarkers(v1::LinkFrame& solved) {
                      settings_.model.name + "' has " + std::to_string(markers) +
                      ": another number of markers takes pictures"};
   }
-  const LoadsPair loads{.now = FrameLoads(), .baseline = baseline_loads_};
   state_ = std::move(recorded_);
   MeasureAgain(state_.shape);
-  SolveForces(loads);
+  SolveForces();
   v1::LinkFrame forces;
   wire::Fill({solved.link(), solved.link_index()}, state_, Detail::kFull, forces);
   TakeForces(forces, solved);
   return {};
 }
 
-void LogLinkSolver::SolveForces(const LoadsPair& loads) {
+void LogLinkSolver::SolveForces() {
   const auto start = std::chrono::steady_clock::now();
-  estimator_->Estimate(loads, state_.shape, state_.forces);
+  estimator_->Estimate(loads_, state_.shape, state_.forces);
   estimator_->FindContacts(*finder_, state_.shape, state_.forces, state_.contacts);
   const double seconds = SecondsSince(start);
   state_.stage_ms.force = seconds * 1e3;
@@ -283,9 +283,9 @@ void LogLinkSolver::SolveForces(const LoadsPair& loads) {
          .attitude = {},
          .attitude_error_mm = estimator_->AttitudeErrorMm(),
          .drift = {},
-         .measured = loads.now,
+         .measured = loads_.now.Real(),
          .is_pressure_measured = IsPressureTold(),
-         .baseline = loads.baseline,
+         .baseline = loads_.baseline.Real(),
          .estimate = estimate},
         state_);
   if (late) Degrade(state_, *std::move(late));

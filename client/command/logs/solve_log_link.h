@@ -46,9 +46,9 @@ class LogLinkSolver {
   Result<void> SolvePictures(const RecordedPictures& pictures, v1::LinkFrame& solved);
   Result<RawImage> Image(CameraId camera, const std::optional<RecordedPicture>& picture) const;
   Result<void> SolveMarkers(v1::LinkFrame& solved);
-  MeasuredLoads FrameLoads() const;
+  MeasuredLoads MeasuredInFrame() const;
   void FollowLoads();
-  void SolveForces(const LoadsPair& loads);
+  void SolveForces();
   bool IsPressureTold() const;
   double FramePressure() const;
 
@@ -67,7 +67,7 @@ class LogLinkSolver {
   int64_t first_utc_ns_ = 0;
   // While forces of recorded markers are solved.
   int64_t baseline_utc_ns_ = 0;
-  MeasuredLoads baseline_loads_;
+  LoadsPair loads_;
   std::optional<MeasuredLoads> before_;  // of the frame before
   LinkReport report_;
 };
