@@ -89,11 +89,10 @@ Result<void> PressureController::CheckOrder(const PressureOrder& order) const {
   }
   const double ramp = order.ramp_kpa_per_s.value_or(options_.ramp_kpa_per_s);
   if (!(ramp > 0 && ramp <= options_.ramp_kpa_per_s)) {
-    return Error{
-        ErrorCode::kInvalidArgument,
-        fmt::format("a ramp of {:g} kPa/s is not above 0 and at most {:g} kPa/s, the ramp_kpa_s of "
-                    "the link's regulator",
-                    ramp, options_.ramp_kpa_per_s)};
+    return Error{ErrorCode::kInvalidArgument,
+                 fmt::format("a ramp of {:g} kPa/s is not above 0 and at most {:g} kPa/s, the ramp_kpa_s of "
+                             "the link's regulator",
+                             ramp, options_.ramp_kpa_per_s)};
   }
   return {};
 }

@@ -56,6 +56,15 @@ void RegulatedAir::Advance(double span_s) {
     kpa_ = near_kpa;
     span_s -= until_s;
   }
+  // Within the valve's range. A leak that takes more than the valve can feed draws the pressure out of it.
+  const double lowest_kpa = commanded_kpa_ - slew * tau;
+  if (commanded_kpa_ / (1 + leak * tau) < lowest_kpa) {
+    const double until_s = TimeTo(lowest_kpa, kpa_, commanded_kpa_ / tau, 1 / tau + leak);
+    if (until_s < span_s) {
+      kpa_ = Relaxed(lowest_kpa, slew, leak, span_s - until_s);
+      return;
+    }
+  }
   kpa_ = Relaxed(kpa_, commanded_kpa_ / tau, 1 / tau + leak, span_s);
 }
 

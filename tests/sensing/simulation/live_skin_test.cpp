@@ -162,6 +162,33 @@ TEST(LiveSkinTest, BodiesThatCannotGoOnDoNotStay) {
   EXPECT_EQ(skin.Play({}, 4).contacts.size(), 0u);
 }
 
+// A regulator's pressure: the skin has it in the frame for which it is given, also while a body is stuck.
+TEST(LiveSkinTest, APressureThatChangesIsThatOfItsFrame) {
+  for (const bool is_stuck : {false, true}) {
+    HandledSkin skin(Model("cylinder"), SceneOf(Pressure(0)));
+    Handling handling;
+    if (is_stuck)
+      handling.bodies.push_back({.id = 1,
+                                 .shape = BodyShape::kFinger,
+                                 .at = {.angle_rad = 0.4, .z_mm = 100},
+                                 .depth_mm = std::nullopt,
+                                 .force_n = 1});
+    skin.Play(handling, 1.5);
+    ASSERT_EQ(skin.truth().trouble.empty(), !is_stuck);
+    constexpr double kRateMpaps = 0.5e-3;
+    double worst_mpa = 0;
+    for (int frame = 0; frame < 30; ++frame) {
+      handling.pressure_mpa = kRateMpaps * kFrameS * frame;
+      handling.pressure_mpaps = kRateMpaps;
+      skin.Play(handling, kFrameS);
+      if (frame > 6)  // the first key was made without it
+        worst_mpa = std::max(worst_mpa, std::abs(skin.truth().pressure_mpa - *handling.pressure_mpa));
+    }
+    EXPECT_LT(worst_mpa, is_stuck ? 20e-6 : 1e-9) << is_stuck;
+    EXPECT_GT(skin.truth().pressure_mpa, 0.4e-3);
+  }
+}
+
 TEST(LiveSkinTest, AHandPressesFromBothSides) {
   const LinkModel model = Model("barrel");
   HandledSkin skin(model, SceneOf(Pressure(0.5)));

@@ -73,6 +73,11 @@ arm:
        gravity: {source: grpc, stale_after_s: 2},
        drift: {time_constant_s: 6, rate_limit_mm_s: 0.5, limit_mm: 7, stop_n: 0.5, go_n: 0.25, quiet_s: 8}}
     - {name: c, model: barrel, source: simulated, scene: press, pace: clock, pressure: {source: constant, kpa: 2}}
+    - {name: d, model: barrel, source: v4l2, devices: [/dev/d, /dev/e],
+       pressure: {source: regulator, device: /dev/f, baud: 9600, min_kpa: 0.25, max_kpa: 1.75, ramp_kpa_s: 0.125, stale_after_s: 2,
+         trips: {over_kpa: 2.25, under_kpa: -1, jump_kpa: 0.75, follow_kpa: 0.5, follow_s: 2, leak_effort: 0.25, leak_s: 5}}}
+    - {name: e, model: barrel, source: simulated, scene: press, pace: clock, pressure: {source: regulator,
+       simulation: {time_constant_s: 0.5, slew_kpa_s: 0.25, leak_per_s: 0.125, noise_pa: 5, offset_pa: 25, gain_error: 0.125}}}
 )";
 
 std::string TextOf(const std::string& text) {

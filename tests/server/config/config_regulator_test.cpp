@@ -23,11 +23,10 @@ std::string Refusal(const std::string& source, const std::string& pressure) {
 TEST(RegulatorConfig, IsReadAndWrittenAgain) {
   const auto config = ParseConfig(
       "arm.yaml",
-      LinkText(
-          kCameraLink,
-          "{source: regulator, device: /dev/r, baud: 9600, min_kpa: 0.1, max_kpa: 1.8, ramp_kpa_s: 0.2, "
-          "stale_after_s: 0.4, sigma_pa: 30, trips: {over_kpa: 2.2, under_kpa: -1, jump_kpa: 0.3, "
-          "follow_kpa: 0.2, follow_s: 2, leak_effort: 0.4, leak_s: 5}}"),
+      LinkText(kCameraLink,
+               "{source: regulator, device: /dev/r, baud: 9600, min_kpa: 0.1, max_kpa: 1.8, ramp_kpa_s: 0.2, "
+               "stale_after_s: 0.4, sigma_pa: 30, trips: {over_kpa: 2.2, under_kpa: -1, jump_kpa: 0.3, "
+               "follow_kpa: 0.2, follow_s: 2, leak_effort: 0.4, leak_s: 5}}"),
       "/etc");
   ASSERT_TRUE(config.ok()) << config.error().message;
   const PressureConfig& pressure = *config->links[0].pressure;

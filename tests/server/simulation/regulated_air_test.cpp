@@ -59,6 +59,20 @@ TEST(RegulatedAir, DoesNotDependOnHowItsTimeIsCut) {
   EXPECT_NEAR(whole.kpa(), cut.kpa(), 1e-10);
 }
 
+TEST(RegulatedAir, ALeakBeyondTheValvesRangeEmptiesTheSkin) {
+  SimulatedRegulatorOptions options{.time_constant_s = 0.2, .slew_kpa_per_s = 1, .leak_per_s = 0};
+  for (const double span_s : {0.05, 0.3, 5.0}) {
+    RegulatedAir air(options);
+    air.Command(1.5);
+    air.Advance(60);
+    air.SetExtraLeak(3);
+    air.Advance(span_s);
+    SimulatedRegulatorOptions torn = options;
+    torn.leak_per_s = 3;
+    EXPECT_NEAR(air.kpa(), Integrated(torn, 1.5, 1.5, span_s), 1e-5) << span_s;
+  }
+}
+
 TEST(RegulatedAir, HoldsWithTheEffortOfItsLeak) {
   const SimulatedRegulatorOptions options{.time_constant_s = 0.2, .slew_kpa_per_s = 1, .leak_per_s = 0.1};
   RegulatedAir air(options);
