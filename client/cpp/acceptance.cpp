@@ -21,11 +21,13 @@ struct Acceptances::Connection {
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<AcceptanceStub> stub;
 
-  template <typename Request>
+  template <typename Request, typename Response>
   Result<v1::Acceptance> Ask(grpc::Status (AcceptanceStub::*method)(grpc::ClientContext*, const Request&,
-                                                                    v1::Acceptance*),
+                                                                    Response*),
                              const Request& request, std::chrono::milliseconds work = {}) const {
-    return client::Ask(*stub, method, request, work + Patience(kAcceptancePatience), address);
+    auto response = client::Ask(*stub, method, request, work + Patience(kAcceptancePatience), address);
+    if (!response) return response.error();
+    return std::move(*response->mutable_acceptance());
   }
 };
 

@@ -16,9 +16,10 @@ namespace {
 
 constexpr double kUsualS = 1;
 
-void Answer(Result<v1::Acceptance> result, v1::Acceptance* response, grpc::ServerUnaryReactor* reactor) {
+template <typename Response>
+void Answer(Result<v1::Acceptance> result, Response* response, grpc::ServerUnaryReactor* reactor) {
   if (!result) return reactor->Finish(ToGrpc(result.error()));
-  *response = *std::move(result);
+  *response->mutable_acceptance() = *std::move(result);
   reactor->Finish(grpc::Status::OK);
 }
 
@@ -53,7 +54,7 @@ grpc::ServerUnaryReactor* AcceptanceService::Do(Context* context, const char* ca
 
 grpc::ServerUnaryReactor* AcceptanceService::StartAcceptance(Context* context,
                                                              const v1::StartAcceptanceRequest* request,
-                                                             v1::Acceptance* response) {
+                                                             v1::StartAcceptanceResponse* response) {
   return Do(context, "StartAcceptance", request,
             [this, request, response, who = Who(*context, *security_)](grpc::ServerUnaryReactor* reactor) {
               const auto link = FindAcceptable(request->link());
@@ -69,7 +70,8 @@ grpc::ServerUnaryReactor* AcceptanceService::StartAcceptance(Context* context,
 }
 
 Result<void> AcceptanceService::Measure(size_t link, const v1::MeasureTrialRequest& request, Context* context,
-                                        v1::Acceptance* response, grpc::ServerUnaryReactor* reactor) {
+                                        v1::MeasureTrialResponse* response,
+                                        grpc::ServerUnaryReactor* reactor) {
   AcceptanceStore& store = arm_.acceptances();
   const auto trial = store.Trial(link, request.trial());
   if (!trial) return trial.error();
@@ -110,7 +112,7 @@ Result<void> AcceptanceService::Measure(size_t link, const v1::MeasureTrialReque
 
 grpc::ServerUnaryReactor* AcceptanceService::MeasureTrial(Context* context,
                                                           const v1::MeasureTrialRequest* request,
-                                                          v1::Acceptance* response) {
+                                                          v1::MeasureTrialResponse* response) {
   return Do(context, "MeasureTrial", request,
             [this, context, request, response](grpc::ServerUnaryReactor* reactor) {
               const auto link = FindAcceptable(request->link());
@@ -121,7 +123,7 @@ grpc::ServerUnaryReactor* AcceptanceService::MeasureTrial(Context* context,
 }
 
 grpc::ServerUnaryReactor* AcceptanceService::SkipTrial(Context* context, const v1::SkipTrialRequest* request,
-                                                       v1::Acceptance* response) {
+                                                       v1::SkipTrialResponse* response) {
   return Do(context, "SkipTrial", request, [this, request, response](grpc::ServerUnaryReactor* reactor) {
     const auto link = FindAcceptable(request->link());
     if (!link) return reactor->Finish(ToGrpc(link.error()));
@@ -131,7 +133,7 @@ grpc::ServerUnaryReactor* AcceptanceService::SkipTrial(Context* context, const v
 
 grpc::ServerUnaryReactor* AcceptanceService::FinishAcceptance(Context* context,
                                                               const v1::FinishAcceptanceRequest* request,
-                                                              v1::Acceptance* response) {
+                                                              v1::FinishAcceptanceResponse* response) {
   return Do(context, "FinishAcceptance", request,
             [this, request, response, who = Who(*context, *security_)](grpc::ServerUnaryReactor* reactor) {
               const auto link = FindAcceptable(request->link());
@@ -149,7 +151,7 @@ grpc::ServerUnaryReactor* AcceptanceService::FinishAcceptance(Context* context,
 
 grpc::ServerUnaryReactor* AcceptanceService::GetAcceptance(Context* context,
                                                            const v1::GetAcceptanceRequest* request,
-                                                           v1::Acceptance* response) {
+                                                           v1::GetAcceptanceResponse* response) {
   return Do(context, "GetAcceptance", request, [this, request, response](grpc::ServerUnaryReactor* reactor) {
     const auto link = arm_.FindLink(request->link());
     if (!link) return reactor->Finish(ToGrpc(link.error()));

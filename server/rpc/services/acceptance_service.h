@@ -33,22 +33,22 @@ class AcceptanceService final : public v1::AcceptanceService::WithCallbackMethod
   using Context = grpc::CallbackServerContext;
 
   grpc::ServerUnaryReactor* StartAcceptance(Context* context, const v1::StartAcceptanceRequest* request,
-                                            v1::Acceptance* response) override;
+                                            v1::StartAcceptanceResponse* response) override;
   grpc::ServerUnaryReactor* MeasureTrial(Context* context, const v1::MeasureTrialRequest* request,
-                                         v1::Acceptance* response) override;
+                                         v1::MeasureTrialResponse* response) override;
   grpc::ServerUnaryReactor* SkipTrial(Context* context, const v1::SkipTrialRequest* request,
-                                      v1::Acceptance* response) override;
+                                      v1::SkipTrialResponse* response) override;
   grpc::ServerUnaryReactor* FinishAcceptance(Context* context, const v1::FinishAcceptanceRequest* request,
-                                             v1::Acceptance* response) override;
+                                             v1::FinishAcceptanceResponse* response) override;
   grpc::ServerUnaryReactor* GetAcceptance(Context* context, const v1::GetAcceptanceRequest* request,
-                                          v1::Acceptance* response) override;
+                                          v1::GetAcceptanceResponse* response) override;
 
   /// Runs `work` (grpc::ServerUnaryReactor*), which finishes the call, on the pool.
   template <typename Request, typename Work>
   grpc::ServerUnaryReactor* Do(Context* context, const char* call, const Request* request, Work work);
   Result<size_t> FindAcceptable(const std::string& name) const;
   Result<void> Measure(size_t link, const v1::MeasureTrialRequest& request, Context* context,
-                       v1::Acceptance* response, grpc::ServerUnaryReactor* reactor);
+                       v1::MeasureTrialResponse* response, grpc::ServerUnaryReactor* reactor);
 
   Arm& arm_;
   const std::shared_ptr<const Security> security_;

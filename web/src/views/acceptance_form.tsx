@@ -57,11 +57,11 @@ function ReportButton({ link }: { link: string }) {
   const app = useApp();
   const open = async () => {
     try {
-      const acceptance = await app.session.acceptance.getAcceptance(
+      const { acceptance } = await app.session.acceptance.getAcceptance(
         { link, finished: true, withFiles: true },
         { timeoutMs: SPARE_MS },
       );
-      const page = URL.createObjectURL(new Blob([acceptance.reportHtml], { type: "text/html" }));
+      const page = URL.createObjectURL(new Blob([acceptance?.reportHtml ?? ""], { type: "text/html" }));
       const anchor = document.createElement("a");
       anchor.href = page;
       anchor.download = `acceptance-${link}.html`;
@@ -88,11 +88,11 @@ function AcceptanceDialog({ link, onClose }: { link: string; onClose: () => void
   const loaded = useSignal<AcceptanceTrial | undefined>(undefined);
   const calls = app.session.acceptance;
 
-  const ask = async (what: string, call: () => Promise<Acceptance>) => {
+  const ask = async (what: string, call: () => Promise<{ acceptance?: Acceptance }>) => {
     busy.value = what;
     trouble.value = "";
     try {
-      acceptance.value = await call();
+      acceptance.value = (await call()).acceptance;
       return true;
     } catch (error) {
       trouble.value = messageOf(error);
@@ -105,8 +105,8 @@ function AcceptanceDialog({ link, onClose }: { link: string; onClose: () => void
   useEffect(() => {
     void (async () => {
       try {
-        const known = await calls.getAcceptance({ link }, { timeoutMs: SPARE_MS });
-        if (known.finishedUtcNs === 0n) acceptance.value = known;
+        const { acceptance: known } = await calls.getAcceptance({ link }, { timeoutMs: SPARE_MS });
+        if (known?.finishedUtcNs === 0n) acceptance.value = known;
       } catch {
         // There is none.
       }
