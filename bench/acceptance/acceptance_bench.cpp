@@ -243,7 +243,8 @@ void AddClaims(AcceptanceOutcome& outcome) {
 }
 
 AcceptanceOutcome AcceptOne(const LinkModel& model, uint64_t seed) {
-  AcceptanceOutcome outcome{.seed = seed};
+  AcceptanceOutcome outcome;
+  outcome.seed = seed;
   outcome.flaw = static_cast<LinkFlaw>(seed % kLinkFlaws);
   outcome.is_negative = seed / kLinkFlaws % 2 == 1;
   const int64_t begin_ns = ThreadCpuClock().MonotonicNs();

@@ -149,7 +149,9 @@ TEST_F(CreepTest, AForceThatIsHeldReadsTheSameAndLeavesNothingBehind) {
   Follow(kReleaseS + 0.5, 940, [&](double t) {
     ASSERT_TRUE(state_.has_forces()) << t << ": " << state_.status_reason;
     // The dent that recovers is not learned as drift.
-    if (t < kReleaseS + 60) EXPECT_EQ(state_.baseline.drift_state, DriftState::kHeld) << t;
+    if (t < kReleaseS + 60) {
+      EXPECT_EQ(state_.baseline.drift_state, DriftState::kHeld) << t;
+    }
     EXPECT_LT(state_.baseline.drift_mm, 0.02) << t;
     ghost = std::max(ghost, StrongestN(state_));
     ghost_without = std::max(ghost_without, StrongestN(without_));
