@@ -1,6 +1,11 @@
 // Shipped designs have no fault, and spoilt ones have the fault that was put into them.
 #include <gmock/gmock.h>
 
+#include <ostream>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "sensing/design/skin_check.h"
 #include "tests/sensing/design/design_models.h"
 
@@ -13,6 +18,10 @@ struct BrokenDesign {
   std::vector<std::pair<std::string, std::string>> replacements;
   std::string fault;   // id of the finding
   std::string change;  // a part of what it says to change
+
+  friend std::ostream& operator<<(std::ostream& out, const BrokenDesign& design) {
+    return out << design.name;
+  }
 };
 
 std::vector<Finding> FindingsFor(const LinkModel& model) {
@@ -110,7 +119,9 @@ const std::vector<BrokenDesign> kBroken = {
      "further out"},
     {"LensTooNarrow",
      "cylinder",
-     {{"focal_px: 226.91", "focal_px: 900"}},
+     {{"focal_px: 226.91", "focal_px: 900"},
+      {"k1_per_px2: 27.85e-7", "k1_per_px2: 0"},
+      {"k2_per_px4: -14.09e-11", "k2_per_px4: 0"}},
      "marker_outside_image",
      "top camera"},
     {"MarkersInTheClamp", "cylinder", {{"first_z_mm: 18", "first_z_mm: 1"}}, "ring_at_clamp", "from the end"},

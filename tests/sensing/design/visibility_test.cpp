@@ -30,14 +30,21 @@ Spot SpotOf(const cv::Mat& with, const cv::Mat& without) {
   return {cv::sum(difference)[0] / most, cv::boundingRect(bright)};
 }
 
+LinkModel ModelFor(const std::string& name) {
+  if (name == "necked")
+    return Altered("bottle", {{"[39.5, 39.5, 39, 37.5, 33, 29]", "[39.5, 39.5, 39, 36, 26, 39]"}});
+  if (name == "narrow")
+    return Altered("cylinder", {{"focal_px: 226.91", "focal_px: 400"},
+                                {"k1_per_px2: 27.85e-7", "k1_per_px2: 0"},
+                                {"k2_per_px4: -14.09e-11", "k2_per_px4: 0"}});
+  return LoadLinkModel(name).value();
+}
+
 class RenderedVisibility : public ::testing::TestWithParam<std::string> {};
 
 // Every eleventh marker, which is all rings and many paths.
 TEST_P(RenderedVisibility, AreOfTheMarkersInRenderedImages) {
-  const LinkModel model =
-      GetParam() == "necked"
-          ? Altered("bottle", {{"[39.5, 39.5, 39, 37.5, 33, 29]", "[39.5, 39.5, 39, 36, 26, 39]"}})
-          : LoadLinkModel(GetParam()).value();
+  const LinkModel model = ModelFor(GetParam());
   CameraEffects effects;
   effects.sensor_noise_levels = 0;
   effects.marker_jitter_px = 0;
@@ -85,6 +92,9 @@ TEST_P(RenderedVisibility, AreOfTheMarkersInRenderedImages) {
           ++clipped;
           EXPECT_TRUE(spot.weight == 0 || at_edge) << where;
           break;
+        case Sight::kTurnedAway:  // a dome stands out of the wall: a part of it may show
+        case Sight::kBehindTube:  // simulated links have no block in their tubes
+          break;
         default:
           EXPECT_EQ(spot.weight, 0) << where;
       }
@@ -92,10 +102,11 @@ TEST_P(RenderedVisibility, AreOfTheMarkersInRenderedImages) {
   }
   EXPECT_GT(seen, 10);
   EXPECT_EQ(hidden > 0, GetParam() == "necked");
-  EXPECT_EQ(clipped > 0, GetParam() == "barrel");
+  EXPECT_EQ(clipped > 0, GetParam() == "narrow");
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, RenderedVisibility, ::testing::Values("cylinder", "barrel", "necked"),
+INSTANTIATE_TEST_SUITE_P(Models, RenderedVisibility,
+                         ::testing::Values("cylinder", "barrel", "necked", "narrow"),
                          [](const auto& model) { return model.param; });
 
 // Both cameras are on the axis: a line of sight stays in the half plane of its path, where it is straight.
