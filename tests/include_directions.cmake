@@ -112,10 +112,12 @@ folder(bench/stability sensing/core sensing/model sensing/shell sensing/pipeline
        bench/force)
 folder(bench/thesis sensing/core sensing/capture bench/tools bench/vision)
 folder(bench/whole sensing/core sensing/capture sensing/pipeline sensing/simulation bench/tools bench/vision bench/force)
-folder(bench/acceptance sensing/core sensing/acceptance sensing/pipeline sensing/simulation bench/tools bench/vision)
+folder(bench/played sensing/core sensing/capture sensing/pipeline sensing/simulation bench/tools)
+folder(bench/acceptance sensing/core sensing/acceptance sensing/pipeline sensing/simulation bench/tools bench/vision bench/played)
+folder(bench/sweep sensing/core sensing/simulation bench/vision bench/played)
 folder(bench/server sensing/core sensing/model sensing/capture sensing/simulation client/cpp/taclink bench/vision)
 folder(bench/log sensing/core sensing/model sensing/capture mcap wire wire/log client/cpp/taclink bench/vision bench/server)
-folder(bench/command sensing/core sensing/acceptance sensing/model sensing/capture client/command/cli bench/vision bench/acceptance bench/force bench/stability
+folder(bench/command sensing/core sensing/acceptance sensing/model sensing/capture client/command/cli client/command/offline bench/vision bench/acceptance bench/sweep bench/force bench/stability
        bench/whole bench/server bench/log)
 folder(bench/micro sensing/model sensing/capture sensing/markers/detect sensing/markers/label sensing/markers/track
        sensing/shell sensing/estimation sensing/contact sensing/pipeline sensing/simulation server/config server/process

@@ -52,6 +52,7 @@ DriftState DriftFromWire(v1::DriftState state) {
 void Fill(const Baseline& baseline, v1::Baseline& out) {
   out.set_origin(OriginToWire(baseline.origin));
   out.set_taken_utc_ns(baseline.taken_utc_ns);
+  out.set_calibrated_utc_ns(baseline.calibrated_utc_ns);
   out.set_drift_m(baseline.drift_mm * kMetresPerMm);
   out.set_drift_state(DriftToWire(baseline.drift_state));
   out.clear_missing_markers();
@@ -61,6 +62,7 @@ void Fill(const Baseline& baseline, v1::Baseline& out) {
 Baseline FromWire(const v1::Baseline& baseline) {
   return {.origin = OriginFromWire(baseline.origin()),
           .taken_utc_ns = baseline.taken_utc_ns(),
+          .calibrated_utc_ns = baseline.calibrated_utc_ns(),
           .drift_mm = baseline.drift_m() / kMetresPerMm,
           .drift_state = DriftFromWire(baseline.drift_state()),
           .missing_markers = {baseline.missing_markers().begin(), baseline.missing_markers().end()}};

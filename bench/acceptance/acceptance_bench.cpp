@@ -4,21 +4,20 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <mutex>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <random>
 #include <thread>
 #include <utility>
 
+#include "bench/played/played_link.h"
 #include "bench/tools/thread_clock.h"
 #include "sensing/acceptance/acceptance_plan.h"
 #include "sensing/acceptance/reading_collector.h"
 #include "sensing/core/similar_skin.h"
 #include "sensing/core/units.h"
-#include "sensing/pipeline/link_pipeline.h"
-#include "sensing/simulation/renderer.h"
-#include "sensing/simulation/simulated_skin.h"
+#include "sensing/simulation/scene.h"
 
 namespace taclink {
 namespace {
@@ -51,16 +50,17 @@ class AcceptedBenchLink {
  public:
   AcceptedBenchLink(const LinkModel& model, uint64_t seed, AcceptanceOutcome& outcome)
       : model_(model), outcome_(outcome), random_(seed) {
-    effects_.marker_jitter_px = 0.15;
+    CameraEffects effects;
+    effects.marker_jitter_px = 0.15;
     std::normal_distribution<double> normal;
-    for (MountError& mount : effects_.mount) {
+    for (MountError& mount : effects.mount) {
       mount.shift_mm = 0.3 * Vec3(normal(random_), normal(random_), normal(random_));
       mount.turn_rad = 0.005 * Vec3(normal(random_), normal(random_), normal(random_));
     }
-    calibrated_ = effects_;
+    const CameraEffects calibrated = effects;
     if (outcome.flaw == LinkFlaw::kCamera) {
       const double angle = std::uniform_real_distribution<double>(0, 2 * kPi)(random_);
-      effects_.mount[random_() % kCameraCount].shift_mm +=
+      effects.mount[random_() % kCameraCount].shift_mm +=
           kCameraMm * Vec3(std::cos(angle), std::sin(angle), 0);
     }
     LinkModel known = model;
@@ -70,9 +70,14 @@ class AcceptedBenchLink {
     if (outcome.flaw == LinkFlaw::kCreep)
       model_.relaxation.terms = {{.share = 1 - 1 / (1 + kCreepOff), .time_s = 12}};
     PipelineOptions options;
-    options.rig = MountedRig(model.nominal_rig, calibrated_);
-    link_ = std::make_unique<LinkPipeline>(known, options, ThreadCpuClock());
-    renderer_ = std::make_unique<Renderer>(model_, MountedRig(model.nominal_rig, effects_), effects_, seed);
+    options.rig = MountedRig(model.nominal_rig, calibrated);
+    const bool is_gain = outcome.flaw == LinkFlaw::kPressure;
+    link_.emplace(PlayedLink::Built{.model = model_,
+                                    .effects = effects,
+                                    .known = known,
+                                    .options = options,
+                                    .pressure_gain = is_gain ? 1 + kGainOff * SignOf(outcome.is_negative) : 1,
+                                    .seed = seed});
   }
 
   Result<void> Accept() {
@@ -158,52 +163,19 @@ class AcceptedBenchLink {
   }
 
   Result<void> Play(const Scene& scene, ReadingCollector* loaded, ReadingCollector* released) {
-    const auto skin = SimulatedSkin::Make(model_, scene);
-    if (!skin) return skin.error();
-    const int frames = static_cast<int>(scene.duration_s * scene.frame_rate_hz);
-    for (int i = 0; i < frames; ++i) {
-      const double time_s = i / scene.frame_rate_hz;
-      (*skin)->Evaluate(time_s, truth_);
-      truth_.frame = ++frames_;
-      Process(time_ns_ + std::llround(1e9 * time_s));
-      const bool is_load = !scene.contacts.empty();
-      if (loaded && (!is_load || (time_s >= kLoadedS && time_s <= loaded_until_s_))) loaded->Add(state_);
-      if (released && time_s > loaded_until_s_ + 2 * kRampS) released->Add(state_);
-    }
-    time_ns_ += std::llround(1e9 * scene.duration_s);
-    return {};
-  }
-
-  void Process(int64_t exposure_ns) {
-    for (const CameraId id : kBothCameras) {
-      renderer_->Render(truth_, id, gray_);
-      PackYuyv(gray_, renderer_->chroma(id), frame_.images[Index(id)]);
-    }
-    frame_.sequence = frames_;
-    const double gain =
-        outcome_.flaw == LinkFlaw::kPressure ? 1 + kGainOff * SignOf(outcome_.is_negative) : 1;
-    frame_.pressure_mpa = gain * truth_.pressure_mpa;
-    frame_.pressure.origin = PressureOrigin::kSerial;
-    frame_.pressure.mpa = *frame_.pressure_mpa;
-    frame_.times = {};
-    frame_.times.exposure_monotonic_ns = frame_.times.exposure_utc_ns = frame_.times.received_ns =
-        exposure_ns;
-    link_->Process(frame_, state_);
+    const bool is_load = !scene.contacts.empty();
+    return link_->Play(scene, [&](const SkinTruth& truth, const LinkState& state) {
+      const double time_s = truth.time_s;
+      if (loaded && (!is_load || (time_s >= kLoadedS && time_s <= loaded_until_s_))) loaded->Add(state);
+      if (released && time_s > loaded_until_s_ + 2 * kRampS) released->Add(state);
+    });
   }
 
   LinkModel model_;  // as the skin really is
   AcceptanceOutcome& outcome_;
   std::mt19937_64 random_;
-  CameraEffects effects_, calibrated_;
-  std::unique_ptr<LinkPipeline> link_;
-  std::unique_ptr<Renderer> renderer_;
+  std::optional<PlayedLink> link_;
   double kpa_ = 0, loaded_until_s_ = 0;
-  uint64_t frames_ = 0;
-  int64_t time_ns_ = 1'000'000'000;
-  SkinTruth truth_;
-  StereoFrame frame_;
-  LinkState state_;
-  cv::Mat gray_;
 };
 
 bool Names(const AcceptanceReport& report, FindingId id) {

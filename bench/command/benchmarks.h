@@ -10,6 +10,7 @@ void AddBenchAccuracy(const Arguments& bench, Selected& selected);
 void AddBenchLog(const Arguments& bench, Selected& selected);
 void AddBenchServer(const Arguments& bench, Selected& selected);
 void AddBenchStability(const Arguments& bench, Selected& selected);
+void AddBenchSweep(const Arguments& bench, Selected& selected);
 void AddBenchVision(const Arguments& bench, Selected& selected);
 void AddBenchWhole(const Arguments& bench, Selected& selected);
 

@@ -9,6 +9,7 @@ void AddBenchmarks(const taclink::command::Arguments& bench, taclink::command::S
   AddBenchAccuracy(bench, selected);
   AddBenchStability(bench, selected);
   AddBenchWhole(bench, selected);
+  AddBenchSweep(bench, selected);
   AddBenchAcceptance(bench, selected);
   AddBenchServer(bench, selected);
   AddBenchLog(bench, selected);

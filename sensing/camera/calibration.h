@@ -5,7 +5,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "sensing/camera/bundle.h"
@@ -92,18 +91,5 @@ Result<CameraCalibration> CalibrateCamera(const RestShape& shape, CameraId id,
 /// places within the mould's tolerance in one bundle adjustment. Errors as above, and a skin that is touched.
 Result<CalibrationSummary> CalibrateFromRest(const RestShape& shape, const LabelledMarkers& rest,
                                              const CalibrationOptions& options = {});
-
-/// Calibration files (YAML, `taclink_calibration: 2`; 1 is read too), for links of that model only. Errors:
-/// kNotFound, kInvalidArgument (file, line, what was expected).
-Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model);
-/// The same from a file's text; `name` stands for the file in messages. Errors: kInvalidArgument.
-Result<StereoRig> ParseCalibration(const std::string& name, std::string_view content, const LinkModel& model);
-/// The file's text.
-std::string CalibrationText(const std::string& model_name, const CalibrationSummary& summary);
-/// Replaces the file as a whole. `may_replace` is asked when the new content is written and only its name is
-/// missing; empty: it may. Errors: kUnavailable, also where it may not; then the file is as it was.
-Result<void> SaveCalibration(const std::string& path, const std::string& model_name,
-                             const CalibrationSummary& summary,
-                             const std::function<bool()>& may_replace = {});
 
 }  // namespace taclink

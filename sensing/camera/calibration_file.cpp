@@ -1,17 +1,25 @@
+#include "sensing/camera/calibration_file.h"
+
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
 #include <system_error>
 
-#include "sensing/camera/calibration.h"
+#include "sensing/core/fingerprint.h"
+#include "sensing/core/read_file.h"
+#include "sensing/core/utc_time.h"
 #include "sensing/model/model_file.h"
 
 namespace taclink {
 namespace {
 
-constexpr int kFormatVersion = 2;
+constexpr int kFormatVersion = 3;
+constexpr int kWithIdentity = 3;  // the first version that has one
+constexpr std::string_view kSerial = "serial:";
 
 // Written for people; read only to be checked.
 void ReadQuality(YamlMap map) {
@@ -53,7 +61,99 @@ std::string SigmasText(const CameraCalibration& one, const std::string& indent) 
   return out.str();
 }
 
-Result<StereoRig> ReadRig(Result<YamlFile> file, const LinkModel& model) {
+// Of where the markers lie and how large the images are: what a calibration of another skin, or at another
+// resolution, differs in. A material may change.
+std::string SkinFingerprint(const LinkModel& model) {
+  std::string text;
+  for (int m = 0; m < model.markers.count(); ++m) {
+    const Vec3 p = model.RestMarker(m);
+    // Rounded to 1 um, off the decimals that model files are written in, so that machines agree.
+    for (const double mm : {p.x(), p.y(), p.z()}) text += std::to_string(std::lround(1e3 * mm + 0.137)) + " ";
+  }
+  for (const CameraId id : kBothCameras) {
+    const CameraModel& camera = model.nominal_rig[id];
+    text += std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) + "\n";
+  }
+  return Fingerprint(text);
+}
+
+// Of the file without the lines that it does not cover.
+std::string FileHash(std::string_view content) {
+  std::string covered;
+  while (!content.empty()) {
+    const size_t end = std::min(content.find('\n'), content.size() - 1) + 1;
+    std::string_view line = content.substr(0, end);
+    content.remove_prefix(end);
+    while (!line.empty() && (line.back() == '\n' || line.back() == '\r')) line.remove_suffix(1);
+    if (line.starts_with("link:") || line.starts_with("hash:")) continue;
+    covered += line;
+    covered += '\n';
+  }
+  return Fingerprint(covered);
+}
+
+std::string Quoted(const std::string& text) {
+  return "'" + text + "'";
+}
+
+// A name as a YAML scalar.
+std::string Scalar(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + "\"";
+}
+
+void CheckDevices(YamlMap& root, const std::array<std::string, kCameraCount>& made_with,
+                  const std::array<std::string, kCameraCount>& used) {
+  if (used[0].empty() || used[1].empty()) return;
+  if (made_with[0] == used[1] && made_with[1] == used[0] && used[0] != used[1]) {
+    return root.Fail("devices", "names the cameras the other way round than the link's configuration: " +
+                                    Quoted(made_with[0]) +
+                                    " is the top one here; exchange 'devices' there, or "
+                                    "calibrate again");
+  }
+  for (const CameraId id : kBothCameras) {
+    const std::string &made = made_with[Index(id)], &use = used[Index(id)];
+    if (made == use || !made.starts_with(kSerial) || !use.starts_with(kSerial)) continue;
+    return root.Fail("devices", std::string("says that the ") + Name(id) + " camera was " + Quoted(made) +
+                                    ", but the link's is " + Quoted(use) + "; calibrate again");
+  }
+}
+
+CalibrationIdentity ReadIdentity(YamlMap& root, const LinkModel& model, const CalibrationIdentity& of) {
+  CalibrationIdentity identity;
+  identity.link = root.Text("link", "");
+  if (!identity.link.empty() && !of.link.empty() && identity.link != of.link) {
+    root.Fail("link", "is " + Quoted(identity.link) + ", but this is the calibration file of link " +
+                          Quoted(of.link) +
+                          "; if that is the same link under a new name, correct this line, else "
+                          "calibrate link " +
+                          Quoted(of.link));
+  }
+  const std::string made = root.Text("made", "");
+  const auto made_s = ParseUtc(made);
+  if (!made.empty() && !made_s) root.Fail("made", "must be a time such as 2027-01-31T00:00:00Z");
+  identity.made_utc_s = made_s.value_or(0);
+  if (root.Has("devices")) {
+    YamlMap devices = root.Map("devices");
+    for (const CameraId id : kBothCameras) identity.devices[Index(id)] = devices.Text(Name(id));
+    devices.Done();
+    CheckDevices(root, identity.devices, of.devices);
+  }
+  const std::string skin = root.Text("skin");
+  if (!root.Failed("skin") && skin != SkinFingerprint(model)) {
+    root.Fail("skin", "is " + Quoted(skin) + ", but the markers of model " + Quoted(model.name) +
+                          " lie elsewhere, or its images have another size: " +
+                          Quoted(SkinFingerprint(model)) + "; calibrate again");
+  }
+  return identity;
+}
+
+Result<SavedCalibration> ReadCalibration(Result<YamlFile> file, std::string_view content,
+                                         const LinkModel& model, const CalibrationIdentity& of) {
   if (!file) return file.error();
   YamlMap& root = file->root();
   const int version = root.Integer("taclink_calibration", {.min = 1, .max = kFormatVersion});
@@ -63,36 +163,64 @@ Result<StereoRig> ReadRig(Result<YamlFile> file, const LinkModel& model) {
     root.Fail("model", "is '" + name + "', but the link's model is '" + model.name + "'");
   }
   root.Integer("markers_used", 0);
+  SavedCalibration saved;
   if (version == 1) {
     root.Number("rms_px", 0.0);
   } else {
     if (root.Has("quality")) ReadQuality(root.Map("quality"));
     if (root.Has("standard_deviations")) ReadSigmas(root.Map("standard_deviations"));
   }
-  StereoRig rig;
+  saved.hash = FileHash(content);
+  if (version >= kWithIdentity) {
+    saved.identity = ReadIdentity(root, model, of);
+    const std::string hash = root.Text("hash");
+    if (!root.Failed("hash") && hash != saved.hash) {
+      root.Fail("hash",
+                "is not that of this content (" + Quoted(saved.hash) +
+                    "): the file was damaged, or changed "
+                    "after the calibration; calibrate again, or write this hash if the change is meant");
+    }
+  }
   YamlMap cameras = root.Map("cameras");
-  for (const CameraId id : kBothCameras) rig[id] = ReadCamera(cameras.Map(Name(id)), id);
+  for (const CameraId id : kBothCameras) saved.rig[id] = ReadCamera(cameras.Map(Name(id)), id);
   cameras.Done();
   root.Done();
   if (auto good = file->Finish(); !good) return good.error();
-  return rig;
+  return saved;
+}
+
+std::string IdentityText(const LinkModel& model, const CalibrationIdentity& identity) {
+  std::string text;
+  if (!identity.link.empty()) text += "link: " + Scalar(identity.link) + "\n";
+  if (identity.made_utc_s != 0) text += "made: " + UtcText(identity.made_utc_s) + "\n";
+  if (!identity.devices[0].empty() && !identity.devices[1].empty()) {
+    text += "devices:\n";
+    for (const CameraId id : kBothCameras)
+      text += std::string("  ") + Name(id) + ": " + Scalar(identity.devices[Index(id)]) + "\n";
+  }
+  return text + "skin: " + SkinFingerprint(model) + "  # of the markers' places and the images' sizes\n";
 }
 
 }  // namespace
 
-Result<StereoRig> LoadCalibration(const std::string& path, const LinkModel& model) {
-  return ReadRig(YamlFile::Load(path), model);
+Result<SavedCalibration> LoadCalibration(const std::string& path, const LinkModel& model,
+                                         const CalibrationIdentity& of) {
+  const auto content = ReadFile(path);
+  if (!content) return content.error();
+  return ParseCalibration(path, *content, model, of);
 }
 
-Result<StereoRig> ParseCalibration(const std::string& name, std::string_view content,
-                                   const LinkModel& model) {
-  return ReadRig(YamlFile::Parse(name, content), model);
+Result<SavedCalibration> ParseCalibration(const std::string& name, std::string_view content,
+                                          const LinkModel& model, const CalibrationIdentity& of) {
+  return ReadCalibration(YamlFile::Parse(name, content), content, model, of);
 }
 
-std::string CalibrationText(const std::string& model_name, const CalibrationSummary& summary) {
+std::string CalibrationText(const LinkModel& model, const CalibrationSummary& summary,
+                            const CalibrationIdentity& identity) {
   std::ostringstream out;
-  out << "taclink_calibration: " << kFormatVersion << "\nmodel: " << model_name
-      << "\nmarkers_used: " << summary.markers_used << "\nquality:  # rest markers against the model"
+  out << "taclink_calibration: " << kFormatVersion << "\nmodel: " << model.name << "\n"
+      << IdentityText(model, identity) << "markers_used: " << summary.markers_used
+      << "\nquality:  # rest markers against the model"
       << "\n  pairs: " << summary.pairs << "\n  rms_px: " << summary.rms_px
       << "\n  rmse_r_mm: " << summary.rmse_r_mm << "\n  rmse_phi_r_mm: " << summary.rmse_phi_r_mm
       << "\n  rmse_z_mm: " << summary.rmse_z_mm << "\n  rmse_3d_mm: " << summary.rmse_3d_mm << "\ncameras:\n";
@@ -105,16 +233,16 @@ std::string CalibrationText(const std::string& model_name, const CalibrationSumm
       out << "  " << Name(id) << ":\n" << SigmasText(summary.cameras[Index(id)], "    ");
     }
   }
-  return out.str();
+  return out.str() + "hash: " + FileHash(out.str()) + "  # of all lines but this one and `link`\n";
 }
 
-Result<void> SaveCalibration(const std::string& path, const std::string& model_name,
-                             const CalibrationSummary& summary, const std::function<bool()>& may_replace) {
+Result<void> SaveCalibration(const std::string& path, const std::string& text,
+                             const std::function<bool()>& may_replace) {
   // Of this call alone: another one may hang while it writes its own.
   static std::atomic<unsigned> calls = 0;
   const std::string part = path + ".part" + std::to_string(++calls);
   std::ofstream out(part, std::ios::trunc);
-  out << CalibrationText(model_name, summary);
+  out << text;
   out.close();
   const bool wanted = !may_replace || may_replace();
   std::error_code error, ignored;

@@ -23,7 +23,9 @@ enum class DriftState : uint8_t {
 struct Baseline {
   BaselineOrigin origin = BaselineOrigin::kNone;
   int64_t taken_utc_ns = 0;  ///< exposure of its newest picture, since 1970-01-01; 0: there is none
-  double drift_mm = 0;       ///< how far it has followed the skin since: of the marker that went furthest
+  /// When the cameras were calibrated that it was taken with, since 1970-01-01; 0: not known.
+  int64_t calibrated_utc_ns = 0;
+  double drift_mm = 0;  ///< how far it has followed the skin since: of the marker that went furthest
   DriftState drift_state = DriftState::kOff;
   /// Markers that neither camera showed when it was taken, by index, ascending: broken off, or hidden for
   /// good.

@@ -44,9 +44,12 @@ BaselineKeeper::BaselineKeeper(const LinkModel& model, const std::optional<Drift
 }
 
 void BaselineKeeper::Take(BaselineOrigin origin, const LabelledMarkers& markers, const KnownLoads& loads,
-                          const FrameTimes& times, const Clock& clock) {
+                          const FrameTimes& times, const Clock& clock,
+                          std::optional<int64_t> calibrated_utc_ns) {
+  const int64_t now_ns = times.exposure_utc_ns != 0 ? times.exposure_utc_ns : clock.UtcNs();
   baseline_ = {.origin = origin,
-               .taken_utc_ns = times.exposure_utc_ns != 0 ? times.exposure_utc_ns : clock.UtcNs(),
+               .taken_utc_ns = now_ns,
+               .calibrated_utc_ns = calibrated_utc_ns.value_or(now_ns),
                .missing_markers = MissingFrom(markers, model_.markers.count())};
   taken_ns_ = MonotonicNs(times, clock);
   loads_ = loads;
@@ -162,7 +165,7 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
     skin.Tare(tare_->markers(), loads, untouched.value_or(estimator.estimate().baseline_mm),
               estimator.ResidualMm(loads.Loads()));
     Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare,
-         tare_->markers(), loads.Loads(), times, clock);
+         tare_->markers(), loads.Loads(), times, clock, baseline_.calibrated_utc_ns);
     replaced_.emplace(std::move(before));
   }
   tare_.reset();

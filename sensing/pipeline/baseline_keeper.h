@@ -27,8 +27,9 @@ class BaselineKeeper {
 
   /// A baseline was taken from these markers, under these loads, the newest of its frames at `times`. Times
   /// are those of frames, so that pictures solved again later tell the same; the clock's for frames without.
+  /// `calibrated_utc_ns`: when its cameras were calibrated, 0: not known; none: from the same images.
   void Take(BaselineOrigin origin, const LabelledMarkers& markers, const KnownLoads& loads,
-            const FrameTimes& times, const Clock& clock);
+            const FrameTimes& times, const Clock& clock, std::optional<int64_t> calibrated_utc_ns);
   /// How far the untouched skin has gone since, by marker; empty: that is not followed.
   std::span<const Vec3> DriftMm() const { return drift_ ? follower_.drift_mm() : std::span<const Vec3>(); }
 

@@ -40,8 +40,9 @@ double Widening(const LinkModel& model, const SkinEstimate& estimate) {
 }  // namespace
 
 void CameraDiagnosis::Begin(SkinMechanics& mechanics, const MeasuredLoads& loads, const StereoRig& rig,
-                            const LabelledMarkers& rest) {
+                            const LabelledMarkers& rest, const std::optional<Reason>& moved) {
   rig_ = rig;
+  moved_ = moved;
   drift_.emplace(mechanics, loads, rig, rest);
   growth_.reset();
   reason_.reset();

@@ -26,8 +26,9 @@ class CameraDiagnosis {
   explicit CameraDiagnosis(const LinkModel& model) : model_(model) {}
 
   /// The rest images were taken: their known loads, under which the skin is stable, cameras and labels.
+  /// `moved`: what the rest images themselves showed (RestResult::moved_cameras).
   void Begin(SkinMechanics& mechanics, const MeasuredLoads& loads, const StereoRig& rig,
-             const LabelledMarkers& rest);
+             const LabelledMarkers& rest, const std::optional<Reason>& moved);
 
   /// What one frame shows.
   struct Frame {
@@ -41,7 +42,7 @@ class CameraDiagnosis {
   void Observe(const LinkState& state, const Frame& frame);
 
   /// Of the frame before. None: nothing is wrong, or it is something else.
-  const std::optional<Reason>& reason() const { return reason_ ? reason_ : growth_; }
+  const std::optional<Reason>& reason() const { return reason_ ? reason_ : moved_ ? moved_ : growth_; }
 
  private:
   void ObserveGrowth(const Frame& frame, int64_t now_ns);
@@ -49,6 +50,7 @@ class CameraDiagnosis {
   const LinkModel model_;
   StereoRig rig_;
   std::optional<CameraDrift> drift_;  // none before Begin
+  std::optional<Reason> moved_;       // since the calibration: until the next rest images
   std::optional<Reason> growth_;
   int grown_frames_ = 0;        // in a row
   int64_t grown_until_ns_ = 0;  // exposure; without another measurement the reason ends then

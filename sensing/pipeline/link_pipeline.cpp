@@ -274,10 +274,17 @@ struct LinkPipeline::Stages {
     skin->SetBaseline(found.markers, loads, *estimator->UntouchedAt(loads.Loads()),
                       estimator->ResidualMm(loads.Loads()));
     for (size_t i = 0; i < kCameraCount; ++i) contrasts[i].SetRest(pictures[i], found.markers.cameras[i]);
-    keeper.Take(rest_origin, found.markers, loads.Loads(), frame.times, clock);
+    keeper.Take(rest_origin, found.markers, loads.Loads(), frame.times, clock, CalibratedUtcNs());
     attitude.Restart();
-    diagnosis.Begin(estimator->skin().mechanics(), loads, calibration->rig, found.markers);
+    diagnosis.Begin(estimator->skin().mechanics(), loads, calibration->rig, found.markers,
+                    found.moved_cameras);
     predicted_mm.clear();
+  }
+
+  // Of the cameras of the rest images that were taken; none: calibrated from these.
+  std::optional<int64_t> CalibratedUtcNs() const {
+    if (rest_origin != BaselineOrigin::kStart || !options.rig) return std::nullopt;
+    return options.calibrated_utc_s * 1'000'000'000;
   }
 
   // Nobody tells the specific force: the link keeps the attitude in which its rest images were taken.

@@ -21,6 +21,8 @@ namespace taclink {
 struct PipelineOptions {
   /// Camera parameters of this very link; none: found from the rest pictures.
   std::optional<StereoRig> rig;
+  /// When `rig` was calibrated, since 1970-01-01; 0: not known.
+  int64_t calibrated_utc_s = 0;
   /// Gauge pressure where the source does not measure it. None: nobody tells it, and forces are degraded.
   std::optional<double> pressure_mpa;
   /// Standard deviation of the pressure, whoever tells it; none: as is usual for its source (PressureSigma).

@@ -9,6 +9,7 @@
 #include "sensing/core/similar_skin.h"
 #include "sensing/pipeline/displaced_labels.h"
 #include "sensing/pipeline/image_displacement.h"
+#include "sensing/pipeline/moved_cameras.h"
 #include "sensing/pipeline/rest_orientation.h"
 
 namespace taclink {
@@ -257,6 +258,7 @@ Result<RestResult> RestFit::ExplainByRig(const StereoRig& rig, const MeasuredLoa
   }
   result.calibration.rig = rig;
   result.noise_px = NoiseOf(*mean, seen.rms_px);
+  result.moved_cameras = FindMovedCameras(*shape, rig, mean->markers());
   return result;
 }
 

@@ -9,6 +9,7 @@
 #include "sensing/camera/calibration.h"
 #include "sensing/core/known_loads.h"
 #include "sensing/core/link_model.h"
+#include "sensing/core/link_state.h"
 #include "sensing/core/markers.h"
 #include "sensing/core/result.h"
 #include "sensing/markers/label/path_tracker.h"
@@ -35,6 +36,8 @@ struct RestResult {
   /// it is off the model's projection stands in.
   double noise_px = 0;
   MeasuredLoads loads;  ///< as the images show them
+  /// Of known cameras: they have moved since their calibration.
+  std::optional<Reason> moved_cameras = {};
 };
 
 /// Explains rest pairs: labels, cameras, mean markers and, where it is not known well, the specific force.

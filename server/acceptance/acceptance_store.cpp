@@ -2,13 +2,11 @@
 
 #include <fcntl.h>
 #include <google/protobuf/util/json_util.h>
-#include <openssl/sha.h>
 #include <spdlog/spdlog.h>
 #include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
@@ -62,14 +60,6 @@ v1::Acceptance MessageOf(const AcceptanceRecord& record, const std::string& plan
 }
 
 }  // namespace
-
-std::string Fingerprint(const std::string& text) {
-  std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
-  SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest.data());
-  std::string hex;
-  for (size_t i = 0; i < 8; ++i) hex += fmt::format("{:02x}", digest[i]);
-  return hex;
-}
 
 LockFile::~LockFile() {
   if (descriptor_ >= 0) ::close(descriptor_);

@@ -43,9 +43,6 @@ class LockFile {
   int descriptor_ = -1;
 };
 
-/// SHA-256 of a text, the first 16 hexadecimal digits: enough to tell files apart, short enough to be read.
-std::string Fingerprint(const std::string& text);
-
 /// The acceptances of all links: at most one under way for each, and the last finished one. Every change is
 /// written to the folder at once (a new file that replaces the old one), so that a server that is killed
 /// loses no reading. Any thread; calls wait for the disk.

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "sensing/core/fingerprint.h"
 #include "sensing/core/read_file.h"
 #include "sensing/core/similar_skin.h"
 #include "server/arm/link_names.h"

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "sensing/core/fingerprint.h"
 #include "sensing/core/thread_start.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/state_estimator.h"

@@ -1,11 +1,16 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sensing/core/baseline.h"
+#include "sensing/core/calibration_report.h"
+#include "sensing/core/camera_model.h"
 #include "sensing/core/frame.h"
 #include "sensing/core/link_state.h"
 #include "sensing/core/markers.h"
@@ -19,10 +24,17 @@ namespace taclink::server {
 
 struct CalibrationOrder {
   int pairs = 8;       ///< rest pairs to average over
+  int repeats = 1;     ///< calibrations, one after the other; the link uses the last
   bool save = false;   ///< write the configured calibration file
   bool force = false;  ///< even while touched
   /// Asked right before the file is replaced: a worker that was given up replaces nothing. Empty: it may.
   std::function<bool()> may_save = {};
+};
+
+/// A camera against where it was calibrated before.
+struct CameraMove {
+  CameraShift shift;
+  bool is_large = false;  ///< more than calibrations differ by
 };
 
 /// How well the cameras fit the rest markers. RMS.
@@ -32,6 +44,13 @@ struct CalibrationResult {
   double rmse_r_mm = 0, rmse_tangential_mm = 0, rmse_z_mm = 0;
   std::string file_text = {};  ///< of the calibration file
   std::string saved_to = {};   ///< empty: nowhere
+  std::vector<CalibrationParameter> parameters = {};
+  int repeats = 1;
+  std::string ended_early = {};  ///< why there are fewer repeats than asked for; empty: there are not
+  /// Against the calibration that was in use before, made at that time (since 1970-01-01; 0: not known).
+  /// None: there was none.
+  int64_t previous_utc_ns = 0;
+  std::array<std::optional<CameraMove>, kCameraCount> moves = {};
 };
 
 struct CalibrationProgress {

@@ -1,7 +1,7 @@
 // `taclink calibrate` on pictures that `taclink simulate` made.
 #include <gmock/gmock.h>
 
-#include "sensing/camera/calibration.h"
+#include "sensing/camera/calibration_file.h"
 #include "sensing/camera/projection.h"
 #include "sensing/capture/image_io.h"
 #include "sensing/model/model_file.h"
@@ -57,7 +57,7 @@ TEST_F(CalibrateTest, RigIsFoundWrittenAndSolvesWithIt) {
   const auto rig = LoadCalibration(Path("rig.yaml"), LoadLinkModel("cylinder").value());
   ASSERT_TRUE(rig.ok()) << rig.error().message;
   for (const CameraId id : kBothCameras) {
-    const Projector is((*rig)[id]), truth(built_.nominal_rig[id]);
+    const Projector is(rig->rig[id]), truth(built_.nominal_rig[id]);
     for (const Vec3& p : built_.RestMarkers()) EXPECT_LT((*is.Project(p) - *truth.Project(p)).norm(), 0.2);
   }
 
@@ -70,6 +70,23 @@ TEST_F(CalibrateTest, RigIsFoundWrittenAndSolvesWithIt) {
   EXPECT_NEAR(ToVec3(contacts[0].at("force_n")).norm(), 0.1, 0.02);
 }
 
+TEST_F(CalibrateTest, EveryPairAloneTellsTheScatter) {
+  const Finished run =
+      Calibrate({"--rest", Picture("top_000000"), Picture("bottom_000000"), "--each", "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json found = json::parse(run.out);
+  EXPECT_EQ(found.at("repeats"), 2);
+  const json& first = found.at("parameters").at(0);
+  EXPECT_EQ(first.at("name"), "position_x");
+  EXPECT_GT(first.at("standard_deviation").get<double>(), 0);
+  EXPECT_LT(first.at("standard_deviation").get<double>(), 0.2);
+  EXPECT_NEAR(first.at("mean").get<double>(), first.at("value").get<double>(), 0.2);
+  const Finished table = Calibrate({"--rest", Picture("top_000000"), Picture("bottom_000000"), "--each"});
+  EXPECT_THAT(table.out, HasSubstr("over 2 calibrations"));
+  const Finished one = Calibrate({"--each"});
+  EXPECT_THAT(one.err, HasSubstr("give --rest at least twice"));
+}
+
 TEST_F(CalibrateTest, TableAndPictureOfResiduals) {
   const Finished run = Calibrate({"--lens", "kannala_brandt"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
@@ -80,7 +97,7 @@ TEST_F(CalibrateTest, TableAndPictureOfResiduals) {
   EXPECT_GT(info->width_px, 2 * 640);
   const auto rig = LoadCalibration(Path("rig.yaml"), LoadLinkModel("cylinder").value());
   ASSERT_TRUE(rig.ok()) << rig.error().message;
-  EXPECT_EQ((*rig)[CameraId::kTop].lens.kind, LensKind::kKannalaBrandt);
+  EXPECT_EQ(rig->rig[CameraId::kTop].lens.kind, LensKind::kKannalaBrandt);
 }
 
 TEST_F(CalibrateTest, BadPicturesAreRefusedAndNothingIsWritten) {

@@ -8,7 +8,7 @@
 
 #include "mcap/cursor.h"
 #include "mcap/file_sink.h"
-#include "sensing/camera/calibration.h"
+#include "sensing/camera/calibration_file.h"
 #include "sensing/capture/image_io.h"
 #include "sensing/model/model_file.h"
 #include "taclink/v1/arm.pb.h"
@@ -95,7 +95,7 @@ class LogSolveTest : public ScratchFolder {
     CalibrationSummary cameras;
     cameras.rig = LoadLinkModel("cylinder").value().nominal_rig;
     for (CameraModel& camera : cameras.rig.cameras) camera.lens.focal_px *= focal_scale;
-    return Write(name, CalibrationText("cylinder", cameras));
+    return Write(name, CalibrationText(LoadLinkModel("cylinder").value(), cameras));
   }
   // Pictures as cameras that send MJPEG give them; the bottom one is missing once.
   std::string JpegFolder() const {

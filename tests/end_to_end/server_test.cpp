@@ -3,7 +3,9 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include "sensing/camera/calibration.h"
+#include <regex>
+
+#include "sensing/camera/calibration_file.h"
 #include "sensing/model/model_file.h"
 #include "tests/end_to_end/support.h"
 #include "tests/support/paths.h"
@@ -148,15 +150,22 @@ TEST_F(ServerTest, CalibrationIsSavedAndUsedFromTheNextStartOn) {
       "    - {name: a, model: cylinder, source: simulated, scene: rest.yaml, calibration: a_cameras.yaml}\n";
   StartServer(config);  // the file does not exist yet
   const Finished saved =
-      Taclink({"calibrate", "--link", "a", "--pairs", "3", "--save", "--server", address_});
+      Taclink({"calibrate", "--link", "a", "--pairs", "3", "--repeat", "3", "--save", "--server", address_});
   ASSERT_EQ(saved.exit_code, 0) << saved.err;
   EXPECT_THAT(saved.out, HasSubstr("a_cameras.yaml"));
+  EXPECT_THAT(saved.out, HasSubstr("over 3 calibrations"));
+  EXPECT_THAT(saved.out, HasSubstr("The top camera has moved by 0.0"));
   const auto rig = LoadCalibration(Path("a_cameras.yaml"), LoadLinkModel("cylinder").value());
   ASSERT_TRUE(rig.ok()) << rig.error().message;
 
   StartServer(config);
   Process watch(Watch({}));
   EXPECT_TRUE(watch.ReadLine(seconds(60)).has_value());
+  EXPECT_THAT(Taclink({"list", "--server", address_}).out, HasSubstr("a: cameras calibrated 2"));
+  Write("b.yaml", std::regex_replace(config, std::regex("name: a,"), "name: b,"));
+  const Finished other = RunToEnd({kTaclinkd, "--config", Path("b.yaml"), "--listen", "127.0.0.1:0"});
+  EXPECT_NE(other.exit_code, 0);
+  EXPECT_THAT(other.err, HasSubstr("link: is 'a', but this is the calibration file of link 'b'"));
   Write("a_cameras.yaml", "taclink_calibration: nonsense\n");
   const Finished refused = RunToEnd({kTaclinkd, "--config", Path("arm.yaml"), "--listen", "127.0.0.1:0"});
   EXPECT_NE(refused.exit_code, 0);

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "client/cpp/taclink/client.h"
 #include "sensing/core/marker_text.h"
 #include "sensing/core/printable.h"
+#include "sensing/core/utc_time.h"
 
 namespace taclink::command {
 namespace {
@@ -68,6 +70,19 @@ void PrintMissingMarkers(const v1::Arm& arm) {
     const std::vector<int> markers(missing.begin(), missing.end());
     fmt::print("\n{}: no camera shows the markers on {}; forces near them are less accurate\n",
                Printable(link.name()), MarkerText(markers, static_cast<int>(link.model().markers().paths())));
+  }
+}
+
+// How old each link's calibration is.
+void PrintCalibrations(const v1::Arm& arm) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const int64_t now_s = std::chrono::duration_cast<std::chrono::seconds>(now).count();
+  for (const auto& link : arm.links()) {
+    const int64_t made_s = link.baseline().calibrated_utc_ns() / 1'000'000'000;
+    if (made_s == 0) continue;
+    constexpr double kDayS = 86400;
+    fmt::print("\n{}: cameras calibrated {}, {:.1f} days ago\n", Printable(link.name()), UtcText(made_s),
+               static_cast<double>(now_s - made_s) / kDayS);
   }
 }
 
@@ -133,6 +148,7 @@ Json ListedLinkJson(const v1::Link& link) {
           {"pairs_skipped", statistics.pairs_skipped()},
           {"missing_markers", std::vector<uint32_t>(link.baseline().missing_markers().begin(),
                                                     link.baseline().missing_markers().end())},
+          {"calibrated_utc_ns", link.baseline().calibrated_utc_ns()},
           {"acceptance", AcceptanceJson(link)},
           {"cameras", std::move(cameras)}};
 }
@@ -156,6 +172,7 @@ Result<void> RunList(const ListOptions& options) {
     PrintTable(*arm);
     PrintCameras(*arm);
     PrintMissingMarkers(*arm);
+    PrintCalibrations(*arm);
     PrintAcceptances(*arm);
   }
   return {};

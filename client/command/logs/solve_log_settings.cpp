@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-#include "sensing/camera/calibration.h"
+#include "sensing/camera/calibration_file.h"
 #include "sensing/core/read_file.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/options_text.h"
@@ -128,12 +128,13 @@ Result<void> FindCalibration(const std::string* given, const Records& records, L
   }
   const std::string* const recorded = Find(records.attachments, attachment);
   if (given == nullptr && recorded == nullptr) return {};  // the first pictures calibrate
-  auto rig = given != nullptr ? ParseCalibration(*given, *out.new_calibration, out.model)
-                              : ParseCalibration("the log's " + attachment, *recorded, out.model);
-  if (!rig && given == nullptr && out.new_model)
-    return Error{rig.error().code, rig.error().message + "; give --calibration for the new model"};
-  if (!rig) return rig.error();
-  out.options.rig = std::move(*rig);
+  const auto saved = given != nullptr ? ParseCalibration(*given, *out.new_calibration, out.model)
+                                      : ParseCalibration("the log's " + attachment, *recorded, out.model);
+  if (!saved && given == nullptr && out.new_model)
+    return Error{saved.error().code, saved.error().message + "; give --calibration for the new model"};
+  if (!saved) return saved.error();
+  out.options.rig = saved->rig;
+  out.options.calibrated_utc_s = saved->identity.made_utc_s;
   return {};
 }
 

@@ -1,4 +1,5 @@
-#include <array>
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -8,10 +9,13 @@
 #include "client/command/cli/commands.h"
 #include "client/command/cli/json.h"
 #include "client/command/live/calibrate_link.h"
+#include "client/command/live/parameter_table.h"
 #include "client/command/offline/calibrate_material.h"
 #include "client/command/offline/calibrate_picture.h"
 #include "client/command/offline/gravity.h"
 #include "client/cpp/taclink/values.h"
+#include "sensing/camera/calibration_file.h"
+#include "sensing/camera/calibration_parameters.h"
 #include "sensing/capture/image_io.h"
 #include "sensing/model/model_file.h"
 #include "sensing/pipeline/picture_calibration.h"
@@ -31,50 +35,20 @@ struct CalibrateOptions {
   std::string gravity;
   double gravity_sigma_mps2 = 0.2;
   bool json = false;
+  std::string link_name;  // that the file is for
+  bool each = false;
   LinkCalibration live;  // instead, if it names a link
 };
 
-// Names and units of what a CameraStep holds, for people.
-struct Row {
-  std::string name;
-  double value = 0, sigma = 0;
+// From all pairs together, and how single ones scatter.
+struct Found {
+  RestResult rest;
+  std::vector<CalibrationParameter> parameters;
+  size_t repeats = 1;
 };
 
-std::vector<Row> Rows(const CameraModel& camera, const CameraModel& nominal, const CameraStep& sigmas) {
-  const Vec3 place = camera.camera_from_link.Inverse().translation;
-  CameraModel designed = nominal;
-  designed.lens.kind = camera.lens.kind;
-  const Vec3 turn = StepBetween(designed, camera).head<3>() * DegFromRad(1);
-  const Vec3 turn_sigma = sigmas.head<3>() * DegFromRad(1);
-  std::vector<Row> rows = {{"position x      mm", place.x(), sigmas[3]},
-                           {"position y      mm", place.y(), sigmas[4]},
-                           {"position z      mm", place.z(), sigmas[5]},
-                           {"tilt about x   deg", turn.x(), turn_sigma.x()},
-                           {"tilt about y   deg", turn.y(), turn_sigma.y()},
-                           {"roll           deg", turn.z(), turn_sigma.z()},
-                           {"principal pt x  px", camera.lens.principal_point_px.x(), sigmas[6]},
-                           {"principal pt y  px", camera.lens.principal_point_px.y(), sigmas[7]},
-                           {"focal length    px", camera.lens.focal_px, sigmas[8]}};
-  const LensParameters lens = ParametersOf(camera.lens);
-  for (int i = 1; i < LensParameterCount(camera.lens.kind); ++i) {
-    const bool division = camera.lens.kind == LensKind::kDivision;
-    const char* unit = !division ? "  " : i == 1 ? "/px2" : "/px4";
-    char name[32];
-    std::snprintf(name, sizeof name, "lens k%d %11s", i, unit);
-    rows.push_back({name, lens[i], sigmas[8 + i]});
-  }
-  return rows;
-}
-
-std::string Cell(const Row& row) {
-  char text[64];
-  const bool tiny = row.sigma > 0 && row.sigma < 5e-4;  // the k's per px2 and px4
-  std::snprintf(text, sizeof text, tiny ? "%11.3e \u00b1 %-9.1e" : "%11.3f \u00b1 %-9.3f", row.value,
-                row.sigma);
-  return text;
-}
-
-void PrintText(const LinkModel& model, const RestResult& rest) {
+void PrintText(const LinkModel& model, const Found& found) {
+  const RestResult& rest = found.rest;
   const CalibrationSummary& summary = rest.calibration;
   const auto& [top, bottom] = summary.cameras;
   std::printf("%s, %d rest pair%s, lens model %s\n\n", model.name.c_str(), summary.pairs,
@@ -92,15 +66,8 @@ void PrintText(const LinkModel& model, const RestResult& rest) {
     std::printf("Specific force      (%.2f, %.2f, %.2f) \u00b1 (%.2f, %.2f, %.2f) m/s2\n\n", value.x(),
                 value.y(), value.z(), sigma.x(), sigma.y(), sigma.z());
   }
-  std::printf("Parameter, \u00b1 standard deviation; tilt and roll against the model's nominal camera\n");
-  std::printf("%-18s %24s   %24s\n", "", "top          ", "bottom        ");
-  std::array<std::vector<Row>, kCameraCount> rows;
-  for (const CameraId id : kBothCameras) {
-    rows[Index(id)] = Rows(summary.rig[id], model.nominal_rig[id], summary.cameras[Index(id)].sigmas);
-  }
-  for (size_t i = 0; i < rows[0].size(); ++i) {
-    std::printf("%s %s   %s\n", rows[0][i].name.c_str(), Cell(rows[0][i]).c_str(), Cell(rows[1][i]).c_str());
-  }
+  std::fflush(stdout);
+  PrintParameters(found.parameters, found.repeats);
 }
 
 Json CameraJson(const CameraCalibration& one) {
@@ -155,7 +122,8 @@ Json SpecificForceJson(const MeasuredLoads& loads) {
           {"sigma", ToJson(Sigmas(loads.specific_force_covariance))}};
 }
 
-void PrintJson(const LinkModel& model, const RestResult& rest) {
+void PrintJson(const LinkModel& model, const Found& found) {
+  const RestResult& rest = found.rest;
   const CalibrationSummary& summary = rest.calibration;
   const Json out = {{"model", model.name},
                     {"pairs", summary.pairs},
@@ -170,6 +138,8 @@ void PrintJson(const LinkModel& model, const RestResult& rest) {
                     {"cameras",
                      {{"top", CameraJson(summary.cameras[Index(CameraId::kTop)])},
                       {"bottom", CameraJson(summary.cameras[Index(CameraId::kBottom)])}}},
+                    {"parameters", ParametersJson(found.parameters)},
+                    {"repeats", found.repeats},
                     {"markers", MarkersJson(model, summary)}};
   std::puts(out.dump().c_str());
 }
@@ -197,6 +167,34 @@ Result<RestResult> CalibrateUnder(const CalibrateOptions& options, const LinkMod
   return CalibrateFromPictures(model, pairs, rest, how);
 }
 
+// With --each, from every pair alone as well: how far a calibration from one pair may be off.
+Result<Found> CalibrateWithScatter(const CalibrateOptions& options, const LinkModel& model,
+                                   const std::vector<RestPictures>& pairs, const CalibrationOptions& how) {
+  auto together = CalibrateUnder(options, model, pairs, how);
+  if (!together) return together.error();
+  std::vector<CalibrationSummary> all;
+  for (size_t i = 0; options.each && i < pairs.size(); ++i) {
+    auto alone = CalibrateUnder(options, model, {pairs[i]}, how);
+    if (!alone)
+      return Error{alone.error().code, "pair " + std::to_string(i + 1) + " alone: " + alone.error().message};
+    all.push_back(std::move(alone->calibration));
+  }
+  Found found{.rest = *std::move(together), .parameters = {}, .repeats = std::max<size_t>(1, all.size())};
+  found.parameters = ParametersOf({&found.rest.calibration, 1}, model.nominal_rig);
+  const auto scatter = ParametersOf(all, model.nominal_rig);
+  for (size_t i = 0; i < scatter.size(); ++i) {
+    found.parameters[i].mean = scatter[i].mean;
+    found.parameters[i].scatter = scatter[i].scatter;
+  }
+  return found;
+}
+
+CalibrationIdentity IdentityOf(const CalibrateOptions& options) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return {.link = options.link_name,
+          .made_utc_s = std::chrono::duration_cast<std::chrono::seconds>(now).count()};
+}
+
 Result<void> Calibrate(const CalibrateOptions& options) {
   if (!options.live.link.empty()) {
     LinkCalibration live = options.live;
@@ -215,16 +213,20 @@ Result<void> Calibrate(const CalibrateOptions& options) {
   for (const LensKind kind : {LensKind::kDivision, LensKind::kKannalaBrandt}) {
     if (options.lens == Name(kind)) how.lens = kind;
   }
-  const auto found = CalibrateUnder(options, *model, *pairs, how);
+  if (options.each && pairs->size() < 2)
+    return Error{ErrorCode::kInvalidArgument, "--each compares calibrations: give --rest at least twice"};
+  const auto found = CalibrateWithScatter(options, *model, *pairs, how);
   if (!found) return found.error();
-  const CalibrationSummary* const summary = &found->calibration;
+  const CalibrationSummary* const summary = &found->rest.calibration;
   const std::string residuals =
       options.residuals.empty()
           ? std::filesystem::path(options.out).replace_extension(".residuals.png").string()
           : options.residuals;
   if (auto written = WritePng(residuals, ResidualPicture(pairs->front(), *summary)); !written)
     return written.error();
-  if (auto saved = SaveCalibration(options.out, model->name, *summary); !saved) return saved.error();
+  if (auto saved = SaveCalibration(options.out, CalibrationText(*model, *summary, IdentityOf(options)));
+      !saved)
+    return saved.error();
   if (options.json) {
     PrintJson(*model, *found);
   } else {
@@ -271,9 +273,19 @@ void AddCalibrate(const Arguments& app, Selected& selected) {
       .Must(Within(1, 300))
       .ShowDefault()
       .Needs(link);
+  command
+      .AddOption("--repeat", options->live.repeats,
+                 "Calibrations that the server makes; tells how far they scatter")
+      .Must(Within(1, 100))
+      .ShowDefault()
+      .Needs(link);
   command.AddFlag("--save", options->live.save, "The server writes the link's configured calibration file")
       .Needs(link);
   command.AddFlag("--force", options->live.force, "Even while the link shows contacts").Needs(link);
+  command.AddFlag("--each", options->each,
+                  "Also calibrate from every pair alone: mean and standard deviation of every parameter");
+  command.AddOption("--for-link", options->link_name,
+                    "Name of the link whose calibration file this is: a server refuses it for another link");
   command.AddOption("--residuals", options->residuals,
                     "Picture of the residuals to write (PNG); without, beside the calibration file");
   command

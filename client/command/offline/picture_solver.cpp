@@ -1,6 +1,6 @@
 #include "client/command/offline/picture_solver.h"
 
-#include "sensing/camera/calibration.h"
+#include "sensing/camera/calibration_file.h"
 #include "sensing/capture/image_io.h"
 
 namespace taclink::command {
@@ -17,9 +17,10 @@ Result<std::unique_ptr<PictureSolver>> PictureSolver::Make(
   options.rest_frames = 1;
   options.pictures_may_repeat = true;
   if (!calibration.empty()) {
-    auto rig = LoadCalibration(calibration, model);
-    if (!rig) return rig.error();
-    options.rig = *rig;
+    const auto saved = LoadCalibration(calibration, model);
+    if (!saved) return saved.error();
+    options.rig = saved->rig;
+    options.calibrated_utc_s = saved->identity.made_utc_s;
   }
   std::unique_ptr<PictureSolver> solver(new PictureSolver(model, options));
   // With each refusal the pipeline tries another attitude, where that is unknown.

@@ -32,7 +32,13 @@ from taclink.errors import (
     WrongProcess,
 )
 from taclink.messages.arm import Arm, Camera, Joint, Link, LinkModel, LinkStatistics, Pose, Source
-from taclink.messages.baseline import Baseline, CalibrationResult, LinkTare
+from taclink.messages.baseline import (
+    Baseline,
+    CalibrationParameter,
+    CalibrationResult,
+    CameraShift,
+    LinkTare,
+)
 from taclink.messages.contacts import ArmContact, ArmContacts, JointTorque, LinkContacts
 from taclink.messages.events import (
     ContactEvent,
@@ -132,10 +138,12 @@ __all__ = [
     "Baseline",
     "BaselineOrigin",
     "BodyShape",
+    "CalibrationParameter",
     "CalibrationResult",
     "Caller",
     "Camera",
     "CameraCounts",
+    "CameraShift",
     "Cancelled",
     "Client",
     "Compression",

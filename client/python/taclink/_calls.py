@@ -178,8 +178,10 @@ def set_camera(
     return Call("tactile", "SetCamera", request, _nothing, chosen_s(timeout, SLOW_S))
 
 
-def calibrate_request(link: str, pairs: int, save: bool, force: bool) -> tactile_pb2.CalibrateRequest:
-    return tactile_pb2.CalibrateRequest(link=link, pairs=pairs, save=save, force=force)
+def calibrate_request(
+    link: str, pairs: int, repeats: int, save: bool, force: bool
+) -> tactile_pb2.CalibrateRequest:
+    return tactile_pb2.CalibrateRequest(link=link, pairs=pairs, repeats=repeats, save=save, force=force)
 
 
 def start_recording(

@@ -201,6 +201,7 @@ class Client:
         link: str,
         *,
         pairs: int = 8,
+        repeats: int = 1,
         save: bool = False,
         force: bool = False,
         on_progress: Callable[[int, int], object] | None = None,
@@ -208,14 +209,15 @@ class Client:
     ) -> CalibrationResult:
         """Finds a link's cameras and rest shape again; nothing may touch its skin. Waits for the end.
 
-        pairs: of pictures to average over, 1 to 300. save: also write the link's configured calibration file on
+        pairs: of pictures to average over, 1 to 300. repeats: calibrations one after the other, 1 to 100, each of
+        so many pairs; their scatter is `parameters[i].standard_deviation`; the link uses the last. save: also write the link's configured calibration file on
         the server. force: even if the newest frame shows contacts. on_progress(taken, wanted): as pairs are
         taken; an exception in it cancels, and then the link stays as it was.
         Errors: NotFound (no such link), InvalidArgument, Refused (touched, moved, does not fit: the message says).
         """
-        request = _calls.calibrate_request(link, pairs, save, force)
+        request = _calls.calibrate_request(link, pairs, repeats, save, force)
         channel = self._connection.channel()
-        call = channel.start("tactile", "Calibrate", request, chosen_s(timeout, SLOW_S))
+        call = channel.start("tactile", "Calibrate", request, chosen_s(timeout, SLOW_S * max(1, repeats)))
         try:
             for message in call:
                 if message.WhichOneof("message") == "result":

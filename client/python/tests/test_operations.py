@@ -36,6 +36,8 @@ def test_a_calibration_tells_its_progress_and_result(client: taclink.Client, mea
     assert result.markers_used > 100 and 0 < result.rms_px < 1
     assert max(result.rmse_r_m, result.rmse_tangential_m, result.rmse_z_m) < 1e-3
     assert result.file_text.startswith("taclink_calibration:") and result.saved_to == ""
+    assert [one.name for one in result.parameters[:3]] == ["position_x", "position_y", "position_z"]
+    assert result.repeats == 1 and result.parameters[0].mean is None
     servers.until(lambda: client.arm().link("idle").baseline.origin == "calibration", "the baseline is new")
 
 

@@ -43,6 +43,7 @@ constexpr std::array kBounds = {
     Bounds{"StreamContactsRequest.max_rate_hz", 0, kMostRateHz, "Hz; 0: no limit"},
     Bounds{"StreamPreviewRequest.max_rate_hz", 0, 30, "Hz; 0: 5"},
     Bounds{"CalibrateRequest.pairs", 0, kMostPairs, "pairs of pictures; 0: 8"},
+    Bounds{"CalibrateRequest.repeats", 0, 100, "calibrations; 0: 1"},
     Bounds{"TareRequest.frames", 0, kMostPairs, "frames; 0: 10"},
     Bounds{"Thresholds.warning_n", 0, kMostForceN, "N; 0: no such level"},
     Bounds{"Thresholds.alarm_n", 0, kMostForceN, "N; 0: no such level"},

@@ -218,7 +218,10 @@ Result<void> TactileService::OrderCalibration(const std::string& who, const v1::
   const auto link = arm_.FindLink(request.link());
   if (!link) return link.error();
   return arm_.worker(*link).Calibrate(
-      {.pairs = static_cast<int>(pairs), .save = request.save(), .force = request.force()},
+      {.pairs = static_cast<int>(pairs),
+       .repeats = static_cast<int>(std::max(1U, request.repeats())),
+       .save = request.save(),
+       .force = request.force()},
       [stream, &arm = arm_, at = *link, who](const CalibrationProgress& progress) {
         if (progress.end) arm.events().Post(EventKind::kCalibration, at, ToOperation(*progress.end, who));
         return stream->Tell(progress);

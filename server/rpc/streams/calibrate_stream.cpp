@@ -8,6 +8,18 @@
 namespace taclink::server {
 namespace {
 
+void Fill(const CalibrationParameter& parameter, v1::CalibrationParameter& out) {
+  const bool is_length = parameter.unit == "mm";
+  const double unit = is_length ? wire::kMetresPerMm : 1;
+  out.set_camera(Name(parameter.camera));
+  out.set_name(parameter.name);
+  out.set_unit(is_length ? "m" : parameter.unit);
+  out.set_value(parameter.value * unit);
+  out.set_fit_sigma(parameter.sigma * unit);
+  if (parameter.mean) out.set_mean(*parameter.mean * unit);
+  if (parameter.scatter) out.set_standard_deviation(*parameter.scatter * unit);
+}
+
 void Fill(const CalibrationProgress& progress, v1::CalibrateResponse& out) {
   if (!progress.end) {
     out.mutable_progress()->set_pairs_taken(static_cast<uint32_t>(progress.taken));
@@ -23,6 +35,19 @@ void Fill(const CalibrationProgress& progress, v1::CalibrateResponse& out) {
   message.set_rmse_z_m(result.rmse_z_mm * wire::kMetresPerMm);
   message.set_file_text(result.file_text);
   message.set_saved_to(result.saved_to);
+  for (const CalibrationParameter& one : result.parameters) Fill(one, *message.add_parameters());
+  message.set_repeats(static_cast<uint32_t>(result.repeats));
+  message.set_ended_early(result.ended_early);
+  message.set_previous_utc_ns(result.previous_utc_ns);
+  for (const CameraId id : kBothCameras) {
+    const auto& move = result.moves[Index(id)];
+    if (!move) continue;
+    v1::CameraShift& shift = *message.add_shifts();
+    shift.set_camera(Name(id));
+    shift.set_moved_m(move->shift.moved_mm * wire::kMetresPerMm);
+    shift.set_turned_rad(move->shift.turned_rad);
+    shift.set_is_large(move->is_large);
+  }
 }
 
 }  // namespace

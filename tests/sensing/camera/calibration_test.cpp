@@ -3,9 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
-
 #include "sensing/markers/detect/detector.h"
 #include "sensing/markers/label/rest_labels.h"
 #include "sensing/model/model_file.h"
@@ -13,7 +10,6 @@
 #include "tests/support/read_jpeg.h"
 #include "tests/support/rest_pair.h"
 #include "tests/support/synthetic_markers.h"
-#include "tests/support/temporary_folder.h"
 
 namespace taclink {
 namespace {
@@ -101,91 +97,6 @@ TEST(Calibration, WrongLabelsAreLeftOutOrRefused) {
   const auto none = CalibrateCamera(setup.nominal, CameraId::kBottom, labels.cameras[1]);
   ASSERT_FALSE(none.ok());
   EXPECT_NE(none.error().message.find("bottom camera sees only 0"), std::string::npos);
-}
-
-TEST(Calibration, FilesKeepTheRig) {
-  CalibrationSummary summary;
-  summary.rig = LoadLinkModel("barrel")->nominal_rig;
-  summary.rig[CameraId::kTop].lens.focal_px = 231.25;
-  const TemporaryFolder folder;
-  const std::string path = folder / "calibration.yaml";
-  ASSERT_TRUE(SaveCalibration(path, "barrel", summary).ok());
-  const auto loaded = LoadCalibration(path, LoadLinkModel("barrel").value());
-  ASSERT_TRUE(loaded.ok()) << loaded.error().message;
-  for (const CameraId id : kBothCameras) {
-    EXPECT_DOUBLE_EQ((*loaded)[id].lens.focal_px, summary.rig[id].lens.focal_px);
-    EXPECT_LT(
-        ((*loaded)[id].camera_from_link.translation - summary.rig[id].camera_from_link.translation).norm(),
-        1e-8);
-  }
-  std::ofstream(path, std::ios::app) << "suprise: 1\n";
-  EXPECT_FALSE(LoadCalibration(path, LoadLinkModel("barrel").value()).ok());
-  std::filesystem::remove(path);
-  EXPECT_EQ(LoadCalibration(path, LoadLinkModel("barrel").value()).error().code, ErrorCode::kNotFound);
-  EXPECT_FALSE(SaveCalibration("/nowhere/at/all.yaml", "barrel", summary).ok());
-}
-
-TEST(Calibration, AFileThatNobodyWaitsForAnyMoreIsNotReplaced) {
-  CalibrationSummary summary;
-  summary.rig = LoadLinkModel("barrel")->nominal_rig;
-  const TemporaryFolder folder;
-  const std::string path = folder / "calibration.yaml";
-  std::ofstream(path) << "as it was\n";
-  bool was_asked_early = false;
-  const auto may_replace = [&] {
-    const auto entries = std::filesystem::directory_iterator(folder.path());
-    was_asked_early = std::distance(begin(entries), end(entries)) != 2;  // the file, and the new one
-    return false;
-  };
-  const auto saved = SaveCalibration(path, "barrel", summary, may_replace);
-  ASSERT_FALSE(saved.ok());
-  EXPECT_EQ(saved.error().code, ErrorCode::kUnavailable);
-  EXPECT_FALSE(was_asked_early);
-  std::string line;
-  std::getline(std::ifstream(path), line);
-  EXPECT_EQ(line, "as it was");
-  const auto entries = std::filesystem::directory_iterator(folder.path());
-  EXPECT_EQ(std::distance(begin(entries), end(entries)), 1) << "nothing else is left";
-}
-
-TEST(Calibration, FilesKeepTheLensAndItsDeviations) {
-  const LinkModel model = LoadLinkModel("barrel").value();
-  CalibrationSummary summary;
-  summary.rig = model.nominal_rig;
-  summary.rig[CameraId::kBottom].lens =
-      ConvertLens(model.nominal_rig[CameraId::kBottom].lens, LensKind::kKannalaBrandt, 1);
-  for (const CameraId id : kBothCameras) summary.cameras[Index(id)].camera = summary.rig[id];
-  summary.covariance = Eigen::MatrixXd::Identity(2 * kCameraParameters, 2 * kCameraParameters);
-  const TemporaryFolder folder;
-  const std::string path = folder / "calibration.yaml";
-  ASSERT_TRUE(SaveCalibration(path, "barrel", summary).ok());
-  const auto loaded = LoadCalibration(path, model);
-  ASSERT_TRUE(loaded.ok()) << loaded.error().message;
-  EXPECT_EQ((*loaded)[CameraId::kTop].lens.kind, LensKind::kDivision);
-  EXPECT_EQ((*loaded)[CameraId::kBottom].lens.kind, LensKind::kKannalaBrandt);
-  for (size_t i = 0; i < 4; ++i) {
-    EXPECT_NEAR((*loaded)[CameraId::kBottom].lens.fisheye_k[i],
-                summary.rig[CameraId::kBottom].lens.fisheye_k[i], 1e-10);
-  }
-}
-
-TEST(Calibration, FilesOfVersionOneAreRead) {
-  const TemporaryFolder folder;
-  const std::string path = folder / "calibration.yaml";
-  const std::string camera =
-      "{image_size_px: [640, 480], focal_px: 230, principal_point_px: [320, 240], k1_per_px2: 1e-6, "
-      "k2_per_px4: 0, position_mm: [0, 0, -4], rotation_deg: [0, 0, 1]}\n";
-  const auto load = [&](const std::string& version) {
-    std::ofstream(path) << "taclink_calibration: " << version
-                        << "\nmodel: barrel\nmarkers_used: 200\nrms_px: 0.3\n"
-                        << "cameras:\n  top: " << camera << "  bottom: " << camera;
-    return LoadCalibration(path, LoadLinkModel("barrel").value());
-  };
-  const auto rig = load("1");
-  ASSERT_TRUE(rig.ok()) << rig.error().message;
-  EXPECT_EQ((*rig)[CameraId::kTop].lens.kind, LensKind::kDivision);
-  EXPECT_EQ((*rig)[CameraId::kTop].lens.focal_px, 230);
-  EXPECT_NE(load("3").error().message.find("taclink_calibration"), std::string::npos);
 }
 
 TEST(Calibration, TouchedSkinIsRefusedAndSaidWhere) {

@@ -18,6 +18,7 @@ namespace taclink {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double kTouchedS = 3;  // in the scene `press`
 
@@ -70,6 +71,33 @@ TEST_F(LinkPipelineTest, CalibratesThenMeasures) {
   ASSERT_EQ(state_.contacts.size(), 1u);
   EXPECT_GT(state_.stage_ms.detect, 0);
   EXPECT_GE(state_.times.solved_ns, state_.times.tracked_ns);
+}
+
+// Between two starts of a server: its first images tell.
+TEST_F(LinkPipelineTest, ACameraThatWasMountedAgainIsNamedFromTheStartOn) {
+  for (const double moved_mm : {0.0, 0.4}) {
+    CameraEffects effects = scene_.camera;
+    effects.mount[Index(CameraId::kTop)].shift_mm = Vec3(moved_mm, 0, 0);
+    options_.rig = model_.nominal_rig;
+    options_.calibrated_utc_s = 1'800'000'000;
+    LinkPipeline pipeline(model_, options_);
+    renderer_ = Renderer(model_, MountedRig(model_.nominal_rig, effects), effects, 1);
+    TakeRest(pipeline);
+    pipeline.Process(Frame(0.2), state_);
+    EXPECT_EQ(state_.baseline.calibrated_utc_ns, 1'800'000'000'000'000'000);
+    if (moved_mm == 0) {
+      EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+      continue;
+    }
+    EXPECT_EQ(state_.status, LinkStatus::kDegraded);
+    EXPECT_THAT(state_.status_reason, HasSubstr("the top camera has moved by 0.4"));
+    EXPECT_THAT(state_.status_reason, Not(HasSubstr("bottom camera has moved")));
+    // New cameras mend it.
+    pipeline.BeginRest(options_.rest_frames);
+    for (int k = 0; k <= options_.rest_frames; ++k) pipeline.Process(Frame(k / 30.0), state_);
+    EXPECT_EQ(state_.status, LinkStatus::kOk) << state_.status_reason;
+    EXPECT_EQ(state_.baseline.calibrated_utc_ns, state_.baseline.taken_utc_ns);
+  }
 }
 
 // A pressure sensor that fell silent: measured on, but said so; no baseline is taken without it.

@@ -4,18 +4,16 @@ import { Supervision, type Link } from "../api/gen/taclink/v1/arm_pb";
 import type { Camera } from "../api/gen/taclink/v1/camera_pb";
 import type { ForceLevelState } from "../api/gen/taclink/v1/events_pb";
 import { ForceModel, ForceModelSchema } from "../api/gen/taclink/v1/frame_pb";
-import type { CalibrationResult } from "../api/gen/taclink/v1/tactile_pb";
 import { messageOf } from "../api/session";
 import { useApp } from "../app_state";
-import { Dialog } from "../ui/dialog";
 import { duration, fixed, newtons } from "../ui/format";
 import { NumberField } from "../ui/number_field";
 import { OperatorButton } from "../ui/operator_button";
 import { MODEL_NOTES, MODEL_WORDS } from "../ui/words";
 import { AcceptanceForm } from "./acceptance_form";
-import { CameraView } from "./camera_view";
+import { CalibrationDialog } from "./calibration_dialog";
 import { PressureForm } from "./pressure_form";
-import { Steps, TareDialog, TouchLine } from "./tare_dialog";
+import { TareDialog } from "./tare_dialog";
 
 /** All that can be chosen, the most exact ones first. */
 const MODELS = ForceModelSchema.values
@@ -54,108 +52,17 @@ function Baseline({ link }: { link: Link }) {
         {baseline && baseline.origin
           ? `Taken ${duration(Date.now() / 1e3 - Number(baseline.takenUtcNs / 1_000_000n) / 1e3)} ago, drift ${fixed(baseline.driftM * 1e3, 2)} mm.${missing(baseline.missingMarkers.length)}`
           : "There is none yet."}
+        {baseline && baseline.calibratedUtcNs > 0n
+          ? ` Cameras calibrated ${duration(Date.now() / 1e3 - Number(baseline.calibratedUtcNs / 1_000_000n) / 1e3)} ago.`
+          : ""}
       </p>
       <div class="row">
         <OperatorButton onClick={() => (taring.value = true)}>Tare …</OperatorButton>
         <OperatorButton onClick={() => (calibrating.value = true)}>Calibrate …</OperatorButton>
       </div>
       {taring.value && <TareDialog links={[link]} onClose={() => (taring.value = false)} />}
-      {calibrating.value && <Calibration link={link} onClose={() => (calibrating.value = false)} />}
+      {calibrating.value && <CalibrationDialog link={link} onClose={() => (calibrating.value = false)} />}
     </fieldset>
-  );
-}
-
-function Calibration({ link, onClose }: { link: Link; onClose: () => void }) {
-  const app = useApp();
-  const progress = useSignal<[number, number] | undefined>(undefined);
-  const result = useSignal<CalibrationResult | undefined>(undefined);
-  const trouble = useSignal("");
-  const save = useSignal(false);
-  const life = useSignal<AbortController | undefined>(undefined);
-
-  const start = async () => {
-    const control = (life.value = new AbortController());
-    trouble.value = "";
-    result.value = undefined;
-    progress.value = [0, 8];
-    try {
-      const request = { link: link.name, save: save.value };
-      for await (const { message } of app.session.tactile.calibrate(request, { signal: control.signal })) {
-        if (message.case === "progress")
-          progress.value = [message.value.pairsTaken, message.value.pairsWanted];
-        else if (message.case === "result") result.value = message.value;
-      }
-    } catch (error) {
-      if (!control.signal.aborted) trouble.value = messageOf(error);
-    }
-    progress.value = undefined;
-    life.value = undefined;
-  };
-  const close = () => {
-    life.value?.abort();
-    onClose();
-  };
-  const step = result.value ? 3 : progress.value ? 2 : 1;
-
-  return (
-    <Dialog title={`Calibrate ${link.name}`} onClose={close}>
-      <Steps names={["Free the skin", "Take pictures", "Check the result"]} now={step} />
-      {step === 1 && (
-        <>
-          <p>Finds both cameras and the rest shape again. Nothing may touch the skin until it has ended.</p>
-          <TouchLine link={link.name} />
-          <CameraView link={link} />
-          <label>
-            <input
-              type="checkbox"
-              checked={save.value}
-              onChange={(event) => (save.value = event.currentTarget.checked)}
-            />{" "}
-            also write the link's calibration file
-          </label>
-        </>
-      )}
-      <div aria-live="polite">
-        {progress.value && (
-          <p>
-            <progress value={progress.value[0]} max={progress.value[1]} aria-label="Rest pairs taken" />{" "}
-            {progress.value[0]} of {progress.value[1]} rest pairs
-          </p>
-        )}
-        {trouble.value && (
-          <p role="alert" class="refusal">
-            {trouble.value} The previous calibration stays in use.
-          </p>
-        )}
-        {result.value && <CalibrationFacts result={result.value} />}
-      </div>
-      <div class="dialog-foot">
-        <OperatorButton onClick={() => void start()} disabled={life.value !== undefined} class="primary">
-          {result.value || trouble.value ? "Again" : "Start"}
-        </OperatorButton>
-        <button type="button" onClick={close}>
-          {life.value ? "Cancel" : "Close"}
-        </button>
-      </div>
-    </Dialog>
-  );
-}
-
-function CalibrationFacts({ result }: { result: CalibrationResult }) {
-  const mm = (metres: number) => `${fixed(metres * 1e3, 3)} mm`;
-  return (
-    <dl class="facts numbers">
-      <dt>Markers used</dt>
-      <dd>{result.markersUsed}</dd>
-      <dt>Reprojection</dt>
-      <dd>{fixed(result.rmsPx, 3)} px RMS</dd>
-      <dt>Radius, around, along</dt>
-      <dd>
-        {mm(result.rmseRM)}, {mm(result.rmseTangentialM)}, {mm(result.rmseZM)} RMS
-      </dd>
-      <dt>File</dt>
-      <dd>{result.savedTo || "not written"}</dd>
-    </dl>
   );
 }
 

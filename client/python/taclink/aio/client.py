@@ -153,14 +153,15 @@ class Client:
         link: str,
         *,
         pairs: int = 8,
+        repeats: int = 1,
         save: bool = False,
         force: bool = False,
         on_progress: Callable[[int, int], object] | None = None,
         timeout: float | None = None,
     ) -> CalibrationResult:
-        request = _calls.calibrate_request(link, pairs, save, force)
+        request = _calls.calibrate_request(link, pairs, repeats, save, force)
         channel = self._connection.channel()
-        call = channel.start("tactile", "Calibrate", request, chosen_s(timeout, SLOW_S))
+        call = channel.start("tactile", "Calibrate", request, chosen_s(timeout, SLOW_S * max(1, repeats)))
         try:
             async for message in call:
                 if message.WhichOneof("message") == "result":

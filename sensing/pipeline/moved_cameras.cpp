@@ -1,0 +1,61 @@
+#include "sensing/pipeline/moved_cameras.h"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "sensing/camera/camera_fit.h"
+#include "sensing/camera/camera_shift.h"
+#include "sensing/camera/projection.h"
+#include "sensing/core/units.h"
+#include "sensing/pipeline/reason_text.h"
+
+namespace taclink {
+namespace {
+
+// A wider skin looks like cameras that have come closer, by about twice the widening; the model's inflation
+// is wrong by 5 % (see CameraDiagnosis).
+constexpr double kShiftOfWidening = 2 * 0.05;
+
+double MeanWideningMm(const RestShape& rest) {
+  const LinkModel& model = rest.model();
+  double sum_mm = 0;
+  for (int m = 0; m < model.markers.count(); ++m)
+    sum_mm += rest.Marker(m).head<2>().norm() - model.RestMarker(m).head<2>().norm();
+  return sum_mm / model.markers.count();
+}
+
+std::vector<PointImage> ImagesOf(const RestShape& rest, const CameraModel& camera,
+                                 std::span<const MarkerObservation> labels) {
+  const Vec3 center_mm = Projector(camera).center_in_link();
+  std::vector<PointImage> images;
+  for (size_t m = 0; m < labels.size(); ++m) {
+    if (!labels[m].seen) continue;
+    images.push_back({SeenPoint(rest, static_cast<int>(m), center_mm, true), labels[m].center_px});
+  }
+  return images;
+}
+
+}  // namespace
+
+std::optional<Reason> FindMovedCameras(const RestShape& rest, const StereoRig& rig,
+                                       const LabelledMarkers& labels) {
+  const double doubt_mm = kShiftOfWidening * std::abs(MeanWideningMm(rest));
+  std::string text;
+  double worst_mm = 0;
+  for (const CameraId id : kBothCameras) {
+    auto shift = FindCameraShift(rig[id], ImagesOf(rest, rig[id], labels.cameras[Index(id)]));
+    if (!shift) continue;
+    CameraShift certain = *shift;
+    certain.moved_mm -= doubt_mm;
+    if (!IsLarge(certain, rest.model())) continue;
+    worst_mm = std::max(worst_mm, shift->moved_mm);
+    text += ReasonText("%sthe %s camera has moved by %.2f mm and turned by %.2f degrees",
+                       text.empty() ? "" : "; ", Name(id), shift->moved_mm, DegFromRad(shift->turned_rad));
+  }
+  if (text.empty()) return std::nullopt;
+  text += " since it was calibrated: it was mounted again, or knocked; forces may be wrong; calibrate again";
+  return Reason{ReasonId::kCamerasMoved, text, worst_mm, doubt_mm};
+}
+
+}  // namespace taclink
