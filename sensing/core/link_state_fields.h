@@ -101,8 +101,9 @@ auto Fields(S& simulation) {
 
 template <Is<Baseline> S>
 auto Fields(S& baseline) {
-  auto& [origin, taken_utc_ns, drift_mm, drift_state, missing_markers] = baseline;
-  return std::tuple(Field{"origin", origin}, Field{"taken_utc_ns", taken_utc_ns}, Field{"drift_mm", drift_mm},
+  auto& [origin, taken_utc_ns, calibrated_utc_ns, drift_mm, drift_state, missing_markers] = baseline;
+  return std::tuple(Field{"origin", origin}, Field{"taken_utc_ns", taken_utc_ns},
+                    Field{"calibrated_utc_ns", calibrated_utc_ns}, Field{"drift_mm", drift_mm},
                     Field{"drift_state", drift_state}, Field{"missing_markers", missing_markers});
 }
 
