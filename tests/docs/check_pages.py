@@ -76,11 +76,12 @@ def complaint_about(config: dict) -> str:
 
 
 def check_config(page: str, block: str) -> None:
-    """A part of a configuration: sections of it, or keys of a link."""
-    link = {"name": "one", "model": "cylinder", "source": "simulated", "scene": "press"}
+    """A part of a configuration: sections of it, or keys of a link, a simulated one or one with cameras."""
+    simulated = {"name": "one", "model": "cylinder", "source": "simulated", "scene": "press", "pace": "clock"}
+    with_cameras = {"name": "one", "model": "cylinder", "source": "v4l2", "devices": ["/dev/video0", "/dev/video2"]}
     part = yaml.safe_load(block)
     complaints = []
-    for place in ("top", "arm", "link"):
+    for place, link in (("top", simulated), ("arm", simulated), ("link", simulated), ("link", with_cameras)):
         config = {"taclink_config": 1, "arm": {"name": "arm", "links": [copy.deepcopy(link)]}}
         target = {"top": config, "arm": config["arm"], "link": config["arm"]["links"][0]}[place]
         for key, value in part.items():
