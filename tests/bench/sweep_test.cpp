@@ -1,0 +1,78 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "bench/sweep/sweep_bench.h"
+#include "bench/sweep/sweep_report.h"
+#include "sensing/model/model_file.h"
+
+namespace taclink {
+namespace {
+
+SweepContact ContactWith(double true_n, double error_n, double center_mm) {
+  return {.unit = {.model = "cylinder", .pressure_kpa = 0.5, .path = 3},
+          .ring = 4,
+          .depth_mm = 2.5,
+          .true_n = true_n,
+          .has_forces = true,
+          .is_ok = true,
+          .found_n = true_n,
+          .force_error_n = error_n,
+          .center_error_mm = center_mm};
+}
+
+TEST(SweepReport, CountsStrongForcesAndAllCenters) {
+  std::vector<SweepContact> contacts;
+  for (int i = 1; i <= 100; ++i) contacts.push_back(ContactWith(0.5, 0.5 * i / 100, i));
+  contacts.push_back(ContactWith(0.1, 0.1, 200));  // too weak a force to count
+  SweepContact silent = ContactWith(0.5, 0, 0);
+  silent.has_forces = silent.is_ok = false;
+  contacts.push_back(silent);
+  SweepContact missed = ContactWith(0.5, 0.5, 0);
+  missed.found_n = 0;
+  contacts.push_back(missed);
+  const SweepSummary sum = SummarizeSweep(contacts);
+  EXPECT_EQ(sum.contacts, 103u);
+  EXPECT_EQ(sum.answered, 102u);
+  EXPECT_EQ(sum.missed, 1u);
+  EXPECT_EQ(sum.force_share.count, 101u);
+  EXPECT_NEAR(sum.force_share.median, 0.51, 1e-9);
+  EXPECT_NEAR(sum.force_share.p95, 0.96, 1e-9);
+  EXPECT_EQ(sum.center_mm.median, 51);
+  EXPECT_EQ(sum.least_n, 0.5);
+}
+
+TEST(SweepReport, ContactsAreReadAsTheyWereWritten) {
+  SweepContact contact = ContactWith(0.5, 0.01, 1.5);
+  contact.is_cell = true;
+  contact.is_ok = false;
+  contact.reasons = "drift few_markers";
+  contact.balance_n = 0.02;
+  const auto read = ParseSweepCsv(SweepCsvHeader() + SweepCsvRow(contact));
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_EQ(read->size(), 1u);
+  EXPECT_EQ(SweepCsvRow(read->front()), SweepCsvRow(contact));
+  EXPECT_TRUE(UnitsOf(*read).contains(contact.unit));
+  EXPECT_EQ(ParseSweepCsv(SweepCsvHeader() + "cylinder,0.5\n").error().message, "line 2 is not of a sweep");
+}
+
+// Some places of one path, from images: what the whole sweep does, at the price of a test.
+TEST(Sweep, AnswersAtThePlacesOfAPath) {
+  LinkModel model = LoadLinkModel("cylinder").value();
+  std::vector<SweepContact> contacts;
+  std::string failure;
+  RunSweep({model},
+           {.units = {{.model = "cylinder", .pressure_kpa = 1, .path = 5}},
+            .jobs = 1,
+            .done = [&](const auto& some, const std::string& why) { contacts = some, failure = why; }});
+  EXPECT_EQ(failure, "");
+  ASSERT_EQ(contacts.size(), static_cast<size_t>(3 * (2 * model.markers.rings() - 1)));
+  const SweepSummary sum = SummarizeSweep(contacts);
+  EXPECT_EQ(sum.missed, 0u);
+  EXPECT_LT(sum.center_mm.median, 3);
+  EXPECT_LT(sum.force_share.median, 0.1);
+}
+
+}  // namespace
+}  // namespace taclink
