@@ -73,13 +73,13 @@ void PrintMissingMarkers(const v1::Arm& arm) {
   }
 }
 
-// How old each link's calibration is.
+// How old a calibration is that was not made with the baseline itself.
 void PrintCalibrations(const v1::Arm& arm) {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   const int64_t now_s = std::chrono::duration_cast<std::chrono::seconds>(now).count();
   for (const auto& link : arm.links()) {
     const int64_t made_s = link.baseline().calibrated_utc_ns() / 1'000'000'000;
-    if (made_s == 0) continue;
+    if (made_s == 0 || link.baseline().calibrated_utc_ns() == link.baseline().taken_utc_ns()) continue;
     constexpr double kDayS = 86400;
     fmt::print("\n{}: cameras calibrated {}, {:.1f} days ago\n", Printable(link.name()), UtcText(made_s),
                static_cast<double>(now_s - made_s) / kDayS);
