@@ -58,7 +58,7 @@ struct TrialReading {
   int frames = 0;            ///< all
   int usable = 0;            ///< with forces; the means are over these
   bool has_contact = false;  ///< in at least half of the usable frames; else force and center are zero
-  double force_n = 0;        ///< normal force of the load's contact
+  double force_n = 0;        ///< of the load's contact (Contact::magnitude_n)
   double force_sd_n = 0;     ///< standard deviation of that from frame to frame
   /// Standard deviation that the link itself states for the force; none: it states none.
   std::optional<double> stated_sigma_n = {};
@@ -67,6 +67,7 @@ struct TrialReading {
   double others_n = 0;                      ///< magnitudes of all other contacts
   std::optional<double> pressure_mpa = {};  ///< as the link's sensor has it
   double baseline_drift_mm = 0;
+  int64_t baseline_utc_ns = 0;  ///< when the baseline was taken
   std::vector<ReadingReason> reasons = {};
   std::vector<HeldSample> held = {};  ///< of a kHold trial's loaded phase
 };
@@ -110,8 +111,8 @@ struct AcceptanceLimits {
 struct AcceptanceRecord {
   std::string link = {}, plan = {};  ///< names
   std::string model = {};            ///< name of the link model
-  /// Fingerprints of the model and of the calibration that was in use; empty: not known.
-  std::string model_hash = {}, calibration_hash = {};
+  std::string model_hash = {};    ///< Fingerprint of the model's file; empty: not known
+  int64_t calibrated_utc_ns = 0;  ///< when the cameras in use were calibrated; 0: not known
   int64_t started_utc_ns = 0, finished_utc_ns = 0;  ///< 0: not finished
   AcceptanceLimits limits = {};
   std::vector<AcceptanceTrial> trials = {};

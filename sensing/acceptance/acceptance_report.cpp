@@ -8,91 +8,18 @@
 #include <set>
 
 #include "sensing/acceptance/mounting_fit.h"
+#include "sensing/acceptance/quantities.h"
 #include "sensing/core/units.h"
 
 namespace taclink {
 namespace {
 
-constexpr double kPercent = 100;
 // Smaller effects are not worth a finding, whether or not they are significant.
 constexpr double kLeastScale = 0.05, kLeastGain = 0.02, kLeastOffsetKpa = 0.02, kLeastCreep = 0.03;
+constexpr size_t kEnds = 3;                                // samples at either end of a held load
+constexpr double kLeastSpanKpa = 0.2, kLeastSpanH = 0.02;  // that a slope is taken from
 constexpr double kLeastTurnRad = 1.5 * std::numbers::pi / 180, kLeastShiftMm = 2;
 constexpr double kLeastPhantomN = 0.03, kLeastReasonShare = 0.2;
-
-std::string Format(const char* format, auto... values) {
-  char text[400];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
-
-std::string Interval(const Estimate& estimate, double scale, const char* format) {
-  std::string text = Format(format, scale * estimate.value);
-  if (estimate.half_width)
-    text +=
-        " ± " + Format(*format == '%' && format[1] == '+' ? "%.1f" : format, scale * *estimate.half_width);
-  return text;
-}
-
-Verdict VerdictOf(double low, double high, double limit) {
-  const double worst = std::max(std::abs(low), std::abs(high));
-  const double best = low > 0 ? low : high < 0 ? -high : 0;
-  return worst <= limit ? Verdict::kPassed : best > limit ? Verdict::kFailed : Verdict::kUndecided;
-}
-
-AcceptanceQuantity Describe(std::string id, std::string label, std::string unit, double limit) {
-  return {.id = std::move(id),
-          .label = std::move(label),
-          .unit = std::move(unit),
-          .low = {},
-          .high = {},
-          .limit = limit};
-}
-
-// Rounding errors are not results.
-double Rounded(double value) {
-  return std::abs(value) < 1e-9 ? 0 : value;
-}
-
-void Judge(AcceptanceQuantity& quantity) {
-  quantity.value = Rounded(quantity.value);
-  if (quantity.low) quantity.low = Rounded(*quantity.low);
-  if (quantity.high) quantity.high = Rounded(*quantity.high);
-  if (quantity.loads == 0)
-    quantity.verdict = Verdict::kNotMeasured;
-  else if (quantity.limit == 0)
-    quantity.verdict = Verdict::kUnlimited;
-  else if (!quantity.low || !quantity.high)
-    quantity.verdict = Verdict::kUndecided;
-  else
-    quantity.verdict = VerdictOf(*quantity.low, *quantity.high, quantity.limit);
-}
-
-void Set(AcceptanceQuantity& quantity, const Estimate& estimate, int loads, double scale = 1) {
-  quantity.value = scale * estimate.value;
-  if (estimate.half_width) {
-    quantity.low = scale * (estimate.value - *estimate.half_width);
-    quantity.high = scale * (estimate.value + *estimate.half_width);
-  }
-  quantity.loads = loads;
-  Judge(quantity);
-}
-
-void Set(AcceptanceQuantity& quantity, const PercentileEstimate& estimate, int loads, double scale = 1) {
-  quantity.value = scale * estimate.value;
-  if (estimate.low) quantity.low = scale * *estimate.low;
-  if (estimate.high) quantity.high = scale * *estimate.high;
-  quantity.loads = estimate.samples > 0 ? loads : 0;
-  Judge(quantity);
-}
-
-using ErrorOfLoad = std::optional<double> LoadError::*;
-
-std::vector<GroupedValue> Values(const std::vector<LoadError>& loads, ErrorOfLoad error, bool magnitudes) {
-  std::vector<GroupedValue> values;
-  for (const LoadError& load : loads)
-    if (load.*error) values.push_back({load.place, magnitudes ? std::abs(*(load.*error)) : *(load.*error)});
-  return values;
-}
 
 /// Makes the report of one record, quantity by quantity.
 class Analysis {
@@ -146,7 +73,10 @@ class Analysis {
     const auto errors = Values(report_.loads, &LoadError::force_to_floor, false);
     AcceptanceQuantity bias =
         Describe("force_bias", "Force: mean error over places", "%", kPercent * limits_.force_bias);
-    Set(bias, GroupedMean(errors), static_cast<int>(errors.size()), kPercent);
+    Estimate mean = GroupedMean(errors);
+    // What the references themselves may be off is the same for all loads.
+    if (mean.half_width) mean.half_width = std::hypot(*mean.half_width, ReferenceWidth());
+    Set(bias, mean, static_cast<int>(errors.size()), kPercent);
     Add(std::move(bias));
     Percentile("force_error", "Force: error of single loads, 95 %", "%", kPercent * limits_.force_error,
                &LoadError::force_to_floor, kPercent);
@@ -169,6 +99,19 @@ class Analysis {
             "reference.");
   }
 
+  // Half the 95 % width of the references' relative error, of the least certain one.
+  double ReferenceWidth() const {
+    double most = 0;
+    for (const AcceptanceTrial& trial : record_.trials) {
+      if (trial.state != TrialState::kMeasured) continue;
+      const auto force_n = ReferenceForce(trial);
+      if (force_n && *force_n > 0)
+        most = std::max(most, trial.reference.force_sigma_n / std::max(*force_n, limits_.force_floor_n));
+    }
+    constexpr double kNormal95 = 1.96;
+    return kNormal95 * most;
+  }
+
   void Repeatability() {
     std::vector<GroupedValue> repeated;
     for (const LoadError& load : report_.loads)
@@ -180,24 +123,30 @@ class Analysis {
     Add(std::move(quantity));
   }
 
-  // Of each held load the change from its first samples to its last, of a straight line's worth of noise. The
-  // load is constant, so whatever changes is the link's.
+  // Of each held load the change from its first samples to its last. The load is constant, so whatever
+  // changes is the link's. Up to two holds hardly tell how holds differ: then the noise within them counts.
   void Creep() {
     std::vector<GroupedValue> changes;
+    double variances = 0, steps = 0;
     for (const AcceptanceTrial& trial : record_.trials) {
-      if (trial.kind != TrialKind::kHold || !trial.loaded || !IsUsable(*trial.loaded)) continue;
+      if (trial.kind != TrialKind::kHold || trial.state != TrialState::kMeasured) continue;
+      if (!trial.loaded || !IsUsable(*trial.loaded)) continue;
       const auto& held = trial.loaded->held;
-      constexpr size_t kEnds = 3;  // samples at either end
       if (held.size() < 3 * kEnds) continue;
-      double begin = 0, end = 0;
+      double begin_n = 0, end_n = 0;
       for (size_t i = 0; i < kEnds; ++i) {
-        begin += held[i].force_n / kEnds;
-        end += held[held.size() - 1 - i].force_n / kEnds;
+        begin_n += held[i].force_n / kEnds;
+        end_n += held[held.size() - 1 - i].force_n / kEnds;
       }
-      if (begin > 0) changes.push_back({static_cast<int>(trial.id), end / begin - 1});
+      if (!(begin_n > 0)) continue;
+      changes.push_back({static_cast<int>(trial.id), end_n / begin_n - 1});
+      variances += VarianceWithin(held) * 2 / kEnds / (begin_n * begin_n);
+      steps += static_cast<double>(held.size() - 1);
     }
     Estimate creep = GroupedMean(changes);
-    if (!changes.empty() && !creep.half_width) creep.half_width = NoiseOfOneHold();
+    const auto holds = static_cast<double>(changes.size());
+    if (!changes.empty() && changes.size() < 3)
+      creep.half_width = StudentT95(steps) * std::sqrt(variances) / holds;
     AcceptanceQuantity quantity =
         Describe("creep", "Change of the force of a held load", "%", kPercent * limits_.creep);
     Set(quantity, creep, static_cast<int>(changes.size()), kPercent);
@@ -209,23 +158,14 @@ class Analysis {
                "model a relaxation.");
   }
 
-  // Half the 95 % width of the change of a single hold, from the scatter of its samples about their
-  // neighbors: differences of successive samples do not see the slow change itself.
-  std::optional<double> NoiseOfOneHold() const {
-    for (const AcceptanceTrial& trial : record_.trials) {
-      if (trial.kind != TrialKind::kHold || !trial.loaded) continue;
-      const auto& held = trial.loaded->held;
-      if (held.size() < 9 || !(held.front().force_n > 0)) continue;
-      double sum2 = 0;
-      for (size_t i = 1; i < held.size(); ++i) {
-        const double step = held[i].force_n - held[i - 1].force_n;
-        sum2 += step * step;
-      }
-      const auto steps = static_cast<double>(held.size() - 1);
-      const double sigma = std::sqrt(sum2 / steps / 2) / held.front().force_n;
-      return StudentT95(steps) * sigma * std::sqrt(2.0 / 3);  // difference of two means of three
+  // Of a sample, from the differences of successive ones, which do not see the slow change itself. N^2.
+  static double VarianceWithin(const std::vector<HeldSample>& held) {
+    double sum2 = 0;
+    for (size_t i = 1; i < held.size(); ++i) {
+      const double step = held[i].force_n - held[i - 1].force_n;
+      sum2 += step * step;
     }
-    return std::nullopt;
+    return sum2 / static_cast<double>(held.size() - 1) / 2;
   }
 
   void PressureEffect() {
@@ -238,7 +178,7 @@ class Analysis {
     }
     AcceptanceQuantity quantity = Describe("pressure_slope", "Change of the force error with pressure",
                                            "%/kPa", kPercent * limits_.pressure_slope);
-    if (const auto line = FitLine(x, y)) {
+    if (const auto line = FitLine(x, y, kLeastSpanKpa)) {
       Set(quantity, line->slope, static_cast<int>(x.size()), kPercent);
       if (line->slope.excludes_zero() && std::abs(line->slope.value) >= kLeastScale)
         Find(FindingId::kPressureEffect,
@@ -295,15 +235,15 @@ class Analysis {
     }
     AcceptanceQuantity gain = Describe("pressure_gain", "Pressure sensor: error of the gain", "%",
                                        kPercent * limits_.pressure_error);
-    if (auto line = FitLine(manometer, sensor)) {
+    if (auto line = FitLine(manometer, sensor, kLeastSpanKpa)) {
       line->slope.value -= 1;
       Set(gain, line->slope, static_cast<int>(sensor.size()), kPercent);
-      const double zero_kpa = line->intercept.value;
+      const Estimate& zero_kpa = line->intercept;
       const bool is_off = line->slope.excludes_zero() && std::abs(line->slope.value) >= kLeastGain;
-      if (is_off || std::abs(zero_kpa) >= kLeastOffsetKpa)
+      if (is_off || (zero_kpa.excludes_zero() && std::abs(zero_kpa.value) >= kLeastOffsetKpa))
         Find(FindingId::kPressureSensor,
              "The pressure sensor reads " + Interval(line->slope, kPercent, "%+.1f") + " % off" +
-                 Format(" and %+.3f kPa at zero: correct kpa_per_unit and offset_kpa.", zero_kpa));
+                 Format(" and %+.3f kPa at zero: correct kpa_per_unit and offset_kpa.", zero_kpa.value));
     }
     Add(std::move(gain));
   }
@@ -312,15 +252,18 @@ class Analysis {
     std::vector<GroupedValue> hours;
     std::vector<double> drift_mm;
     std::optional<int64_t> first_ns;
+    std::map<int64_t, int> baselines;  // a tare or a start begins the drift anew
     for (const AcceptanceTrial& trial : record_.trials) {
       if (trial.state != TrialState::kMeasured || !trial.loaded) continue;
       const TrialReading& reading = trial.released ? *trial.released : *trial.loaded;
       if (!first_ns) first_ns = reading.utc_ns;
-      hours.push_back({0, 1e-9 / 3600 * static_cast<double>(reading.utc_ns - *first_ns)});
+      const int count = static_cast<int>(baselines.size());
+      const int baseline = baselines.emplace(reading.baseline_utc_ns, count).first->second;
+      hours.push_back({baseline, 1e-9 / 3600 * static_cast<double>(reading.utc_ns - *first_ns)});
       drift_mm.push_back(reading.baseline_drift_mm);
     }
     AcceptanceQuantity quantity = Describe("drift", "Drift of the baseline", "mm/h", limits_.drift_mm_per_h);
-    if (const auto line = FitLine(hours, drift_mm))
+    if (const auto line = FitLine(hours, drift_mm, kLeastSpanH))
       Set(quantity, line->slope, static_cast<int>(hours.size()));
     Add(std::move(quantity));
   }
@@ -367,6 +310,9 @@ class Analysis {
     std::map<ReasonId, std::pair<int, std::string>> reasons;
     int frames = 0;
     std::vector<GroupedValue> phantoms;
+    const auto is_untouched = [](const AcceptanceTrial& trial, const std::optional<TrialReading>* reading) {
+      return trial.kind == TrialKind::kPressure || reading == &trial.unloaded;
+    };
     for (const AcceptanceTrial& trial : record_.trials) {
       if (trial.state != TrialState::kMeasured) continue;
       for (const auto* reading : {&trial.unloaded, &trial.loaded, &trial.released}) {
@@ -378,8 +324,9 @@ class Analysis {
           if (known.second.empty()) known.second = reason.text;
         }
         if (reading != &trial.released && IsUsable(**reading))
-          phantoms.push_back({static_cast<int>(trial.id),
-                              (*reading)->others_n + (reading == &trial.unloaded ? (*reading)->force_n : 0)});
+          phantoms.push_back(
+              {static_cast<int>(trial.id),
+               (*reading)->others_n + (is_untouched(trial, reading) ? (*reading)->force_n : 0)});
       }
     }
     for (const auto& [id, reason] : reasons) {
@@ -406,12 +353,36 @@ class Analysis {
            Format("%d loads were not measured: the link withheld its forces.", report_.withheld));
   }
 
+  // Whether the plan has trials that tell this quantity.
+  bool IsPlanned(const std::string& id) const {
+    std::set<std::string> attitudes;
+    std::set<double> pressures;
+    bool has_loads = false, has_holds = false, repeats = false;
+    for (const AcceptanceTrial& trial : record_.trials) {
+      has_holds = has_holds || trial.kind == TrialKind::kHold;
+      if (trial.kind == TrialKind::kPressure) continue;
+      has_loads = true;
+      repeats = repeats || trial.repetition > 1;
+      if (!trial.attitude.empty()) attitudes.insert(trial.attitude);
+      if (trial.pressure_mpa) pressures.insert(*trial.pressure_mpa / kMpaPerKpa);
+    }
+    if (id == "creep") return has_holds;
+    if (id == "repeatability") return repeats;
+    if (id == "attitude_effect") return attitudes.size() > 1;
+    if (id == "pressure_slope")
+      return pressures.size() > 1 && *pressures.rbegin() - *pressures.begin() >= kLeastSpanKpa;
+    return has_loads && (id == "force_bias" || id == "force_error" || id == "place_error" || id == "ghost" ||
+                         id == "balance");
+  }
+
   void Conclude() {
     bool any = false, failed = report_.withheld + report_.missed > 0, undecided = report_.open > 0;
     for (const AcceptanceQuantity& quantity : report_.quantities) {
-      any = any || quantity.verdict != Verdict::kNotMeasured;
+      const bool is_measured = quantity.verdict != Verdict::kNotMeasured;
+      any = any || is_measured;
       failed = failed || quantity.verdict == Verdict::kFailed;
-      undecided = undecided || quantity.verdict == Verdict::kUndecided;
+      undecided = undecided || quantity.verdict == Verdict::kUndecided ||
+                  (!is_measured && quantity.limit > 0 && IsPlanned(quantity.id));
     }
     report_.verdict = !any        ? Verdict::kNotMeasured
                       : failed    ? Verdict::kFailed

@@ -10,9 +10,6 @@
 namespace taclink {
 namespace {
 
-// Below this, relative errors say nothing.
-constexpr double kLeastForceN = 0.02;
-
 std::optional<double> BalanceError(const AcceptanceTrial& trial, double reference_n, double scale_n) {
   const TrialReference& reference = trial.reference;
   std::optional<Vec3> direction = reference.direction;
@@ -39,7 +36,7 @@ LoadError ErrorOf(const AcceptanceTrial& trial, double floor_n) {
   error.pressure_kpa = PressureKpa(trial);
   const TrialReading& loaded = *trial.loaded;
   const auto reference_n = ReferenceForce(trial);
-  if (reference_n && *reference_n >= kLeastForceN) {
+  if (reference_n && *reference_n >= kLeastReferenceN) {
     error.force = loaded.has_contact ? loaded.force_n / *reference_n - 1 : -1;
     const double scale_n = std::max(*reference_n, floor_n);
     error.force_to_floor = *error.force * *reference_n / scale_n;

@@ -34,6 +34,8 @@ std::vector<LoadError> LoadErrors(const AcceptanceRecord& record);
 Vec3 AtRadiusOf(const Vec3& reference_mm, const Vec3& measured_mm);
 
 bool IsUsable(const TrialReading& reading);
+/// References below this compare nothing: relative errors would say nothing. N.
+inline constexpr double kLeastReferenceN = 0.02;
 /// The force that the load really had: of the reading's reference, else as planned.
 std::optional<double> ReferenceForce(const AcceptanceTrial& trial);
 

@@ -27,6 +27,7 @@ void ReadingCollector::Add(const LinkState& state) {
     ++pressures_;
   }
   reading_.baseline_drift_mm = state.baseline.drift_mm;
+  reading_.baseline_utc_ns = state.baseline.taken_utc_ns;
   if (!state.has_forces()) return;
   ++reading_.usable;
   reading_.total_force_n += state.total_force_n;
@@ -95,14 +96,15 @@ TrialReading ReadingCollector::Reading() const {
     reading.others_n += load_.force_n / reading.usable;
     return reading;
   }
-  const double n = load_.frames;
+  // A load that is felt in some of the frames only is felt as less.
+  const double n = reading.usable;
   reading.force_n = load_.force_n / n;
   reading.center_mm = load_.moment_nmm / load_.force_n;
-  if (load_.frames > 1) {
+  if (reading.usable > 1) {
     const double variance = (load_.force2_n2 - n * reading.force_n * reading.force_n) / (n - 1);
     reading.force_sd_n = std::sqrt(std::max(0.0, variance));
   }
-  if (load_.has_variance) reading.stated_sigma_n = std::sqrt(load_.variance_n2 / n);
+  if (load_.has_variance) reading.stated_sigma_n = std::sqrt(load_.variance_n2 / load_.frames);
   return reading;
 }
 

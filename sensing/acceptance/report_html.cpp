@@ -147,7 +147,7 @@ std::string ErrorPlot(const AcceptanceReport& report, const std::string& title, 
 std::string HoldPlot(const AcceptanceRecord& record) {
   std::vector<Curve> curves;
   for (const AcceptanceTrial& trial : record.trials) {
-    if (!trial.loaded || trial.loaded->held.empty()) continue;
+    if (trial.state != TrialState::kMeasured || !trial.loaded || trial.loaded->held.empty()) continue;
     const auto reference_n = ReferenceForce(trial);
     Curve curve{{}, true};
     for (const HeldSample& sample : trial.loaded->held)
@@ -161,7 +161,8 @@ std::string HoldPlot(const AcceptanceRecord& record) {
 std::string PlacePlot(const AcceptanceRecord& record) {
   Curve reference, measured;
   for (const AcceptanceTrial& trial : record.trials) {
-    if (!trial.reference.place_mm || !trial.loaded || !trial.loaded->has_contact) continue;
+    if (trial.state != TrialState::kMeasured || !trial.reference.place_mm) continue;
+    if (!trial.loaded || !trial.loaded->has_contact) continue;
     const Vec3 &a = *trial.reference.place_mm, &b = trial.loaded->center_mm;
     reference.points.push_back({a.z(), kDegPerRad * std::atan2(a.y(), a.x())});
     measured.points.push_back({b.z(), kDegPerRad * std::atan2(b.y(), b.x())});
@@ -241,9 +242,9 @@ std::string AcceptanceHtml(const AcceptanceRecord& record, const AcceptanceRepor
                                      : std::string("not finished");
   page +=
       Text("; %d trials measured, %d skipped, %d open</p>\n", report.measured, report.skipped, report.open);
-  if (!record.model_hash.empty()) page += "<p>Model file " + Escaped(record.model_hash);
-  if (!record.calibration_hash.empty()) page += ", calibration file " + Escaped(record.calibration_hash);
-  page += record.model_hash.empty() ? "" : "</p>\n";
+  if (!record.model_hash.empty()) page += "<p>Model file " + Escaped(record.model_hash) + "</p>\n";
+  if (record.calibrated_utc_ns > 0)
+    page += "<p>Cameras calibrated " + UtcText(record.calibrated_utc_ns / 1'000'000'000) + "</p>\n";
   page += "<h2>Findings</h2>\n";
   if (report.findings.empty()) page += "<p>None.</p>\n";
   for (const AcceptanceFinding& finding : report.findings)
@@ -265,10 +266,11 @@ std::string AcceptanceHtml(const AcceptanceRecord& record, const AcceptanceRepor
       "<th class='n'>Left, N</th><th class='n'>kPa</th><th>Note</th></tr>\n" +
       TrialRows(record, report) + "</table>\n";
   page +=
-      "<p>Relative errors are (measured − reference) / reference. Intervals hold the true value in 95 of 100 "
-      "acceptances; places are the independent samples. A verdict is undecided where the interval contains "
-      "the "
-      "limit: more places decide it.</p>\n</body></html>\n";
+      "<p>Relative errors are (measured − reference) / reference. Intervals of means and slopes hold the true "
+      "value in 95 of 100 acceptances; places are the independent samples. Intervals of percentiles are "
+      "resampled from the places that were measured: of fewer than some 20 places they are too narrow for "
+      "others. A verdict is undecided where the interval contains the limit, or what the plan has trials for "
+      "was not measured: more places decide it.</p>\n</body></html>\n";
   return page;
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 #include <random>
+#include <ranges>
+#include <utility>
 
 namespace taclink {
 namespace {
@@ -101,56 +103,57 @@ PercentileEstimate PooledDeviation(std::span<const GroupedValue> values) {
           .samples = groups};
 }
 
-std::optional<LineFit> FitLine(std::span<const GroupedValue> x, std::span<const double> y) {
-  struct Sums {
-    double x = 0, y = 0, n = 0;
+std::optional<LineFit> FitLine(std::span<const GroupedValue> x, std::span<const double> y,
+                               double least_span) {
+  std::map<int, std::vector<std::pair<double, double>>> groups;
+  for (size_t i = 0; i < x.size(); ++i) groups[x[i].group].emplace_back(x[i].value, y[i]);
+  std::erase_if(groups, [&](const auto& group) {
+    const auto [least, most] = std::ranges::minmax(group.second | std::views::keys);
+    return !(most - least >= least_span) || !(most > least);
+  });
+  if (groups.empty()) return std::nullopt;
+  struct Means {
+    double x = 0, y = 0;
   };
-  std::map<int, Sums> means;
-  for (size_t i = 0; i < x.size(); ++i) {
-    Sums& of_group = means[x[i].group];
-    of_group.x += x[i].value;
-    of_group.y += y[i];
-    of_group.n += 1;
+  std::map<int, Means> means;
+  double xx = 0, xy = 0, points = 0;
+  for (const auto& [id, group] : groups) {
+    Means& of = means[id];
+    const auto n = static_cast<double>(group.size());
+    for (const auto& [px, py] : group) of.x += px / n, of.y += py / n;
+    for (const auto& [px, py] : group) xx += (px - of.x) * (px - of.x), xy += (px - of.x) * (py - of.y);
+    points += n;
   }
-  double xx = 0, xy = 0;
-  const auto centered = [&](size_t i) {
-    const Sums& of_group = means[x[i].group];
-    return std::pair(x[i].value - of_group.x / of_group.n, y[i] - of_group.y / of_group.n);
-  };
-  for (size_t i = 0; i < x.size(); ++i) {
-    const auto [dx, dy] = centered(i);
-    xx += dx * dx;
-    xy += dx * dy;
-  }
-  if (!(xx > 1e-12)) return std::nullopt;
   LineFit fit;
-  fit.slope.value = xy / xx;
+  fit.slope = {.value = xy / xx, .half_width = {}, .samples = static_cast<int>(groups.size())};
   // Scores by group: offsets of a group cancel within it, a slope of its own does not.
-  std::map<int, double> scores;
-  double residual2 = 0;
-  for (size_t i = 0; i < x.size(); ++i) {
-    const auto [dx, dy] = centered(i);
-    const double residual = dy - fit.slope.value * dx;
-    scores[x[i].group] += dx * residual;
-    residual2 += residual * residual;
+  double residual2 = 0, scores2 = 0;
+  for (const auto& [id, group] : groups) {
+    double score = 0;
+    for (const auto& [px, py] : group) {
+      const double residual = py - means[id].y - fit.slope.value * (px - means[id].x);
+      score += (px - means[id].x) * residual;
+      residual2 += residual * residual;
+    }
+    scores2 += score * score;
   }
-  const auto groups = static_cast<double>(scores.size());
-  fit.slope.samples = static_cast<int>(scores.size());
-  const double freedom = static_cast<double>(x.size()) - groups - 1;
-  double variance = freedom > 0 ? residual2 / freedom / xx : 0;
-  if (scores.size() >= 2) {
-    double of_groups = 0;
-    for (const auto& [group, score] : scores) of_groups += score * score;
-    variance = std::max(variance, groups / (groups - 1) * of_groups / (xx * xx));
+  const auto count = static_cast<double>(groups.size());
+  const double freedom = points - count - 1;
+  const double variance = freedom > 0 ? residual2 / freedom : 0;
+  if (groups.size() >= 2) {
+    const double of_groups = count / (count - 1) * scores2 / (xx * xx);
+    fit.slope.half_width = StudentT95(count - 1) * std::sqrt(std::max(variance / xx, of_groups));
+  } else if (freedom > 0) {
+    fit.slope.half_width = StudentT95(freedom) * std::sqrt(variance / xx);
   }
-  if (scores.size() >= 2)
-    fit.slope.half_width = StudentT95(groups - 1) * std::sqrt(variance);
-  else if (freedom > 0)
-    fit.slope.half_width = StudentT95(freedom) * std::sqrt(variance);
   std::vector<GroupedValue> offsets;
-  for (const auto& [group, of_group] : means)
-    offsets.push_back({group, (of_group.y - fit.slope.value * of_group.x) / of_group.n});
+  for (const auto& [id, of] : means) offsets.push_back({id, of.y - fit.slope.value * of.x});
   fit.intercept = GroupedMean(offsets);
+  if (groups.size() == 1 && freedom > 0) {
+    const double mean_x = means.begin()->second.x;
+    fit.intercept.half_width =
+        StudentT95(freedom) * std::sqrt(variance * (1 / points + mean_x * mean_x / xx));
+  }
   return fit;
 }
 

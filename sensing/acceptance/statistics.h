@@ -37,7 +37,8 @@ double StudentT95(double degrees_of_freedom);
 Estimate GroupedMean(std::span<const GroupedValue> values);
 
 /// Percentile (0 to 1) of all values; bounds by resampling whole groups (seeded, so that a report can be made
-/// again), at least two groups. The highest group bounds a percentile that few groups can't resolve.
+/// again), at least two groups. No bound exceeds the largest value: of few groups they are those of the
+/// groups that were measured, and too narrow for others.
 PercentileEstimate GroupedPercentile(std::span<const GroupedValue> values, double percentile);
 
 /// Standard deviation within groups of repeated values, pooled; bounds by the chi-squared distribution. None
@@ -49,9 +50,10 @@ struct LineFit {
   Estimate slope;
   Estimate intercept;  ///< mean over groups, at x = 0
 };
-/// Least squares with group offsets; the slope's width from the residuals' variance by group (sandwich with
-/// the t quantile of groups - 1 degrees of freedom), at least two groups, else from single points.
-/// None: x does not vary within any group.
-std::optional<LineFit> FitLine(std::span<const GroupedValue> x, std::span<const double> y);
+/// Least squares with group offsets, by the groups within which x varies by `least_span` at least; the
+/// slope's width from the residuals' variance by group (sandwich with the t quantile of groups - 1 degrees of
+/// freedom), of one such group from its points. The intercept's width likewise. None: x varies so much within
+/// no group.
+std::optional<LineFit> FitLine(std::span<const GroupedValue> x, std::span<const double> y, double least_span);
 
 }  // namespace taclink

@@ -45,6 +45,7 @@ void Write(const TrialReading& reading, v1::TrialReading& out) {
   out.set_others_n(reading.others_n);
   if (reading.pressure_mpa) out.set_pressure_pa(*reading.pressure_mpa * kPascalsPerMpa);
   out.set_baseline_drift_m(reading.baseline_drift_mm * kMetresPerMm);
+  out.set_baseline_utc_ns(reading.baseline_utc_ns);
   for (const taclink::ReadingReason& reason : reading.reasons) {
     v1::ReadingReason& message = *out.add_reasons();
     message.set_name(taclink::Name(reason.id));
@@ -69,7 +70,8 @@ TrialReading ReadingFrom(const v1::TrialReading& message) {
                        .center_mm = wire::FromWire(message.center_m(), 1 / kMetresPerMm),
                        .total_force_n = wire::FromWire(message.total_force_n(), 1),
                        .others_n = message.others_n(),
-                       .baseline_drift_mm = message.baseline_drift_m() / kMetresPerMm};
+                       .baseline_drift_mm = message.baseline_drift_m() / kMetresPerMm,
+                       .baseline_utc_ns = message.baseline_utc_ns()};
   if (message.has_stated_sigma_n()) reading.stated_sigma_n = message.stated_sigma_n();
   if (message.has_pressure_pa()) reading.pressure_mpa = message.pressure_pa() / kPascalsPerMpa;
   for (const v1::ReadingReason& reason : message.reasons()) {
@@ -137,7 +139,7 @@ void Fill(const AcceptanceRecord& record, v1::Acceptance& out) {
   out.set_plan(record.plan);
   out.set_model(record.model);
   out.set_model_hash(record.model_hash);
-  out.set_calibration_hash(record.calibration_hash);
+  out.set_calibrated_utc_ns(record.calibrated_utc_ns);
   out.set_started_utc_ns(record.started_utc_ns);
   out.set_finished_utc_ns(record.finished_utc_ns);
   for (const AcceptanceTrial& trial : record.trials) Write(trial, *out.add_trials());
@@ -196,7 +198,7 @@ AcceptanceRecord FromWire(const v1::Acceptance& message) {
                           .plan = message.plan(),
                           .model = message.model(),
                           .model_hash = message.model_hash(),
-                          .calibration_hash = message.calibration_hash(),
+                          .calibrated_utc_ns = message.calibrated_utc_ns(),
                           .started_utc_ns = message.started_utc_ns(),
                           .finished_utc_ns = message.finished_utc_ns()};
   for (const v1::AcceptanceTrial& trial : message.trials()) record.trials.push_back(TrialFrom(trial));

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
-#include <fstream>
 #include <system_error>
 #include <utility>
 
@@ -17,6 +16,7 @@
 #include "sensing/core/printable.h"
 #include "sensing/core/read_file.h"
 #include "sensing/core/utc_time.h"
+#include "server/process/replace_file.h"
 
 namespace taclink::server {
 namespace {
@@ -25,31 +25,24 @@ namespace fs = std::filesystem;
 
 constexpr int64_t kNsPerS = 1'000'000'000;
 
-// A reader sees the old file or the new one, also after a power failure in between.
-Result<void> WriteFile(const std::string& path, const std::string& text) {
-  const std::string fresh = path + ".new";
-  const auto failed = [&](const std::string& what) {
-    return Error{ErrorCode::kUnavailable, fresh + ": " + what + "; the acceptance was not saved"};
-  };
-  std::error_code error;
-  fs::create_directories(fs::path(path).parent_path(), error);
-  if (error) return failed(error.message());
-  std::ofstream file(fresh, std::ios::binary);
-  file << text;
-  file.flush();
-  if (!file) return failed("cannot be written");
-  file.close();
-  fs::rename(fresh, path, error);
-  if (error) return failed(error.message());
-  return {};
-}
-
-std::string JsonOf(const v1::Acceptance& message) {
+Result<std::string> JsonOf(const v1::Acceptance& message) {
   std::string json;
   google::protobuf::util::JsonPrintOptions options;
   options.add_whitespace = true;
-  static_cast<void>(google::protobuf::util::MessageToJsonString(message, &json, options));
+  const auto made = google::protobuf::util::MessageToJsonString(message, &json, options);
+  if (!made.ok()) {
+    return Error{ErrorCode::kInvalidArgument,
+                 "the acceptance cannot be written as JSON: " + std::string(made.message())};
+  }
   return json;
+}
+
+// The file's end is what counts: one that was never there is gone as well.
+Result<void> Remove(const std::string& path) {
+  std::error_code error;
+  fs::remove(path, error);
+  if (error) return Error{ErrorCode::kUnavailable, "cannot remove " + path + ": " + error.message()};
+  return {};
 }
 
 v1::Acceptance MessageOf(const AcceptanceRecord& record, const std::string& plan_text) {
@@ -91,7 +84,11 @@ AcceptanceStore::AcceptanceStore(std::vector<AcceptedLink> links, std::string fo
     if (!folder_.empty()) Load(link);
     if (links_[link].recorded.empty()) continue;
     Entry& entry = entries_[link];
-    entry.finished = Parse("the log's acceptance", links_[link].recorded, entry.finished_plan);
+    auto recorded = Parse("the log's acceptance", links_[link].recorded, entry.finished_plan);
+    if (recorded)
+      entry.finished = *std::move(recorded);
+    else
+      SPDLOG_WARN("acceptance: {}", Printable(recorded.error().message));
     SetSummary(link);
   }
 }
@@ -112,20 +109,31 @@ std::string AcceptanceStore::PathOf(size_t link, const std::string& file) const 
 
 void AcceptanceStore::Load(size_t link) {
   Entry& entry = entries_[link];
-  entry.current = LoadRecord(PathOf(link, "current.json"), entry.current_plan);
-  entry.finished = LoadRecord(PathOf(link, "accepted.json"), entry.finished_plan);
+  const auto take = [](Result<std::optional<AcceptanceRecord>> loaded) {
+    if (loaded) return *std::move(loaded);
+    SPDLOG_WARN("acceptance: {}; it is left as it is and not used", Printable(loaded.error().message));
+    return std::optional<AcceptanceRecord>();
+  };
+  auto current = LoadRecord(PathOf(link, "current.json"), entry.current_plan);
+  entry.unreadable = current ? "" : current.error().message;
+  entry.current = take(std::move(current));
+  entry.finished = take(LoadRecord(PathOf(link, "accepted.json"), entry.finished_plan));
   SetSummary(link);
 }
 
-std::optional<AcceptanceRecord> AcceptanceStore::LoadRecord(const std::string& path, std::string& plan_text) {
+// None: there is no such file.
+Result<std::optional<AcceptanceRecord>> AcceptanceStore::LoadRecord(const std::string& path,
+                                                                    std::string& plan_text) {
   const auto text = ReadFile(path);
-  if (text) return Parse(path, *text, plan_text);
-  if (text.error().code != ErrorCode::kNotFound) SPDLOG_WARN("acceptance: {}", text.error().message);
-  return std::nullopt;
+  if (!text && text.error().code == ErrorCode::kNotFound) return std::optional<AcceptanceRecord>();
+  if (!text) return text.error();
+  auto record = Parse(path, *text, plan_text);
+  if (!record) return record.error();
+  return std::optional(*std::move(record));
 }
 
-std::optional<AcceptanceRecord> AcceptanceStore::Parse(const std::string& path, const std::string& text,
-                                                       std::string& plan_text) {
+Result<AcceptanceRecord> AcceptanceStore::Parse(const std::string& path, const std::string& text,
+                                                std::string& plan_text) {
   v1::Acceptance message;
   google::protobuf::util::JsonParseOptions options;
   options.ignore_unknown_fields = true;
@@ -133,10 +141,7 @@ std::optional<AcceptanceRecord> AcceptanceStore::Parse(const std::string& path, 
   const auto plan = parsed.ok() ? ParseAcceptancePlan(path, message.plan_text())
                                 : Result<AcceptancePlan>(Error{ErrorCode::kInvalidArgument,
                                                                path + ": " + std::string(parsed.message())});
-  if (!plan) {
-    SPDLOG_WARN("acceptance: {}; it is left as it is and not used", Printable(plan.error().message));
-    return std::nullopt;
-  }
+  if (!plan) return plan.error();
   AcceptanceRecord record = FromWire(message);
   record.limits = plan->limits;
   plan_text = message.plan_text();
@@ -149,8 +154,8 @@ Result<void> AcceptanceStore::CheckFolder() const {
                "this server has no folder for acceptances; configure acceptance: {folder: ...}"};
 }
 
-std::string AcceptanceStore::CalibrationHash(size_t link) const {
-  return links_[link].calibration_hash ? links_[link].calibration_hash() : "";
+int64_t AcceptanceStore::CalibratedUtcNs(size_t link) const {
+  return links_[link].calibrated_utc_ns ? links_[link].calibrated_utc_ns() : 0;
 }
 
 Result<v1::Acceptance> AcceptanceStore::Start(size_t link, const std::string& plan_name,
@@ -169,7 +174,25 @@ Result<v1::Acceptance> AcceptanceStore::Start(size_t link, const std::string& pl
   const std::lock_guard lock(mutex_);
   if (auto owned = Own(link); !owned) return owned.error();
   Entry& entry = entries_[link];
+  if (entry.is_measuring) return IsMeasuring(link);
+  if (!entry.unreadable.empty() && !restart) {
+    return Error{ErrorCode::kFailedPrecondition,
+                 "an acceptance of link '" + links_[link].name + "' is under way, but cannot be read: " +
+                     entry.unreadable + "; mend the file, or start anew with restart, which puts it aside"};
+  }
+  if (!entry.unreadable.empty()) {
+    std::error_code error;
+    fs::rename(PathOf(link, "current.json"), PathOf(link, "current.json.unreadable"), error);
+    if (error)
+      return Error{ErrorCode::kUnavailable, "cannot put the unreadable acceptance aside: " + error.message()};
+    entry.unreadable.clear();
+  }
   if (entry.current && !restart) {
+    if (entry.current->model_hash != links_[link].model_hash) {
+      return Error{ErrorCode::kFailedPrecondition,
+                   "the model of link '" + links_[link].name +
+                       "' was changed since its acceptance began: finish it, or start anew with restart"};
+    }
     if (entry.current_plan == text) return Save(link);
     return Error{ErrorCode::kFailedPrecondition,
                  "an acceptance of link '" + links_[link].name + "' by plan '" + entry.current->plan +
@@ -179,7 +202,7 @@ Result<v1::Acceptance> AcceptanceStore::Start(size_t link, const std::string& pl
                                    .plan = plan->name,
                                    .model = links_[link].model.name,
                                    .model_hash = links_[link].model_hash,
-                                   .calibration_hash = CalibrationHash(link),
+                                   .calibrated_utc_ns = CalibratedUtcNs(link),
                                    .started_utc_ns = clock_.UtcNs(),
                                    .limits = plan->limits,
                                    .trials = std::move(*trials)};
@@ -191,13 +214,19 @@ Result<v1::Acceptance> AcceptanceStore::Start(size_t link, const std::string& pl
 Result<v1::Acceptance> AcceptanceStore::Save(size_t link) {
   const Entry& entry = entries_[link];
   v1::Acceptance message = MessageOf(*entry.current, entry.current_plan);
-  if (auto written = WriteFile(PathOf(link, "current.json"), JsonOf(message)); !written)
-    return written.error();
+  const auto json = JsonOf(message);
+  if (!json) return json.error();
+  if (auto written = ReplaceFile(PathOf(link, "current.json"), *json); !written) return written.error();
   server::Fill(AnalyzeAcceptance(*entry.current), *message.mutable_report());
   return message;
 }
 
-Result<AcceptanceRecord*> AcceptanceStore::Current(size_t link) {
+Error AcceptanceStore::IsMeasuring(size_t link) const {
+  return {ErrorCode::kFailedPrecondition,
+          "a trial of link '" + links_[link].name + "' is being measured; wait for its end, or cancel it"};
+}
+
+Result<const AcceptanceRecord*> AcceptanceStore::Current(size_t link) const {
   if (entries_[link].current) return &*entries_[link].current;
   return Error{ErrorCode::kFailedPrecondition,
                "no acceptance of link '" + links_[link].name + "' is under way; start one"};
@@ -205,7 +234,7 @@ Result<AcceptanceRecord*> AcceptanceStore::Current(size_t link) {
 
 Result<AcceptanceTrial> AcceptanceStore::Trial(size_t link, uint32_t trial) const {
   const std::lock_guard lock(mutex_);
-  const auto record = const_cast<AcceptanceStore*>(this)->Current(link);
+  const auto record = Current(link);
   if (!record) return record.error();
   const auto found = std::ranges::find((*record)->trials, trial, &AcceptanceTrial::id);
   if (found == (*record)->trials.end()) {
@@ -214,7 +243,9 @@ Result<AcceptanceTrial> AcceptanceStore::Trial(size_t link, uint32_t trial) cons
   }
   AcceptanceTrial planned = *found;
   const LinkModel& model = links_[link].model;
-  if (planned.path > 0) {
+  // Of an acceptance that was begun with another model there may be markers that this one does not have.
+  if (planned.path > 0 && planned.path <= model.markers.paths && planned.ring > 0 &&
+      planned.ring <= model.markers.rings()) {
     const double angle = model.PathAngle(planned.path - 1);
     const double z_mm = model.markers.rings_z_mm[static_cast<size_t>(planned.ring - 1)];
     if (!planned.reference.place_mm) planned.reference.place_mm = model.PointAtDepth(angle, z_mm, 0);
@@ -238,10 +269,10 @@ Result<v1::Acceptance> AcceptanceStore::Store(size_t link, uint32_t trial, v1::T
                                               const std::optional<TrialReference>& reference) {
   const std::lock_guard lock(mutex_);
   if (auto owned = Own(link); !owned) return owned.error();
-  const auto record = Current(link);
-  if (!record) return record.error();
-  const auto found = std::ranges::find((*record)->trials, trial, &AcceptanceTrial::id);
-  if (found == (*record)->trials.end())
+  if (const auto record = Current(link); !record) return record.error();
+  auto& trials = entries_[link].current->trials;
+  const auto found = std::ranges::find(trials, trial, &AcceptanceTrial::id);
+  if (found == trials.end())
     return Error{ErrorCode::kFailedPrecondition, "the acceptance was replaced while the trial was measured"};
   if (phase == v1::TRIAL_PHASE_UNLOADED) {
     found->unloaded = reading;
@@ -260,10 +291,10 @@ Result<v1::Acceptance> AcceptanceStore::Skip(size_t link, uint32_t trial, bool r
   if (const auto known = Trial(link, trial); !known) return known.error();
   const std::lock_guard lock(mutex_);
   if (auto owned = Own(link); !owned) return owned.error();
-  const auto record = Current(link);
-  if (!record) return record.error();
-  const auto found = std::ranges::find((*record)->trials, trial, &AcceptanceTrial::id);
-  if (found == (*record)->trials.end())
+  if (const auto record = Current(link); !record) return record.error();
+  auto& trials = entries_[link].current->trials;
+  const auto found = std::ranges::find(trials, trial, &AcceptanceTrial::id);
+  if (found == trials.end())
     return Error{ErrorCode::kFailedPrecondition, "the acceptance was replaced meanwhile"};
   found->state = reopen ? TrialState::kOpen : TrialState::kSkipped;
   if (reopen) {
@@ -280,10 +311,10 @@ Result<v1::Acceptance> AcceptanceStore::Finish(size_t link, bool discard) {
   const auto current = Current(link);
   if (!current) return current.error();
   Entry& entry = entries_[link];
-  std::error_code ignored;
+  if (entry.is_measuring) return IsMeasuring(link);
   if (discard) {
     v1::Acceptance message = MessageOf(*entry.current, entry.current_plan);
-    fs::remove(PathOf(link, "current.json"), ignored);
+    if (auto removed = Remove(PathOf(link, "current.json")); !removed) return removed.error();
     entry.current.reset();
     return message;
   }
@@ -296,15 +327,16 @@ Result<v1::Acceptance> AcceptanceStore::Finish(size_t link, bool discard) {
                                                      "': there is nothing to report; discard it, or measure"};
   }
   v1::Acceptance message = MessageOf(record, entry.current_plan);
-  const std::string json = JsonOf(message);
+  const auto json = JsonOf(message);
+  if (!json) return json.error();
   const std::pair<std::string, std::string> files[] = {
-      {UtcText(record.finished_utc_ns / kNsPerS) + ".json", json},
+      {UtcText(record.finished_utc_ns / kNsPerS) + ".json", *json},
       {"report.html", AcceptanceHtml(record, report)},
       {"report.csv", AcceptanceCsv(record, report)},
-      {"accepted.json", json}};
+      {"accepted.json", *json}};
   for (const auto& [name, text] : files)
-    if (auto written = WriteFile(PathOf(link, name), text); !written) return written.error();
-  fs::remove(PathOf(link, "current.json"), ignored);
+    if (auto written = ReplaceFile(PathOf(link, name), text); !written) return written.error();
+  if (auto removed = Remove(PathOf(link, "current.json")); !removed) return removed.error();
   server::Fill(report, *message.mutable_report());
   entry.finished = std::move(record);
   entry.finished_plan = std::exchange(entry.current_plan, {});
@@ -337,7 +369,7 @@ void AcceptanceStore::SetSummary(size_t link) {
   const auto& finished = entries_[link].finished;
   if (!finished) return;
   Summarized made{SummaryOf(*finished, AnalyzeAcceptance(*finished)), finished->model_hash,
-                  finished->calibration_hash};
+                  finished->calibrated_utc_ns};
   const std::lock_guard lock(summary_mutex_);
   summaries_[link] = std::move(made);
 }
@@ -350,9 +382,10 @@ std::optional<v1::AcceptanceSummary> AcceptanceStore::Summary(size_t link) const
   }
   if (!made) return std::nullopt;
   if (!links_[link].recorded.empty()) return made->summary;
+  const int64_t calibrated_ns = CalibratedUtcNs(link);
   if (made->model_hash != links_[link].model_hash)
     made->summary.set_outdated("the link's model was changed since");
-  else if (made->calibration_hash != CalibrationHash(link))
+  else if (made->calibrated_utc_ns != 0 && calibrated_ns != 0 && made->calibrated_utc_ns != calibrated_ns)
     made->summary.set_outdated("the cameras were calibrated again since");
   return made->summary;
 }
@@ -360,7 +393,9 @@ std::optional<v1::AcceptanceSummary> AcceptanceStore::Summary(size_t link) const
 std::string AcceptanceStore::FinishedFile(size_t link) const {
   const std::lock_guard lock(mutex_);
   const Entry& entry = entries_[link];
-  return entry.finished ? JsonOf(MessageOf(*entry.finished, entry.finished_plan)) : "";
+  if (!entry.finished) return "";
+  const auto json = JsonOf(MessageOf(*entry.finished, entry.finished_plan));
+  return json ? *json : "";
 }
 
 }  // namespace taclink::server

@@ -21,8 +21,8 @@ struct AcceptedLink {
   LinkModel model;
   std::string model_hash;     ///< of the model's file
   std::string recorded = {};  ///< a finished acceptance from elsewhere, as FinishedFile: from a log
-  /// Of the calibration file in use; empty: there is none. Reads a small file.
-  std::function<std::string()> calibration_hash = {};
+  /// When the cameras in use were calibrated, since 1970-01-01; 0: not known. Any thread.
+  std::function<int64_t()> calibrated_utc_ns = {};
 };
 
 /// A file that one process at a time holds, until it ends or lets go.
@@ -44,8 +44,8 @@ class LockFile {
 };
 
 /// The acceptances of all links: at most one under way for each, and the last finished one. Every change is
-/// written to the folder at once (a new file that replaces the old one), so that a server that is killed
-/// loses no reading. Any thread; calls wait for the disk.
+/// written to the folder at once (see ReplaceFile), so that a server that is killed loses no reading. Any
+/// thread; calls wait for the disk.
 ///
 ///     FOLDER/LINK/current.json    under way
 ///     FOLDER/LINK/accepted.json   the last finished one; report.html and report.csv beside it
@@ -65,7 +65,8 @@ class AcceptanceStore {
   /// The trial as it stands, with the references that the plan gives it. Errors: kFailedPrecondition (none is
   /// under way), kNotFound (no such trial).
   Result<AcceptanceTrial> Trial(size_t link, uint32_t trial) const;
-  /// Claims the link for one measurement; false: one is under way. Ends with Store or Release.
+  /// Claims the link for one measurement; false: one is under way. Until Release the acceptance is neither
+  /// replaced nor ended.
   bool Claim(size_t link);
   void Release(size_t link);
   /// Stores a reading. `reference`: with the loaded phase. Errors: as Trial, and kUnavailable (the disk).
@@ -77,7 +78,7 @@ class AcceptanceStore {
 
   /// Errors: kFailedPrecondition (there is none).
   Result<v1::Acceptance> Get(size_t link, bool finished, bool with_files) const;
-  /// Of the last finished one. None: there is none. Does not wait for the disk but for the calibration file.
+  /// Of the last finished one. None: there is none. Does not wait for the disk.
   std::optional<v1::AcceptanceSummary> Summary(size_t link) const;
   /// The file of the last finished one, for logs. Empty: there is none.
   std::string FinishedFile(size_t link) const;
@@ -86,6 +87,7 @@ class AcceptanceStore {
   struct Entry {
     std::optional<AcceptanceRecord> current, finished;
     std::string current_plan, finished_plan;  ///< texts
+    std::string unreadable;  ///< why what is under way cannot be read; empty: it can, or there is none
     bool is_measuring = false;
     LockFile lock;
   };
@@ -93,20 +95,22 @@ class AcceptanceStore {
   /// Of a finished acceptance, with what it holds for.
   struct Summarized {
     v1::AcceptanceSummary summary;
-    std::string model_hash, calibration_hash;
+    std::string model_hash;
+    int64_t calibrated_utc_ns = 0;
   };
 
   void Load(size_t link);
-  static std::optional<AcceptanceRecord> LoadRecord(const std::string& path, std::string& plan_text);
+  static Result<std::optional<AcceptanceRecord>> LoadRecord(const std::string& path, std::string& plan_text);
   /// `path`: for messages.
-  static std::optional<AcceptanceRecord> Parse(const std::string& path, const std::string& text,
-                                               std::string& plan_text);
+  static Result<AcceptanceRecord> Parse(const std::string& path, const std::string& text,
+                                        std::string& plan_text);
   Result<v1::Acceptance> Save(size_t link);
-  Result<AcceptanceRecord*> Current(size_t link);
+  Result<const AcceptanceRecord*> Current(size_t link) const;
+  Error IsMeasuring(size_t link) const;
   Result<void> CheckFolder() const;
   Result<void> Own(size_t link);
   std::string PathOf(size_t link, const std::string& file) const;
-  std::string CalibrationHash(size_t link) const;
+  int64_t CalibratedUtcNs(size_t link) const;
   void SetSummary(size_t link);
 
   // Constant after construction.

@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "sensing/core/fingerprint.h"
-#include "sensing/core/read_file.h"
 #include "sensing/core/similar_skin.h"
 #include "server/arm/link_names.h"
 #include "server/pressure/pressure_controller.h"
@@ -11,17 +9,18 @@
 namespace taclink::server {
 namespace {
 
-std::unique_ptr<AcceptanceStore> MakeAcceptances(const std::vector<LinkDescription>& links,
+std::unique_ptr<AcceptanceStore> MakeAcceptances(const std::vector<LinkDescription>& links, const Hub& hub,
                                                  const std::string& folder, Clock& clock) {
   std::vector<AcceptedLink> accepted;
-  for (const LinkDescription& link : links) {
-    AcceptedLink& one =
-        accepted.emplace_back(AcceptedLink{link.name, link.model, link.model_hash, link.acceptance});
-    if (link.calibration.empty()) continue;
-    one.calibration_hash = [path = link.calibration] {
-      const auto text = ReadFile(path);
-      return text ? Fingerprint(*text) : std::string();
-    };
+  for (size_t link = 0; link < links.size(); ++link) {
+    accepted.push_back({.name = links[link].name,
+                        .model = links[link].model,
+                        .model_hash = links[link].model_hash,
+                        .recorded = links[link].acceptance,
+                        .calibrated_utc_ns = [&hub, link]() -> int64_t {
+                          const auto newest = hub.Latest(link);
+                          return newest ? newest->state().baseline.calibrated_utc_ns : 0;
+                        }});
   }
   return std::make_unique<AcceptanceStore>(std::move(accepted), folder, clock);
 }
@@ -68,7 +67,7 @@ Arm::Arm(std::string name, std::vector<LinkParts> links, FrameEncoder encoder, C
         link, links_.back().name, std::move(parts.source), std::move(parts.processor),
         std::move(parts.factories), hub_, clock, worker, options.watchdog));
   }
-  acceptances_ = MakeAcceptances(links_, options.acceptance_folder, clock);
+  acceptances_ = MakeAcceptances(links_, hub_, options.acceptance_folder, clock);
   events_ = std::make_unique<EventEngine>(hub_, std::move(watched), options.events, clock);
   for (size_t link = 0; link < links_.size(); ++link) {
     const auto controller = regulator(link);

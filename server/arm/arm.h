@@ -32,7 +32,6 @@ struct LinkDescription {
   SourceKind source = SourceKind::kSimulated;
   LinkRules rules = {};          ///< of its force levels, at the start
   std::string model_hash = {};   ///< Fingerprint of the model's file
-  std::string calibration = {};  ///< path of its calibration file; empty: none
   std::string acceptance = {};   ///< of a log: its acceptance (AcceptanceStore::FinishedFile); empty: none
 };
 

@@ -1,6 +1,7 @@
 #include "server/pressure/line_reader.h"
 
 #include <poll.h>
+#include <termios.h>
 #include <unistd.h>
 
 #include <array>
@@ -29,8 +30,12 @@ std::optional<double> NumberOfLine(std::string_view line) {
   return value;
 }
 
+// What a device has not taken is thrown away: the kernel would wait for it, half a minute long, and a device
+// that comes back would obey commands of long ago.
 LineReader::~LineReader() {
-  if (descriptor_ >= 0) close(descriptor_);
+  if (descriptor_ < 0) return;
+  tcflush(descriptor_, TCOFLUSH);
+  close(descriptor_);
 }
 
 LineReader::LineReader(LineReader&& other) noexcept {

@@ -21,8 +21,9 @@ constexpr milliseconds kCycle{20};
 constexpr milliseconds kHeartbeat{100};  // a fifth of the device's watchdog
 constexpr milliseconds kCommandGap{20};  // a setpoint that moves is sent no more often
 constexpr milliseconds kFirstRetry{100}, kLongestRetry{2000};
-// A loop that stands still for longer has lost the device, which has vented by itself.
-constexpr milliseconds kLongestStall = PressureActuator::kDeviceWatchdog;
+// A device that heard nothing for longer may have vented by itself: the next setpoint would fill the skin
+// without a ramp. Half of the device's watchdog, for the line takes time as well.
+constexpr milliseconds kLongestStall = PressureActuator::kDeviceWatchdog / 2;
 
 int64_t NsOf(milliseconds duration) {
   return std::chrono::nanoseconds(duration).count();
@@ -214,6 +215,20 @@ std::optional<PressureTrip> PressureController::Advance(int64_t now_ns) {
   return guard_.OnTime(status_.reading, MomentAt(now_ns));
 }
 
+// Counted from the last command that the device got, whatever kept the next one back.
+std::optional<PressureTrip> PressureController::LateCommand(int64_t now_ns) const {
+  if (!status_.setpoint_kpa || !line_.sent_kpa || !line_.sent_ns) return std::nullopt;
+  const double silent_s = SecondsOf(now_ns - *line_.sent_ns), limit_s = SecondsOf(NsOf(kLongestStall));
+  if (silent_s <= limit_s) return std::nullopt;
+  return PressureTrip{
+      .cause = PressureTripCause::kLoopStalled,
+      .text = fmt::format("the device got no command for {:.2f} s, limit {:.2f} s; the machine was "
+                          "suspended or is overloaded",
+                          silent_s, limit_s),
+      .measured = silent_s,
+      .limit = limit_s};
+}
+
 void PressureController::Step(milliseconds timeout) {
   const int64_t now_ns = clock_.MonotonicNs();
   Guarded([&] { return Advance(now_ns); });
@@ -223,6 +238,7 @@ void PressureController::Step(milliseconds timeout) {
     if (const auto opened = actuator_->Open(); !opened) return Failed(opened.error());
     line_ = {.is_open = true, .backoff = line_.backoff, .sent_ns = {}, .sent_kpa = {}};
   }
+  Guarded([&] { return LateCommand(now_ns); });
   SendCommand(now_ns);
   if (!line_.is_open) return;
   const auto reading = actuator_->Read(timeout);
@@ -236,13 +252,13 @@ void PressureController::Step(milliseconds timeout) {
 
 void PressureController::TakeReading(const RegulatorReading& reading) {
   line_.backoff = milliseconds(0);  // only a reading proves that the device works
-  const auto added = readings_.Add({.time_ns = reading.time_ns, .mpa = reading.kpa * kMpaPerKpa});
-  SetTrouble(added ? "" : added.error().message);
-  if (!added || !*added) return;
+  // One that no frame can use, as of a sensor that is saturated, counts for the limits all the same.
   Guarded([&] {
     status_.reading = reading;
     return guard_.OnReading(reading, MomentAt(reading.time_ns));
   });
+  const auto added = readings_.Add({.time_ns = reading.time_ns, .mpa = reading.kpa * kMpaPerKpa});
+  SetTrouble(added ? "" : added.error().message);
 }
 
 void PressureController::TakeError(const Error& error) {

@@ -91,6 +91,7 @@ class PressureController final : public PressureSource {
   void MoveSetpoint(double span_s);
   void Close(RegulatorState state);
   std::optional<PressureTrip> Advance(int64_t now_ns);
+  std::optional<PressureTrip> LateCommand(int64_t now_ns) const;
   template <typename Judge>
   void Guarded(Judge judge);
   void TakeReading(const RegulatorReading& reading);

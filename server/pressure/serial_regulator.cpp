@@ -71,8 +71,10 @@ class SerialRegulator final : public PressureActuator {
     if (!kpa) return std::nullopt;
     RegulatorReading reading{.time_ns = clock_.MonotonicNs(), .kpa = *kpa};
     if (blank == std::string_view::npos) return reading;
-    reading.effort = NumberOfLine(text.substr(blank));
-    if (!reading.effort || !(*reading.effort >= 0 && *reading.effort <= 1)) return std::nullopt;
+    const auto effort = NumberOfLine(text.substr(blank));
+    if (!effort) return std::nullopt;
+    // Beyond its range it says nothing more than its end; the pressure counts.
+    reading.effort = std::clamp(*effort, 0.0, 1.0);
     return reading;
   }
 

@@ -67,8 +67,9 @@ Result<v1::Acceptance> Measure(client::Client& connection, client::Acceptances& 
   PersonOptions person = options.person;
   if (options.weight_g) person.force_n = kNewtonsPerGram * *options.weight_g;
   const auto trial_operator =
-      options.play ? MakePlayer(connection, *link, person.force_n) : MakePerson(person);
-  return MeasureTrials(calls, *std::move(started), *trial_operator);
+      options.play ? Result(MakePlayer(connection, *link, person.force_n)) : MakePerson(person);
+  if (!trial_operator) return trial_operator.error();
+  return MeasureTrials(calls, *std::move(started), **trial_operator);
 }
 
 Result<void> RunAccept(const AcceptOptions& options) {

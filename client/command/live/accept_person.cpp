@@ -6,10 +6,12 @@
 
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <iostream>
+#include <utility>
 
 #include "client/command/cli/interrupt.h"
 #include "client/command/cli/units.h"
@@ -29,6 +31,16 @@ std::optional<double> NumberOf(const std::string& text) {
   return value;
 }
 
+std::optional<speed_t> GaugeSpeed(int baud) {
+  constexpr std::pair<int, speed_t> kSpeeds[] = {{1200, B1200},   {2400, B2400},     {4800, B4800},
+                                                 {9600, B9600},   {19200, B19200},   {38400, B38400},
+                                                 {57600, B57600}, {115200, B115200}, {230400, B230400}};
+  for (const auto& [rate, speed] : kSpeeds) {
+    if (rate == baud) return speed;
+  }
+  return std::nullopt;
+}
+
 /// A force gauge that sends a number a line.
 class Gauge {
  public:
@@ -42,7 +54,7 @@ class Gauge {
     if (::tcgetattr(device, &settings) == 0) {
       cfmakeraw(&settings);
       settings.c_cflag |= CLOCAL | CREAD;
-      ::cfsetspeed(&settings, Speed(options_.gauge_baud));
+      ::cfsetspeed(&settings, *GaugeSpeed(options_.gauge_baud));
       ::tcsetattr(device, TCSANOW, &settings);
     }
     const std::string text = TextOf(device);
@@ -70,36 +82,21 @@ class Gauge {
     return {ErrorCode::kUnavailable, "force gauge " + options_.gauge + ": " + what};
   }
 
-  static speed_t Speed(int baud) {
-    switch (baud) {
-      case 115200:
-        return B115200;
-      case 57600:
-        return B57600;
-      case 38400:
-        return B38400;
-      case 19200:
-        return B19200;
-      case 4800:
-        return B4800;
-      case 2400:
-        return B2400;
-      default:
-        return B9600;
-    }
-  }
-
+  // What comes within a second.
   static std::string TextOf(int device) {
-    constexpr int kRounds = 10, kRoundMs = 100;
+    using Clock = std::chrono::steady_clock;
+    const auto end = Clock::now() + std::chrono::seconds(1);
     std::string text;
-    for (int round = 0; round < kRounds; ++round) {
+    for (;;) {
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()).count();
+      if (left <= 0) return text;
       pollfd waiting{.fd = device, .events = POLLIN, .revents = 0};
-      if (::poll(&waiting, 1, kRoundMs) <= 0) continue;
+      if (::poll(&waiting, 1, static_cast<int>(left)) <= 0) continue;
       char piece[1024];
       const ssize_t got = ::read(device, piece, sizeof piece);
+      if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) return text;  // the device is gone
       if (got > 0) text.append(piece, static_cast<size_t>(got));
     }
-    return text;
   }
 
   const PersonOptions& options_;
@@ -109,9 +106,14 @@ class Person final : public TrialOperator {
  public:
   explicit Person(const PersonOptions& options) : options_(options) {}
 
-  Result<TrialAnswer> Clear() override { return Ask("Nothing may touch the link", false); }
+  Result<TrialAnswer> Clear() override {
+    auto answer = Ask("Nothing may touch the link", false);
+    if (answer && manometer_pa_) answer->reference.set_pressure_pa(*manometer_pa_);
+    return answer;
+  }
 
   Result<TrialAnswer> SetCondition(const v1::AcceptanceTrial& trial) override {
+    manometer_pa_.reset();
     std::string what;
     if (!trial.attitude().empty()) what = "bring the link into the attitude '" + trial.attitude() + "'";
     if (trial.has_pressure_pa())
@@ -147,20 +149,22 @@ class Person final : public TrialOperator {
   Result<TrialAnswer> Release(const v1::AcceptanceTrial&) override { return Ask("  Take it off", false); }
 
  private:
-  // Waits for a line: empty: done; a number, where one is asked for; s: skip; q or the end of input: stop.
+  // Waits for a line: empty: done; a number, where one is asked for; s: skip; r: repeat; q or the end of
+  // input: stop.
   Result<TrialAnswer> Ask(const std::string& what, bool takes_number) {
     number_.reset();
     for (;;) {
-      fmt::print("{}. Enter when done (s skips, q stops): ", what);
+      fmt::print("{}. Enter when done (s skips, r repeats the one before, q stops): ", what);
       std::fflush(stdout);
       std::string line;
       if (!std::getline(std::cin, line)) return TrialAnswer{.kind = Kind::kStop, .reference = {}};
       if (line.empty()) return TrialAnswer{};
       if (line == "s") return TrialAnswer{.kind = Kind::kSkip, .reference = {}};
+      if (line == "r") return TrialAnswer{.kind = Kind::kRepeat, .reference = {}};
       if (line == "q") return TrialAnswer{.kind = Kind::kStop, .reference = {}};
       number_ = NumberOf(line);
       if (takes_number && number_ && *number_ >= 0) return TrialAnswer{};
-      fmt::print("  '{}' is not {}\n", line, takes_number ? "a number from 0 on, s or q" : "s or q");
+      fmt::print("  '{}' is not {}\n", line, takes_number ? "a number from 0 on, s, r or q" : "s, r or q");
     }
   }
 
@@ -171,8 +175,13 @@ class Person final : public TrialOperator {
 
 }  // namespace
 
-std::unique_ptr<TrialOperator> MakePerson(const PersonOptions& options) {
-  return std::make_unique<Person>(options);
+Result<std::unique_ptr<TrialOperator>> MakePerson(const PersonOptions& options) {
+  if (!GaugeSpeed(options.gauge_baud)) {
+    return Error{ErrorCode::kInvalidArgument,
+                 fmt::format("--gauge-baud {} is no rate of serial lines; usual are 9600 and 115200",
+                             options.gauge_baud)};
+  }
+  return std::unique_ptr<TrialOperator>(std::make_unique<Person>(options));
 }
 
 }  // namespace taclink::command

@@ -14,8 +14,8 @@ namespace {
 constexpr uint64_t kBody = 90;
 constexpr double kDiscM = 0.011;
 // A load is on when its true force is that near to what was asked for, and has been for so long.
-constexpr double kForceShare = 0.01, kRestS = 0.3, kMostWaitS = 15;
-constexpr double kPressurePa = 5;
+constexpr double kForceShare = 0.01, kRestS = 0.3, kMostWaitS = 30;
+constexpr double kPressurePa = 20;  // a regulator's noise within
 
 double NormOf(const v1::Vector3& v) {
   return std::hypot(v.x(), v.y(), v.z());
@@ -40,10 +40,7 @@ class Player final : public TrialOperator {
                    "the simulation cannot be brought into attitude '" + trial.attitude() + "'"};
     if (!trial.has_pressure_pa()) return TrialAnswer{};
     fmt::print("{:.2f} kPa\n", kKpaPerPascal * trial.pressure_pa());
-    v1::SetScenePressureRequest request;
-    request.set_link(link_.name());
-    request.set_pressure_pa(trial.pressure_pa());
-    if (auto set = connection_.SetScenePressure(request); !set) return set.error();
+    if (auto set = SetPressure(trial.pressure_pa()); !set) return set.error();
     const auto frame = Wait(
         [&](const v1::LinkFrame& now) {
           return std::abs(now.pressure().pressure_pa() - trial.pressure_pa()) < kPressurePa;
@@ -88,6 +85,22 @@ class Player final : public TrialOperator {
   }
 
  private:
+  // By the link's regulator, if it has one: then nothing else can set it.
+  Result<void> SetPressure(double pressure_pa) {
+    if (link_.has_regulator()) {
+      v1::SetPressureRequest request;
+      request.set_link(link_.name());
+      request.set_pressure_pa(pressure_pa);
+      const auto set = connection_.SetPressure(request);
+      return set ? Result<void>() : set.error();
+    }
+    v1::SetScenePressureRequest request;
+    request.set_link(link_.name());
+    request.set_pressure_pa(pressure_pa);
+    const auto set = connection_.SetScenePressure(request);
+    return set ? Result<void>() : set.error();
+  }
+
   // Of a simulated link without a sensor of its own the frames have the true pressure.
   static TrialAnswer WithPressure(const v1::LinkFrame& frame) {
     TrialAnswer answer;

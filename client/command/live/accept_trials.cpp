@@ -56,8 +56,9 @@ class Run {
   Result<v1::Acceptance> All() {
     while (acceptance_.next_trial() != 0) {
       const v1::AcceptanceTrial trial = Find(acceptance_.next_trial());
-      if (auto measured = One(trial); !measured) return measured.error();
-      last_ = trial;
+      const auto measured = One(trial);
+      if (!measured) return measured.error();
+      if (*measured) last_measured_ = trial.id();
     }
     return std::move(acceptance_);
   }
@@ -69,50 +70,59 @@ class Run {
     return v1::AcceptanceTrial::default_instance();
   }
 
-  Result<void> One(const v1::AcceptanceTrial& trial) {
+  // False: the trial was skipped, or another one comes first.
+  Result<bool> One(const v1::AcceptanceTrial& trial) {
     fmt::print("{} of {}: ", trial.id(), acceptance_.trials_size());
-    if (!last_ || !HasSameCondition(*last_, trial)) {
-      const auto set = operator_.SetCondition(trial);
-      if (auto going = GoesOn(set, trial); !going || !*going) return going ? Result<void>() : going.error();
+    if (!condition_ || !HasSameCondition(*condition_, trial)) {
+      condition_.reset();
+      is_cleared_ = false;  // what touches while the pressure is set, or the link is turned, is not known
+      if (auto going = GoesOn(operator_.SetCondition(trial), trial); !going || !*going) return going;
+      condition_ = trial;
     }
     if (trial.kind() == v1::TRIAL_KIND_PRESSURE) {
       const auto cleared = operator_.Clear();
-      if (auto going = GoesOn(cleared, trial); !going || !*going)
-        return going ? Result<void>() : going.error();
+      if (auto going = GoesOn(cleared, trial); !going || !*going) return going;
+      is_cleared_ = true;
       return Measured(trial, v1::TRIAL_PHASE_LOADED, cleared->reference);
     }
-    if (!last_) {
-      const auto cleared = operator_.Clear();
-      if (auto going = GoesOn(cleared, trial); !going || !*going)
-        return going ? Result<void>() : going.error();
+    if (!is_cleared_) {
+      if (auto going = GoesOn(operator_.Clear(), trial); !going || !*going) return going;
+      is_cleared_ = true;
       if (auto measured = Measured(trial, v1::TRIAL_PHASE_UNLOADED, {}); !measured) return measured;
     }
     const auto loaded = operator_.Load(trial);
-    if (auto going = GoesOn(loaded, trial); !going || !*going) return going ? Result<void>() : going.error();
+    if (auto going = GoesOn(loaded, trial); !going || !*going) return going;
+    is_cleared_ = false;
     if (auto measured = Measured(trial, v1::TRIAL_PHASE_LOADED, loaded->reference); !measured)
       return measured;
-    const auto released = operator_.Release(trial);
-    if (!released) return released.error();
-    if (released->kind == Kind::kStop) return kStopped;
+    if (auto going = GoesOn(operator_.Release(trial), trial); !going || !*going) return going;
+    is_cleared_ = true;
     return Measured(trial, v1::TRIAL_PHASE_RELEASED, {});
   }
 
-  // False: the trial is skipped.
+  // False: the trial is skipped, or the one before is done again.
   Result<bool> GoesOn(const Result<TrialAnswer>& answer, const v1::AcceptanceTrial& trial) {
     if (!answer) return answer.error();
     if (answer->kind == Kind::kStop) return kStopped;
     if (answer->kind == Kind::kReady) return true;
+    if (answer->kind == Kind::kRepeat && last_measured_ == 0) {
+      fmt::print("  there is no trial before this one to repeat\n");
+      return false;
+    }
+    const bool repeats = answer->kind == Kind::kRepeat;
     v1::SkipTrialRequest request;
     request.set_link(acceptance_.link());
-    request.set_trial(trial.id());
+    request.set_trial(repeats ? last_measured_ : trial.id());
+    request.set_reopen(repeats);
     auto skipped = calls_.Skip(request);
     if (!skipped) return skipped.error();
     acceptance_ = *std::move(skipped);
-    fmt::print("  skipped\n");
+    fmt::print("  {}\n", repeats ? "the trial before is done again" : "skipped");
     return false;
   }
 
-  Result<void> Measured(const v1::AcceptanceTrial& trial, v1::TrialPhase phase,
+  // True.
+  Result<bool> Measured(const v1::AcceptanceTrial& trial, v1::TrialPhase phase,
                         const v1::TrialReference& reference) {
     v1::MeasureTrialRequest request;
     request.set_link(acceptance_.link());
@@ -131,13 +141,16 @@ class Run {
     if (phase == v1::TRIAL_PHASE_RELEASED && now.released().force_n() + now.released().others_n() > 0.01)
       fmt::print("  {:.3f} N left after the load\n", now.released().force_n() + now.released().others_n());
     std::fflush(stdout);
-    return {};
+    return true;
   }
 
   client::Acceptances& calls_;
   v1::Acceptance acceptance_;
   TrialOperator& operator_;
-  std::optional<v1::AcceptanceTrial> last_;
+  std::optional<v1::AcceptanceTrial>
+      condition_;            // pressure and attitude of this one are there; none: not known
+  bool is_cleared_ = false;  // nothing touches
+  uint32_t last_measured_ = 0;
 };
 
 }  // namespace

@@ -10,7 +10,8 @@ namespace taclink::command {
 
 /// What whoever carries out a trial answers.
 struct TrialAnswer {
-  enum class Kind { kReady, kSkip, kStop };
+  /// kRepeat: the trial before this one is done again.
+  enum class Kind { kReady, kSkip, kRepeat, kStop };
   Kind kind = Kind::kReady;
   v1::TrialReference reference;  ///< what is known of the load from outside; empty: as planned
 };
@@ -19,7 +20,7 @@ struct TrialAnswer {
 class TrialOperator {
  public:
   virtual ~TrialOperator() = default;
-  /// Nothing touches the link when this returns.
+  /// Nothing touches the link when this returns. Its reference holds what is known of the pressure.
   virtual Result<TrialAnswer> Clear() = 0;
   /// The trial's pressure and attitude are there when this returns. Called where they change.
   virtual Result<TrialAnswer> SetCondition(const v1::AcceptanceTrial& trial) = 0;
@@ -42,7 +43,8 @@ struct PersonOptions {
   int gauge_baud = 9600;
   double gauge_n_per_unit = 1;
 };
-std::unique_ptr<TrialOperator> MakePerson(const PersonOptions& options);
+/// Errors: kInvalidArgument (a baud rate that serial lines do not have).
+Result<std::unique_ptr<TrialOperator>> MakePerson(const PersonOptions& options);
 
 /// Presses bodies on a simulated link, with the true force as the reference. `force_n`: in place of the
 /// planned one.

@@ -97,6 +97,7 @@ Result<void> WaitForPressure(client::Client& connection, const PressureOptions& 
                              v1::PressureRegulator regulator) {
   const double way_pa = std::abs(regulator.target_pa() - regulator.setpoint_pa());
   const double limit_s = way_pa / regulator.ramp_pa_per_s() + kWaitMarginS;
+  const double wanted_pa = regulator.target_pa();
   const auto begin = std::chrono::steady_clock::now();
   CatchInterrupts();
   while (true) {
@@ -105,10 +106,14 @@ Result<void> WaitForPressure(client::Client& connection, const PressureOptions& 
     if (regulator.state() == v1::REGULATOR_STATE_CLOSED)
       return Error{ErrorCode::kFailedPrecondition,
                    "the valve was closed meanwhile: somebody has vented the skin"};
+    if (std::abs(regulator.target_pa() - wanted_pa) > 1e-6)
+      return Error{ErrorCode::kFailedPrecondition, fmt::format("somebody else has set {:.3f} kPa meanwhile",
+                                                               regulator.target_pa() / kPascalsPerKpa)};
     const bool has_arrived = regulator.state() == v1::REGULATOR_STATE_HOLDING &&
                              std::abs(regulator.measured_pa() - regulator.target_pa()) <= kReachedPa;
     if (has_arrived) break;
-    if (IsInterrupted()) return {};
+    if (IsInterrupted())
+      return Error{ErrorCode::kEndOfData, "interrupted; the pressure still moves to its setpoint"};
     if (std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() > limit_s)
       return Error{ErrorCode::kTimeout,
                    fmt::format("the pressure is {:.3f} kPa after {:.0f} s and not {:.3f} kPa; see 'taclink "

@@ -79,8 +79,15 @@ Result<void> AcceptanceService::Measure(size_t link, const v1::MeasureTrialReque
   const v1::TrialPhase phase =
       request.phase() == v1::TRIAL_PHASE_UNSPECIFIED ? v1::TRIAL_PHASE_LOADED : request.phase();
   if (phase == v1::TRIAL_PHASE_LOADED) {
-    reference =
-        FromWire(request.reference(), arm_.poses().At(link, arm_.clock().MonotonicNs()).base_from_link);
+    const LinkPose pose = arm_.poses().At(link, arm_.clock().MonotonicNs());
+    if (request.reference().in_base_frame() && pose.validity >= PoseValidity::kStale) {
+      return Error{
+          ErrorCode::kFailedPrecondition,
+          "the pose of link '" + arm_.links()[link].name +
+              "' is not known now (joint states are missing or old), so that a reference in the base frame "
+              "says nothing; send joint states, or the reference in the link's frame"};
+    }
+    reference = FromWire(request.reference(), pose.base_from_link);
     if (!reference->place_mm) {
       reference->place_mm = trial->reference.place_mm;
       if (!reference->direction) reference->direction = trial->reference.direction;
