@@ -81,9 +81,13 @@ std::optional<CameraShift> FindCameraShift(const CameraModel& camera, std::span<
   return std::nullopt;
 }
 
+double LargeShiftMm(const LinkModel& model) {
+  return kLargeMm * LengthUnit(model);
+}
+
 bool IsLarge(const CameraShift& shift, const LinkModel& model) {
   const bool moved =
-      shift.moved_mm > kLargeMm * LengthUnit(model) && shift.moved_mm > kLargeSigmas * shift.moved_sigma_mm;
+      shift.moved_mm > LargeShiftMm(model) && shift.moved_mm > kLargeSigmas * shift.moved_sigma_mm;
   const bool turned =
       shift.turned_rad > kLargeRad && shift.turned_rad > kLargeSigmas * shift.turned_sigma_rad;
   return moved || turned;

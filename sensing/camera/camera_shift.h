@@ -22,6 +22,8 @@ struct PointImage {
 /// points, or no motion converges.
 std::optional<CameraShift> FindCameraShift(const CameraModel& camera, std::span<const PointImage> images);
 
+/// From where on a shift is large, mm.
+double LargeShiftMm(const LinkModel& model);
 /// Whether the shift is real and puts forces in doubt: beyond 0.25 mm or 0.09 degrees, lengths scaled to the
 /// skin, and beyond 4 standard deviations.
 bool IsLarge(const CameraShift& shift, const LinkModel& model);

@@ -55,7 +55,7 @@ std::optional<Reason> FindMovedCameras(const RestShape& rest, const StereoRig& r
   }
   if (text.empty()) return std::nullopt;
   text += " since it was calibrated: it was mounted again, or knocked; forces may be wrong; calibrate again";
-  return Reason{ReasonId::kCamerasMoved, text, worst_mm, doubt_mm};
+  return Reason{ReasonId::kCamerasMoved, text, worst_mm, LargeShiftMm(rest.model()) + doubt_mm};
 }
 
 }  // namespace taclink

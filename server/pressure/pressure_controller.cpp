@@ -21,9 +21,9 @@ constexpr milliseconds kCycle{20};
 constexpr milliseconds kHeartbeat{100};  // a fifth of the device's watchdog
 constexpr milliseconds kCommandGap{20};  // a setpoint that moves is sent no more often
 constexpr milliseconds kFirstRetry{100}, kLongestRetry{2000};
-// A device that heard nothing for longer may have vented by itself: the next setpoint would fill the skin
-// without a ramp. Half of the device's watchdog, for the line takes time as well.
-constexpr milliseconds kLongestStall = PressureActuator::kDeviceWatchdog / 2;
+// A device that heard nothing for its watchdog's time has vented by itself: the next setpoint would fill the
+// skin without a ramp. Less than that, for the line takes time as well.
+constexpr milliseconds kLongestStall = PressureActuator::kDeviceWatchdog * 7 / 10;
 
 int64_t NsOf(milliseconds duration) {
   return std::chrono::nanoseconds(duration).count();

@@ -86,8 +86,17 @@ function AcceptanceDialog({ link, onClose }: { link: string; onClose: () => void
   const trouble = useSignal("");
   // The load of the trial is on and was measured: what is left of it comes next.
   const loaded = useSignal<AcceptanceTrial | undefined>(undefined);
+  // A second click throws away what was measured.
+  const discarding = useSignal(false);
   const calls = app.session.acceptance;
 
+  const end = async (what: string, discard: boolean) => {
+    const ended = await ask(what, () => calls.finishAcceptance({ link, discard }, { timeoutMs: SPARE_MS }));
+    if (!ended) return;
+    loaded.value = undefined;
+    discarding.value = false;
+    if (discard) acceptance.value = undefined;
+  };
   const ask = async (what: string, call: () => Promise<{ acceptance?: Acceptance }>) => {
     busy.value = what;
     trouble.value = "";
@@ -116,6 +125,7 @@ function AcceptanceDialog({ link, onClose }: { link: string; onClose: () => void
   const now = acceptance.value;
   const next = now?.trials.find((trial) => trial.id === now.nextTrial);
   const before = now?.trials.filter((trial) => trial.state === TrialState.MEASURED).at(-1);
+  const measuredCount = now?.trials.filter((trial) => trial.state === TrialState.MEASURED).length ?? 0;
   const isOver = now !== undefined && now.finishedUtcNs !== 0n;
 
   const measure = async (trial: AcceptanceTrial, phase: TrialPhase, reference: number | undefined) => {
@@ -195,20 +205,24 @@ function AcceptanceDialog({ link, onClose }: { link: string; onClose: () => void
           <>
             <OperatorButton
               disabled={busy.value !== ""}
+              onClick={() => (discarding.value ? void end("", true) : (discarding.value = true))}
+            >
+              {discarding.value ? `Really discard ${measuredCount} measured trials` : "Discard"}
+            </OperatorButton>
+            <OperatorButton
+              disabled={busy.value !== "" || !before || loaded.value !== undefined}
               onClick={() =>
                 void ask("", () =>
-                  calls.finishAcceptance({ link, discard: true }, { timeoutMs: SPARE_MS }),
-                ).then((done) => done && (acceptance.value = undefined))
+                  calls.skipTrial({ link, trial: before!.id, reopen: true }, { timeoutMs: SPARE_MS }),
+                )
               }
             >
-              Discard
+              Repeat the last
             </OperatorButton>
             <OperatorButton
               disabled={busy.value !== "" || !before}
               class={next ? undefined : "primary"}
-              onClick={() =>
-                void ask("Finishing …", () => calls.finishAcceptance({ link }, { timeoutMs: SPARE_MS }))
-              }
+              onClick={() => void end("Finishing …", false)}
             >
               Finish
             </OperatorButton>

@@ -87,7 +87,10 @@ export function CalibrationDialog({ link, onClose }: { link: Link; onClose: () =
         )}
         {trouble.value && (
           <p role="alert" class="refusal">
-            {trouble.value} The previous calibration stays in use.
+            {trouble.value}{" "}
+            {repeats.value > 1
+              ? "The link uses the last calibration that was complete."
+              : "The previous calibration stays in use."}
           </p>
         )}
         {result.value && <CalibrationFacts result={result.value} />}
