@@ -62,7 +62,7 @@ folder(sensing/contact sensing/core sensing/estimation)
 folder(sensing/pipeline sensing/core sensing/camera sensing/capture sensing/markers/detect sensing/markers/label
        sensing/markers/track sensing/estimation sensing/contact)
 folder(sensing/simulation sensing/core sensing/yaml sensing/camera sensing/capture sensing/shell)
-folder(sensing/acceptance sensing/core sensing/yaml)
+folder(sensing/acceptance sensing/core sensing/identification sensing/yaml)
 folder(mcap sensing/core)
 folder(wire sensing/core)
 folder(wire/log sensing/core mcap wire)

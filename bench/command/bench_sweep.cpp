@@ -44,8 +44,9 @@ Result<void> SweepRest(const std::vector<LinkModel>& models, const BenchSweepOpt
   }
   std::ofstream file;
   if (!options.csv.empty()) {
-    file.open(options.csv, std::ios::app);
-    if (contacts.empty()) file << SweepCsvHeader();
+    file.open(options.csv, std::ios::trunc);
+    file << SweepCsvHeader();
+    for (const SweepContact& one : contacts) file << SweepCsvRow(one);
   }
   sweep.done = [&](const std::vector<SweepContact>& unit, const std::string& failure) {
     for (const SweepContact& one : unit) file << SweepCsvRow(one);
@@ -106,6 +107,7 @@ Result<void> BenchSweep(const BenchSweepOptions& options) {
   }
   auto contacts = ReadContacts(options.csv);
   if (!contacts) return contacts.error();
+  *contacts = WholeUnits(models, *std::move(contacts));
   if (!options.report_only) {
     if (auto swept = SweepRest(models, options, *contacts); !swept) return swept;
   }

@@ -171,6 +171,10 @@ class SweptLink {
 
 }  // namespace
 
+size_t SweepContactsOfUnit(const LinkModel& model) {
+  return kDepthsMm.size() * static_cast<size_t>(2 * model.markers.rings() - 1);
+}
+
 std::vector<SweepUnit> SweepUnits(const std::vector<LinkModel>& models,
                                   const std::vector<double>& pressures_kpa) {
   std::vector<SweepUnit> units;

@@ -44,6 +44,8 @@ struct SweepOptions {
   std::function<void(const std::vector<SweepContact>& contacts, const std::string& failure)> done;
 };
 
+/// How many contacts a unit of this model has.
+size_t SweepContactsOfUnit(const LinkModel& model);
 /// All units of these models and pressures.
 std::vector<SweepUnit> SweepUnits(const std::vector<LinkModel>& models,
                                   const std::vector<double>& pressures_kpa);

@@ -155,6 +155,7 @@ Result<std::vector<SweepContact>> ParseSweepCsv(const std::string& text) {
   };
   if (!line.empty() && line + "\n" != SweepCsvHeader()) return wrong(1);
   for (size_t number = 2; std::getline(lines, line); ++number) {
+    if (lines.eof()) break;
     std::vector<std::string> cells;
     std::istringstream parts(line + ",");
     for (std::string cell; std::getline(parts, cell, ',');) cells.push_back(cell);
@@ -180,6 +181,17 @@ Result<std::vector<SweepContact>> ParseSweepCsv(const std::string& text) {
     }
   }
   return out;
+}
+
+std::vector<SweepContact> WholeUnits(const std::vector<LinkModel>& models,
+                                     std::vector<SweepContact> contacts) {
+  std::map<SweepUnit, size_t> counts;
+  for (const SweepContact& one : contacts) ++counts[one.unit];
+  std::erase_if(contacts, [&](const SweepContact& one) {
+    const auto model = std::ranges::find(models, one.unit.model, &LinkModel::name);
+    return model != models.end() && counts[one.unit] < SweepContactsOfUnit(*model);
+  });
+  return contacts;
 }
 
 std::set<SweepUnit> UnitsOf(std::span<const SweepContact> contacts) {

@@ -43,9 +43,13 @@ std::vector<double> WorstForceShare(const LinkModel& model, std::span<const Swee
 /// A line for each contact, with a header. What was written is read back, so that a sweep can go on.
 std::string SweepCsvHeader();
 std::string SweepCsvRow(const SweepContact& contact);
-/// Errors: kInvalidArgument (which line).
+/// A last line without an end is left out: it was being written. Errors: kInvalidArgument (which line).
 Result<std::vector<SweepContact>> ParseSweepCsv(const std::string& text);
 
+/// The contacts of units that have all of theirs: one that was being written when a sweep ended is done
+/// again.
+std::vector<SweepContact> WholeUnits(const std::vector<LinkModel>& models,
+                                     std::vector<SweepContact> contacts);
 /// The units of which there are contacts.
 std::set<SweepUnit> UnitsOf(std::span<const SweepContact> contacts);
 

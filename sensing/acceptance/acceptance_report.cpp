@@ -10,6 +10,7 @@
 #include "sensing/acceptance/mounting_fit.h"
 #include "sensing/acceptance/quantities.h"
 #include "sensing/core/units.h"
+#include "sensing/identification/relaxation_fit.h"
 
 namespace taclink {
 namespace {
@@ -155,7 +156,34 @@ class Analysis {
       Find(FindingId::kCreep,
            "A held load reads " + Interval(creep, kPercent, "%+.1f") +
                " % different at its end: the skin creeps more than its model says; give the "
-               "model a relaxation.");
+               "model a relaxation" +
+               FittedRelaxation() + ".");
+  }
+
+  // What the holds tell of it, for the model file; empty: they do not determine it.
+  std::string FittedRelaxation() const {
+    std::vector<RelaxationRecord> records;
+    for (const AcceptanceTrial& trial : record_.trials) {
+      if (trial.kind != TrialKind::kHold || trial.state != TrialState::kMeasured || !trial.loaded) continue;
+      const auto reference_n = ReferenceForce(trial);
+      if (trial.loaded->held.size() < 3 * kEnds || !reference_n || !(*reference_n > 0)) continue;
+      RelaxationRecord& record = records.emplace_back();
+      record.name = "trial " + std::to_string(trial.id);
+      for (const HeldSample& sample : trial.loaded->held)
+        record.samples.push_back({sample.time_s, sample.force_n, *reference_n});
+    }
+    if (records.empty()) return "";
+    const auto fit = FitRelaxation(records);
+    if (!fit) return "";
+    std::string shares, times_s, sigmas;
+    for (size_t i = 0; i < fit->terms.size(); ++i) {
+      const char* const comma = i > 0 ? ", " : "";
+      shares += comma + Format("%.3f", fit->terms[i].share);
+      times_s += comma + Format("%.3g", fit->terms[i].time_s);
+      sigmas += comma + Format("%.3f", fit->share_sigmas[i]);
+    }
+    return ", of the holds: relaxation: {shares: [" + shares + "], times_s: [" + times_s +
+           "]}, standard deviations of the shares " + sigmas;
   }
 
   // Of a sample, from the differences of successive ones, which do not see the slow change itself. N^2.

@@ -119,11 +119,14 @@ void FindRange(const LinkModel& model, LoadedSkin& skin, int ring, double disc_d
   for (const double share : kDepthShares) depths_mm.push_back(share * most_mm - inflation_mm);
   const std::vector<SkinPushResult> pushed = skin.PushAsFar(marker, depths_mm, disc_diameter_mm).results;
   for (size_t i = 0; i < pushed.size(); ++i) {
-    if (i > 0 && pushed[i].force_n < pushed[i - 1].force_n) break;
+    if (i > 0 && pushed[i].force_n < pushed[i - 1].force_n) {
+      force.end = RingForce::End::kSnap;
+      return;
+    }
     force.range_mm = depths_mm[i] + inflation_mm;
     force.range_n = pushed[i].force_n;
-    force.ends_at_tube = i + 1 == depths_mm.size();
   }
+  if (pushed.size() == depths_mm.size()) force.end = RingForce::End::kTube;
 }
 
 }  // namespace
@@ -203,7 +206,7 @@ SkinForces FindForces(SkinEstimator& estimator, const KnownLoads& loads,
       const RingForce& same = forces.by_ring[static_cast<size_t>(mirrored)];
       force.range_mm = same.range_mm;
       force.range_n = same.range_n;
-      force.ends_at_tube = same.ends_at_tube;
+      force.end = same.end;
     } else if (skin) {
       FindRange(model, *skin, ring, disc_diameter_mm, force);
     }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,6 +23,9 @@ struct PressureLimits {
   /// Positive: beyond, there is no stable equilibrium, or the skin grows by more than half its radius.
   std::optional<double> runs_away_mpa;
 };
+
+/// Of the pressure at which a skin runs away, over the highest that it is meant for.
+inline constexpr double kPressureReserve = 1.3;
 
 /// `shell`: meshed in rings (RingBlocks::Fit). To 1 % of `most_mpa`.
 PressureLimits FindPressureLimits(const NonlinearShell& shell, double most_mpa);
@@ -50,7 +54,10 @@ struct RingForce {
   /// How far a disc can press from the surface under the loads: until a dome meets the tube or the force
   /// stops rising; and the force there. None: no equilibrium was found even for a shallow push.
   std::optional<double> range_mm, range_n;
-  bool ends_at_tube = false;  ///< else at the instability
+  /// What ended the way: a dome met the tube, the force fell (the dent snaps), or the solver found no
+  /// equilibrium.
+  enum class End : uint8_t { kNotSolved, kTube, kSnap };
+  End end = End::kNotSolved;
 };
 
 struct SkinForces {

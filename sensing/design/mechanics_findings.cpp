@@ -10,7 +10,6 @@ namespace taclink {
 namespace {
 
 constexpr double kKpaPerMpa = 1e3;
-constexpr double kPressureReserve = 1.3;    // of the pressure at which a skin runs away, over the working one
 constexpr double kSensorScatterMpa = 5e-5;  // of pressure readings about zero
 constexpr double kFelt = 3;                 // standard deviations of a marker that a sag must have to count
 
@@ -110,7 +109,8 @@ void AddRange(const SkinDesign& design, const SkinForces& forces, std::vector<Fi
   int worst = -1;
   double least_mm = 0;
   for (size_t ring = 0; ring < forces.by_ring.size(); ++ring) {
-    const double mm = forces.by_ring[ring].range_mm.value_or(0);
+    if (!forces.by_ring[ring].range_mm) continue;  // not solved: nothing is known of it
+    const double mm = *forces.by_ring[ring].range_mm;
     if (worst >= 0 && mm >= least_mm) continue;
     worst = static_cast<int>(ring);
     least_mm = mm;
@@ -124,12 +124,15 @@ void AddRange(const SkinDesign& design, const SkinForces& forces, std::vector<Fi
   finding.unit = "mm";
   finding.what = "the shortest working range " + StateText(forces) + " is " + Decimals(least_mm) +
                  " mm, at ring " + std::to_string(worst + 1);
+  using End = RingForce::End;
   if (at.range_n)
-    finding.what +=
-        ", where " + Digits(*at.range_n, 2) + " N " +
-        (at.ends_at_tube ? "press a marker against the tube" : "are the most before the dent snaps");
-  if (finding.severity == Severity::kWarning)
-    finding.change = at.ends_at_tube ? "a thinner tube or a wider skin" : "more pressure or a thicker wall";
+    finding.what += ", where " + Digits(*at.range_n, 2) + " N " +
+                    (at.end == End::kTube   ? "press a marker against the tube"
+                     : at.end == End::kSnap ? "are the most before the dent snaps"
+                                            : "press as far as an equilibrium was found");
+  if (finding.severity == Severity::kWarning && at.end != End::kNotSolved)
+    finding.change =
+        at.end == End::kTube ? "a thinner tube or a wider skin" : "more pressure or a thicker wall";
   findings.push_back(AtMarker(model, model.MarkerIndex(0, worst), std::move(finding)));
 }
 

@@ -11,6 +11,7 @@ namespace taclink {
 namespace {
 
 constexpr double kMostMpa = 0.02, kMostMps2 = 100;
+constexpr double kBeyondReserve = 1.1 * kPressureReserve;
 
 Result<void> CheckOptions(const SkinCheckOptions& options) {
   if (!(options.pressure_mpa >= 0 && options.pressure_mpa <= kMostMpa))
@@ -61,7 +62,8 @@ Result<SkinDesign> AnalyzeSkin(const LinkModel& model, const SkinCheckOptions& o
         FindForces(estimator, loads, design.loaded->resolutions, options.contact_diameter_mm);
   }
   done(0.8);
-  design.pressure = FindPressureLimits(mechanics.shell(), options.searched_pressure_mpa);
+  design.pressure = FindPressureLimits(
+      mechanics.shell(), std::max(options.searched_pressure_mpa, kBeyondReserve * options.pressure_mpa));
   done(0.9);
   design.sag = FindWeightSag(mechanics, 0);
   done(1);

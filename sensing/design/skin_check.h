@@ -21,7 +21,9 @@ struct SkinCheckOptions {
   double least_marker_px = 3;               ///< across a marker in an image [duong2021, (3.3)]
   double least_force_n = 0.1;               ///< that the link is meant to feel everywhere
   double contact_diameter_mm = 5.5;         ///< of the smallest body that is meant to touch it
-  double searched_pressure_mpa = 5e-3;      ///< up to which limits of pressure are looked for
+  /// Up to which limits of pressure are looked for at least; beyond the reserve over `pressure_mpa` in any
+  /// case.
+  double searched_pressure_mpa = 5e-3;
 };
 
 /// One state of the skin: slack, or under the pressure and the specific force of the options.

@@ -15,7 +15,7 @@ namespace taclink {
 namespace {
 
 constexpr size_t kLeastSamples = 20;
-constexpr double kMostShares = 0.95;    // of all terms: a skin that flows is none
+constexpr double kMostShares = 0.9;     // of all terms: a skin that flows is none
 constexpr double kLeastDeviations = 3;  // of a share, to be told from noise
 constexpr double kMostTimeSigma = 1;    // of a time constant's logarithm
 constexpr double kSchwarzGain = 10;     // "very strong" [kass1995]
@@ -168,6 +168,7 @@ std::optional<Error> Objection(std::span<const RelaxationRecord> records) {
       presses = presses || sample.reference_n > 0;
     }
     if (!presses) return wrong("the reference force is never above 0: nothing presses");
+    if (record.samples.size() < 2) return wrong("a single sample shows no creep");
     samples += record.samples.size();
   }
   if (samples < kLeastSamples)

@@ -57,7 +57,7 @@ void BaselineKeeper::Take(BaselineOrigin origin, const LabelledMarkers& markers,
   replaced_.reset();
 }
 
-Result<void> BaselineKeeper::UndoTare(std::optional<SkinStage>& skin) {
+Result<void> BaselineKeeper::UndoTare(std::optional<SkinStage>& skin, StateEstimator& estimator) {
   if (tare_) return Error{ErrorCode::kFailedPrecondition, "a tare is under way; wait for its end"};
   if (!replaced_)
     return Error{ErrorCode::kFailedPrecondition,
@@ -67,6 +67,7 @@ Result<void> BaselineKeeper::UndoTare(std::optional<SkinStage>& skin) {
   taken_ns_ = replaced_->taken_ns;
   loads_ = replaced_->loads;
   follower_ = replaced_->follower;
+  if (replaced_->history) estimator.Restore(*replaced_->history);
   tare_end_ = TareSummary{.undone = true, .shift_mm = replaced_->shift_mm};
   replaced_.reset();
   return {};
@@ -160,8 +161,11 @@ void BaselineKeeper::TakeTareFrame(const FrameTimes& times, const LinkState& sta
     // The pressures were good enough for their frames' estimates.
     const MeasuredLoads loads = tare_->loads();
     const auto untouched = estimator.UntouchedAt(loads.Loads());
-    Replaced before{skin, baseline_, taken_ns_, loads_, follower_, tare_->shift_mm()};
-    if (tare_->forced()) estimator.ForgetContacts();
+    Replaced before{skin, baseline_, taken_ns_, loads_, follower_, tare_->shift_mm(), {}};
+    if (tare_->forced()) {
+      before.history = estimator.history();
+      estimator.ForgetContacts();
+    }
     skin.Tare(tare_->markers(), loads, untouched.value_or(estimator.estimate().baseline_mm),
               estimator.ResidualMm(loads.Loads()));
     Take(tare_->forced() || is_forced() ? BaselineOrigin::kForcedTare : BaselineOrigin::kTare,

@@ -37,7 +37,7 @@ class BaselineKeeper {
   Result<void> BeginTare(const TareOptions& options);
   /// Restores the baseline before the last tare; TakeTareEnd returns the result. Errors: kFailedPrecondition
   /// (a tare is under way, or there was none since the rest shape was taken).
-  Result<void> UndoTare(std::optional<SkinStage>& skin);
+  Result<void> UndoTare(std::optional<SkinStage>& skin, StateEstimator& estimator);
   void CancelTare();
   /// Its end will say why.
   void AbortTare(const std::string& why);
@@ -73,7 +73,8 @@ class BaselineKeeper {
     int64_t taken_ns;
     KnownLoads loads;
     DriftFollower follower;
-    double shift_mm;  // of the tare
+    double shift_mm;                      // of the tare
+    std::optional<CreepHistory> history;  // of a forced one, which forgets what pressed
   };
 
   const LinkModel model_;

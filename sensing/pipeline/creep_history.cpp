@@ -49,32 +49,44 @@ CreepHistory::CreepHistory(const LinkModel& model) : relaxation_(model.relaxatio
 }
 
 void CreepHistory::Forget() {
-  known_.reset();
+  pressure_mpa_.reset();
+  specific_force_mps2_.reset();
   contacts_.reset();
   now_n_.resize(0);
 }
 
-MeasuredLoads CreepHistory::Elastic(const MeasuredLoads& real, bool is_attitude_known, int64_t exposure_ns) {
+// What the elastic skin's load has beyond the real one.
+template <typename Value>
+Value CreepHistory::ByCreep(std::optional<Known<Value>>& known, const Value& real, bool is_measured,
+                            double span_s) const {
+  if (!known && !is_measured) return Value(0 * real);
+  if (!known) {
+    const double relaxed = RelaxationFilter<Value>(relaxation_, real).Relaxed();
+    known.emplace(Known<Value>{RelaxationFilter<Value>(relaxation_, Value(real / relaxed)), real});
+    span_s = 0;
+  }
+  if (is_measured) known->real = real;
+  const Value elastic = known->filter.ToElastic(known->real, span_s);
+  known->filter.Advance(elastic, span_s);
+  return elastic - known->real;
+}
+
+MeasuredLoads CreepHistory::Elastic(const MeasuredLoads& real, const Measured& measured,
+                                    int64_t exposure_ns) {
   if (!any()) return real;
   if (exposure_ns < frame_ns_) Forget();
-  const double span_s = known_ ? 1e-9 * static_cast<double>(exposure_ns - frame_ns_) : 0;
+  const double span_s = frame_ns_ == 0 ? 0 : 1e-9 * static_cast<double>(exposure_ns - frame_ns_);
   frame_ns_ = exposure_ns;
   now_n_.resize(0);
-  Vec4 external = real.Loads().Stacked();
-  if (!is_attitude_known) external.tail<3>().setZero();
-  if (!known_) {
-    known_.emplace(relaxation_, external);
-    known_.emplace(relaxation_, external / known_->Relaxed());
-  }
-  const Vec4 elastic = known_->ToElastic(external, span_s);
-  known_->Advance(elastic, span_s);
   MeasuredLoads loads = real;
-  loads.by_creep = elastic - external;
+  loads.by_creep[0] = ByCreep(pressure_mpa_, real.pressure_mpa, measured.pressure, span_s);
+  loads.by_creep.tail<3>() =
+      ByCreep(specific_force_mps2_, real.specific_force_mps2, measured.specific_force, span_s);
   loads.pressure_mpa += loads.by_creep[0];
   loads.specific_force_mps2 += loads.by_creep.tail<3>();
-  for (size_t i = 0; i < relaxation_.share_sigmas.size(); ++i)
+  for (size_t i = 0; pressure_mpa_ && i < relaxation_.share_sigmas.size(); ++i)
     loads.pressure_sigma_mpa =
-        std::hypot(loads.pressure_sigma_mpa, relaxation_.share_sigmas[i] * known_->ByShare(i)[0]);
+        std::hypot(loads.pressure_sigma_mpa, relaxation_.share_sigmas[i] * pressure_mpa_->filter.ByShare(i));
   return loads;
 }
 

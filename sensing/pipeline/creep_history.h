@@ -19,10 +19,10 @@ namespace taclink {
 /// is taken as that of the pressure; contact forces are remembered at the markers, and a contact has the
 /// memory of those within 2.5 pitches of the markers that it loads.
 ///
-/// The one state of an estimator that the answer depends on. It begins relaxed: as if the known loads of the
-/// first frame had acted for long, and nothing else. Between frames with an answer, whatever the gap, loads
-/// are taken as linear in time. A model without Relaxation has no history; nothing is done then.
-/// mm, N, MPa; link frame. One thread.
+/// The one state of an estimator that the answer depends on. It begins relaxed: as if the pressure and the
+/// specific force that are measured first had acted for long, and nothing else; while one is not measured, it
+/// counts as unchanged. Between frames with an answer, whatever the gap, loads are taken as linear in time. A
+/// model without Relaxation has no history; nothing is done then. mm, N, MPa; link frame. One thread.
 class CreepHistory {
  public:
   explicit CreepHistory(const LinkModel& model);
@@ -32,10 +32,13 @@ class CreepHistory {
   /// What pressed, not the known loads: where a baseline is taken that what presses is part of.
   void ForgetContacts() { contacts_.reset(); }
 
-  /// Begins a frame, once: the elastic skin's loads. `is_attitude_known`: false: the specific force is no
-  /// measurement of this frame, and comes back as it is. `exposure_ns`: monotonic; where it goes back, all is
-  /// forgotten.
-  MeasuredLoads Elastic(const MeasuredLoads& real, bool is_attitude_known, int64_t exposure_ns);
+  /// Which known loads a frame measures.
+  struct Measured {
+    bool pressure = true, specific_force = true;
+  };
+  /// Begins a frame, once: the elastic skin's loads. What is not measured comes back as it is, with the creep
+  /// of what was measured last. `exposure_ns`: monotonic; where it goes back, all is forgotten.
+  MeasuredLoads Elastic(const MeasuredLoads& real, const Measured& measured, int64_t exposure_ns);
 
   /// Forces at the markers, three each, by load. Of one frame it may be asked several times; the last counts.
   using LumpedForces = std::vector<Eigen::VectorXd>;
@@ -68,7 +71,17 @@ class CreepHistory {
   Relaxation relaxation_;
   double reach_mm_ = 0, negligible_n_ = 0;
   std::vector<Vec3> inward_, place_mm_;  // by marker, at rest
-  std::optional<RelaxationFilter<Vec4>> known_;
+  /// A known load since it was first measured.
+  template <typename Value>
+  struct Known {
+    RelaxationFilter<Value> filter;
+    Value real;  // as measured last
+  };
+  template <typename Value>
+  Value ByCreep(std::optional<Known<Value>>& known, const Value& real, bool is_measured, double span_s) const;
+
+  std::optional<Known<double>> pressure_mpa_;
+  std::optional<Known<Vec3>> specific_force_mps2_;
   std::optional<Filter> contacts_;  // none: nothing has pressed yet
   int64_t frame_ns_ = 0, contacts_ns_ = 0;
   Eigen::VectorXd now_n_;  // the elastic forces of the frame in work; empty: none

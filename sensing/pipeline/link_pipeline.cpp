@@ -287,6 +287,10 @@ struct LinkPipeline::Stages {
     return options.calibrated_utc_s * 1'000'000'000;
   }
 
+  bool IsPressureTold(const StereoFrame& frame) const {
+    return !frame.pressure.stale &&
+           (frame.pressure_mpa || options.pressure_mpa || frame.pressure.origin != PressureOrigin::kNone);
+  }
   // Nobody tells the specific force: the link keeps the attitude in which its rest images were taken.
   static bool NeverMoves(const StereoFrame& frame) { return !frame.specific_force; }
 
@@ -303,8 +307,11 @@ struct LinkPipeline::Stages {
       measured.specific_force_mps2 = skin->baseline_loads().specific_force_mps2;
     }
     const int64_t exposure_ns = frame.times.exposure_monotonic_ns;
-    return estimator->BeginFrame(measured, frame.specific_force.has_value(),
-                                 exposure_ns != 0 ? exposure_ns : clock.MonotonicNs());
+    return estimator->BeginFrame(
+        measured,
+        {.pressure = IsPressureTold(frame),
+         .specific_force = frame.specific_force.has_value() && !IsAttitudeUnknown(measured)},
+        exposure_ns != 0 ? exposure_ns : clock.MonotonicNs());
   }
 
   // Labels that contradict the shape are no labels.
@@ -408,7 +415,7 @@ Result<void> LinkPipeline::BeginTare(const TareOptions& options) {
   if (stages_->rest || !stages_->skin)
     return Error{ErrorCode::kFailedPrecondition,
                  "the link's rest shape is being taken; wait until it measures"};
-  if (options.undo) return stages_->keeper.UndoTare(stages_->skin);
+  if (options.undo) return stages_->keeper.UndoTare(stages_->skin, *stages_->estimator);
   return stages_->keeper.BeginTare(options);
 }
 void LinkPipeline::CancelTare() {
@@ -430,8 +437,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
   const bool stale = frame.pressure.stale;
   const MeasuredLoads measured = s.TakeLoads(frame);
   // Without a sensor, or when it fell silent, the pressure is estimated from the shape.
-  const bool is_pressure_measured = !stale && (frame.pressure_mpa || s.options.pressure_mpa ||
-                                               frame.pressure.origin != PressureOrigin::kNone);
+  const bool is_pressure_measured = s.IsPressureTold(frame);
 
   const auto timed = [&s](double& stage_ms, auto&& stage) {
     const int64_t start = s.clock.MonotonicNs();
@@ -486,6 +492,7 @@ void LinkPipeline::Process(const StereoFrame& frame, LinkState& state) {
          .baseline = s.skin->baseline_loads().Real(),
          .estimate = estimate},
         state);
+  if (state.has_forces()) s.estimator->EndFrame();
   s.diagnosis.Observe(state, {.images = s.pictures,
                               .skin_mm = s.UntouchedMarkers(),
                               .estimate = estimate,

@@ -273,7 +273,6 @@ void StateEstimator::FindContacts(ContactFinder& finder, const SkinShape& shape,
   else
     finder.Find(skin_, estimate_, contacts);
   AddEncirclementVariance(model_, forces.limit_around_n, contacts);
-  if (forces.converged) creep_.Advance();
 }
 
 std::unique_ptr<StateEstimator> MakeStateEstimator(const LinkModel& model, const ForceOptions& options) {

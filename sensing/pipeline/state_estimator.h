@@ -38,9 +38,12 @@ class StateEstimator {
   /// Begins a frame of a link that is followed in time, once, before Estimate: the measured loads become
   /// those that Estimate takes (CreepHistory::Elastic). Without it forces are those of the elastic skin,
   /// E(0).
-  MeasuredLoads BeginFrame(const MeasuredLoads& measured, bool is_attitude_known, int64_t exposure_ns) {
-    return creep_.Elastic(measured, is_attitude_known, exposure_ns);
+  MeasuredLoads BeginFrame(const MeasuredLoads& loads, const CreepHistory::Measured& measured,
+                           int64_t exposure_ns) {
+    return creep_.Elastic(loads, measured, exposure_ns);
   }
+  /// Ends it: what was estimated has acted on the skin. Not for an answer that is withheld.
+  void EndFrame() { creep_.Advance(); }
   /// Uses `shape`'s measured displacements, from the baseline, and its sources; sets the rest of it, where it
   /// can. Where it can't, the forces are not converged, and the shape is what is measured: what was not stays
   /// at the untouched skin's, with a covariance that says so. A frame may be looked at several times
@@ -64,6 +67,9 @@ class StateEstimator {
   }
   /// Goes on with what another estimator of the same model knows to have acted on the skin.
   void TakeHistory(const StateEstimator& other) { creep_ = other.creep_; }
+  /// What has acted on the skin, to be restored.
+  const CreepHistory& history() const { return creep_; }
+  void Restore(const CreepHistory& history) { creep_ = history; }
   /// See CreepHistory::ForgetContacts.
   void ForgetContacts() { creep_.ForgetContacts(); }
   /// Dents of former contacts remain that would be drift to who does not know of them.

@@ -59,10 +59,9 @@ struct PressureConfig {
         fields.Check(kpa_per_unit != 0, "kpa_per_unit", "must not be 0");
         fields("offset_kpa", offset_kpa, kNoLimits, "Added to the product.");
       }
-      if (kind >= 2) fields("stale_after_s", stale_after_s, {0.01, 3600}, "An older reading is not used.");
-      if (kind == 5)
-        fields.Check(stale_after_s >= 0.1 && stale_after_s <= 2, "stale_after_s",
-                     "must be 0.1 to 2 s of a regulator: without readings for so long it vents the skin");
+      // Without readings for so long a regulator vents the skin.
+      const Range stale_s = kind == 5 ? Range{0.1, 2} : Range{0.01, 3600};
+      if (kind >= 2) fields("stale_after_s", stale_after_s, stale_s, "An older reading is not used.");
     });
     visit("sigma_pa", sigma_pa, {0.1, 1e5}, "Standard deviation; not set: as is usual for the source.");
   }

@@ -208,11 +208,16 @@ MeasuredLoads LogLinkSolver::MeasuredInFrame() const {
 // The known loads as the frame was solved with; what a frame's estimate found is what a baseline taken in it
 // has. A baseline is taken with the frame before the first that is measured against it.
 void LogLinkSolver::FollowLoads() {
-  loads_.now = estimator_->BeginFrame(MeasuredInFrame(), recorded_.specific_force.has_value(),
-                                      recorded_.times.exposure_monotonic_ns);
+  const MeasuredLoads measured = MeasuredInFrame();
+  loads_.now = estimator_->BeginFrame(
+      measured,
+      {.pressure = IsPressureTold(),
+       .specific_force = recorded_.specific_force.has_value() && !IsAttitudeUnknown(measured)},
+      recorded_.times.exposure_monotonic_ns);
   MeasuredLoads now = loads_.now;
   if (recorded_.measured() && recorded_.baseline.taken_utc_ns != baseline_utc_ns_) {
     baseline_utc_ns_ = recorded_.baseline.taken_utc_ns;
+    if (recorded_.baseline.origin == BaselineOrigin::kForcedTare) estimator_->ForgetContacts();
     loads_.baseline = before_.value_or(now);
     if (!before_ && (recorded_.pressure_mpa || recorded_.specific_force)) {
       report_.warnings.emplace_back(
@@ -288,6 +293,7 @@ void LogLinkSolver::SolveForces() {
          .baseline = loads_.baseline.Real(),
          .estimate = estimate},
         state_);
+  if (state_.has_forces()) estimator_->EndFrame();
   if (late) Degrade(state_, *std::move(late));
 }
 

@@ -28,7 +28,7 @@ std::vector<const DesignState*> StatesOf(const SkinDesign& design) {
 struct RingSight {
   int seen[kCameraCount] = {};
   double smallest_px = INFINITY;
-  Vec3 sigmas_mm = Vec3::Zero();  // NaN: a marker without
+  Vec3 sigmas_mm = Vec3::Zero();  // NaN: of a marker that both cameras do not see
 };
 
 RingSight SightOf(const LinkModel& model, const DesignState& state, int ring) {
@@ -42,8 +42,10 @@ RingSight SightOf(const LinkModel& model, const DesignState& state, int ring) {
       sight.smallest_px = std::min(sight.smallest_px, view.larger_px());
     }
     const auto& sigmas = state.resolutions[m].sigmas_mm;
-    if (!sigmas) continue;
-    sight.sigmas_mm = sight.sigmas_mm.cwiseMax(*sigmas);
+    if (!sigmas)
+      sight.sigmas_mm.setConstant(NAN);
+    else if (sight.sigmas_mm.allFinite())
+      sight.sigmas_mm = sight.sigmas_mm.cwiseMax(*sigmas);
   }
   return sight;
 }
@@ -102,6 +104,18 @@ Json ViewJson(const MarkerView& view) {
   return json;
 }
 
+const char* NameOf(RingForce::End end) {
+  switch (end) {
+    case RingForce::End::kTube:
+      return "tube";
+    case RingForce::End::kSnap:
+      return "snap";
+    case RingForce::End::kNotSolved:
+      break;
+  }
+  return "not_solved";
+}
+
 Json StateJson(const LinkModel& model, const DesignState& state) {
   Json markers = Json::array(), rings = Json::array();
   for (int m = 0; m < model.markers.count(); ++m) {
@@ -120,7 +134,7 @@ Json StateJson(const LinkModel& model, const DesignState& state) {
                      {"room_mm", force.room_mm},
                      {"range_mm", OptionalJson(force.range_mm)},
                      {"range_n", OptionalJson(force.range_n)},
-                     {"ends_at_tube", force.ends_at_tube}});
+                     {"range_ends", NameOf(force.end)}});
   }
   Json blind = Json::object();
   for (const CameraId id : kBothCameras) {

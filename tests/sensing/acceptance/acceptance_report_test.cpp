@@ -151,6 +151,71 @@ TEST(AcceptanceReport, LoadsThatTheLinkDidNotMeasureFailIt) {
   EXPECT_EQ(AnalyzeAcceptance(record).loads[2].force, -1);
 }
 
+// A skin that creeps by one term: the report has it for the model file, with its standard deviation.
+TEST(AcceptanceReport, HoldsGiveTheModelsRelaxation) {
+  AcceptanceRecord record = RecordOf("quick", {}, 4);
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  constexpr double kShare = 0.1, kTimeS = 8;
+  for (AcceptanceTrial& trial : record.trials) {
+    if (trial.kind != TrialKind::kHold) continue;
+    const double force_n = *trial.force_n;
+    // The elastic force of a constant load grows by the compliance of one term [fung1993].
+    for (HeldSample& sample : trial.loaded->held) {
+      const double creep = (1 - kShare * std::exp(-sample.time_s * (1 - kShare) / kTimeS)) / (1 - kShare);
+      sample.force_n = force_n * (creep + 0.0005 * normal(random));
+    }
+  }
+  const AcceptanceReport report = AnalyzeAcceptance(record);
+  const auto creep = std::ranges::find(report.findings, FindingId::kCreep, &AcceptanceFinding::id);
+  ASSERT_NE(creep, report.findings.end());
+  const size_t at = creep->text.find("shares: [");
+  ASSERT_NE(at, std::string::npos) << creep->text;
+  EXPECT_NEAR(std::stod(creep->text.substr(at + 9)), kShare, 0.02) << creep->text;
+  EXPECT_NEAR(std::stod(creep->text.substr(creep->text.find("times_s: [") + 10)), kTimeS, 2) << creep->text;
+}
+
+// The plan asks for a hold; without one its limit is not decided.
+TEST(AcceptanceReport, WhatWasPlannedAndSkippedIsUndecided) {
+  AcceptanceRecord record = RecordOf("quick", {.place_sigma = 0.01, .load_sigma = 0.005}, 6);
+  for (AcceptanceTrial& trial : record.trials)
+    if (trial.kind == TrialKind::kHold) trial.state = TrialState::kSkipped;
+  const AcceptanceReport report = AnalyzeAcceptance(record);
+  EXPECT_EQ(report.Quantity("creep")->verdict, Verdict::kNotMeasured);
+  EXPECT_EQ(report.verdict, Verdict::kUndecided);
+}
+
+TEST(AcceptanceReport, AnUncertainReferenceDecidesLess) {
+  AcceptanceRecord record = RecordOf("quick", {.place_sigma = 0.01, .load_sigma = 0.005}, 6);
+  for (AcceptanceTrial& trial : record.trials)
+    trial.reference.force_sigma_n = 0.1 * trial.force_n.value_or(0);
+  const AcceptanceReport report = AnalyzeAcceptance(record);
+  const AcceptanceQuantity* bias = report.Quantity("force_bias");
+  EXPECT_GT(*bias->high - *bias->low, 2 * 19);  // percent: 1.96 times 10 to either side
+  EXPECT_EQ(bias->verdict, Verdict::kUndecided);
+}
+
+TEST(AcceptanceReport, ForcesOfAnInflatedSkinThatNothingTouchesAreAFinding) {
+  AcceptanceRecord record = RecordOf("full", {}, 1);
+  for (AcceptanceTrial& trial : record.trials)
+    if (trial.kind == TrialKind::kPressure) trial.loaded->force_n = 0.5;
+  EXPECT_TRUE(Finds(AnalyzeAcceptance(record), FindingId::kPhantom));
+}
+
+// A tare in between sets the drift back: that is no drift.
+TEST(AcceptanceReport, DriftIsTakenWithinABaseline) {
+  AcceptanceRecord record = RecordOf("quick", {}, 1);
+  const size_t half = record.trials.size() / 2;
+  for (size_t i = 0; i < record.trials.size(); ++i) {
+    AcceptanceTrial& trial = record.trials[i];
+    trial.released.reset();
+    trial.loaded->baseline_utc_ns = i < half ? 1 : 2;
+    trial.loaded->baseline_drift_mm = 0.02 * static_cast<double>(i < half ? i : i - half);
+  }
+  const AcceptanceReport report = AnalyzeAcceptance(record);
+  EXPECT_NEAR(report.Quantity("drift")->value, 1.2, 1e-6);  // mm/h: 0.02 mm a minute
+}
+
 TEST(AcceptanceReport, WhatTheLinkItselfReportsIsAFinding) {
   AcceptanceRecord record = RecordOf("quick", {}, 1);
   for (AcceptanceTrial& trial : record.trials)

@@ -73,6 +73,16 @@ TEST(ReadingCollector, RareContactsAreGhosts) {
   EXPECT_NEAR(collector.Reading().others_n, 0.05, 1e-12);
 }
 
+// What is felt in some frames only is felt as less: the mean is over all that have forces.
+TEST(ReadingCollector, AFlickeringContactIsLessThanASteadyOne) {
+  ReadingCollector collector(kPlace);
+  for (int i = 0; i < 10; ++i)
+    collector.Add(StateAt(0.1 * i, i % 5 < 3 ? std::vector{ContactAt(kPlace, 0.5)} : std::vector<Contact>{}));
+  EXPECT_TRUE(collector.Reading().has_contact);
+  EXPECT_NEAR(collector.Reading().force_n, 0.3, 1e-12);
+  EXPECT_NEAR(collector.Reading().center_mm.x(), kPlace.x(), 1e-9);
+}
+
 TEST(ReadingCollector, HeldForceIsSampledOnceASecond) {
   ReadingCollector collector(kPlace, 30, true);
   for (int i = 0; i < 50; ++i) collector.Add(StateAt(0.1 * i, {ContactAt(kPlace, 1 + 0.01 * i)}));

@@ -21,9 +21,32 @@ TEST(Statistics, FewDataHaveNoWidth) {
   EXPECT_FALSE(GroupedMean(one).half_width);
   EXPECT_FALSE(GroupedPercentile(one, 0.95).high);
   EXPECT_EQ(PooledDeviation(std::vector<GroupedValue>{{1, 1.0}, {2, 2.0}}).samples, 0);
-  EXPECT_FALSE(FitLine(one, std::vector<double>{1, 2}).has_value() &&
-               FitLine(one, std::vector<double>{1, 2})->slope.half_width);
-  EXPECT_FALSE(FitLine(std::vector<GroupedValue>{{1, 2.0}, {2, 3.0}}, std::vector<double>{1, 2}));
+  EXPECT_FALSE(FitLine(one, std::vector<double>{1, 2}, 0)->slope.half_width) << "two points of one place";
+  EXPECT_FALSE(FitLine(std::vector<GroupedValue>{{1, 2.0}, {2, 3.0}}, std::vector<double>{1, 2}, 0));
+}
+
+// A sensor's noise about one pressure tells no slope.
+TEST(Statistics, ALineNeedsASpan) {
+  const std::vector<GroupedValue> x = {{1, 1.000}, {1, 1.001}, {2, 0.999}, {2, 1.000}};
+  EXPECT_FALSE(FitLine(x, std::vector<double>{0.01, -0.01, 0.02, 0}, 0.2));
+}
+
+// Places at one pressure tell of no slope, and count for none of its certainty.
+TEST(Statistics, PlacesWithoutASpanGiveALineNoCertainty) {
+  const std::vector<GroupedValue> x = {{0, 0}, {0, 1}, {1, 0}, {2, 0}, {3, 0}, {4, 0}};
+  const auto line = FitLine(x, std::vector<double>{0.01, 0.09, 0, 0.02, 0.01, 0.03}, 0.2);
+  ASSERT_TRUE(line);
+  EXPECT_NEAR(line->slope.value, 0.08, 1e-12);
+  EXPECT_EQ(line->slope.samples, 1);
+  EXPECT_FALSE(line->slope.half_width);
+}
+
+TEST(Statistics, OneGroupsInterceptHasAWidth) {
+  const auto line = FitLine(std::vector<GroupedValue>{{0, 0}, {0, 1}, {0, 2}, {0, 3}},
+                            std::vector<double>{0.1, 1.0, 2.1, 3.0}, 0.2);
+  ASSERT_TRUE(line && line->intercept.half_width);
+  EXPECT_GT(*line->intercept.half_width, 0.05);
+  EXPECT_LT(*line->intercept.half_width, 0.5);
 }
 
 // Loads at one place share an error that is larger than what differs between repetitions. An interval that
@@ -48,7 +71,7 @@ TEST(Statistics, IntervalsHoldTheTruthAsOftenAsTheySay) {
     }
     const Estimate mean = GroupedMean(values);
     mean_held += std::abs(mean.value - kTruth) <= mean.half_width.value() ? 1 : 0;
-    const auto line = FitLine(x, y);
+    const auto line = FitLine(x, y, 0.2);
     ASSERT_TRUE(line && line->slope.half_width);
     slope_held += std::abs(line->slope.value - kSlope) <= *line->slope.half_width ? 1 : 0;
     const PercentileEstimate deviation = PooledDeviation(values);
@@ -62,7 +85,7 @@ TEST(Statistics, IntervalsHoldTheTruthAsOftenAsTheySay) {
 
 TEST(Statistics, LineGoesThroughExactPointsOfEveryGroup) {
   const std::vector<GroupedValue> x = {{0, 0}, {0, 1}, {1, 0}, {1, 2}};
-  const auto line = FitLine(x, std::vector<double>{1, 3, -1, 3});
+  const auto line = FitLine(x, std::vector<double>{1, 3, -1, 3}, 0.2);
   ASSERT_TRUE(line);
   EXPECT_NEAR(line->slope.value, 2, 1e-12);
   EXPECT_NEAR(line->intercept.value, 0, 1e-12);

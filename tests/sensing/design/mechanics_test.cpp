@@ -73,7 +73,7 @@ TEST(DesignMechanics, RangeEndsWhereADomeMeetsTheTube) {
     const RingForce& slack = design->slack.forces.by_ring[i];
     EXPECT_NEAR(slack.room_mm, 36.5 - 15 - 1.4, 1e-9);
     ASSERT_TRUE(slack.range_mm && slack.range_n);
-    EXPECT_TRUE(slack.ends_at_tube);
+    EXPECT_EQ(slack.end, RingForce::End::kTube);
     EXPECT_NEAR(*slack.range_mm, slack.room_mm, 1e-6);
     // On a finer mesh, without steps on the way.
     const auto fine = PushSkin(model, {.marker = model.MarkerIndex(3, ring), .depth_mm = slack.room_mm});

@@ -31,7 +31,7 @@ class CreepHistoryTest : public ::testing::Test {
   };
   // What the history makes of these loads at a time, each lumped at one marker.
   std::vector<EstimatedLoad> At(double time_s, const std::vector<Pressed>& pressed, double sigma_n = 0.002) {
-    history_.Elastic({}, false, static_cast<int64_t>(1e9 * time_s) + 1);
+    history_.Elastic({}, {}, static_cast<int64_t>(1e9 * time_s) + 1);
     CreepHistory::LumpedForces lumped;
     std::vector<EstimatedLoad> loads;
     for (const auto& [marker, elastic_n] : pressed) {
@@ -95,7 +95,7 @@ TEST_F(CreepHistoryTest, AGapCountsAsAnEvenChange) {
 
 TEST_F(CreepHistoryTest, TheFirstPressureCountsAsOldAndAStepCreeps) {
   const auto pressure_at = [&](double time_s, double mpa) {
-    return history_.Elastic({.pressure_mpa = mpa}, false, static_cast<int64_t>(1e9 * time_s) + 1);
+    return history_.Elastic({.pressure_mpa = mpa}, {}, static_cast<int64_t>(1e9 * time_s) + 1);
   };
   for (double t = 0; t < 5; t += 0.5)
     EXPECT_NEAR(pressure_at(t, 1e-3).pressure_mpa, 1e-3 / (1 - kShare), 1e-12);
@@ -128,7 +128,7 @@ TEST_F(CreepHistoryTest, TimeThatGoesBackForgets) {
 TEST_F(CreepHistoryTest, AnElasticSkinHasNone) {
   CreepHistory none(LoadLinkModel("cylinder").value());
   EXPECT_FALSE(none.any());
-  EXPECT_EQ(none.Elastic({.pressure_mpa = 0.3}, false, 5).pressure_mpa, 0.3);
+  EXPECT_EQ(none.Elastic({.pressure_mpa = 0.3}, {}, 5).pressure_mpa, 0.3);
   EXPECT_EQ(none.ResidualInward().size(), 0);
 }
 

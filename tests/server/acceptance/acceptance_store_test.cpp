@@ -29,7 +29,7 @@ class AcceptanceStoreTest : public testing::Test {
         std::vector<AcceptedLink>{{.name = "upper",
                                    .model = *LoadLinkModel("cylinder"),
                                    .model_hash = model_hash_,
-                                   .calibration_hash = [this] { return calibration_hash_; }}},
+                                   .calibrated_utc_ns = [this] { return calibrated_utc_ns_; }}},
         folder, clock_);
   }
   std::unique_ptr<AcceptanceStore> Open() { return Open(folder_); }
@@ -55,7 +55,8 @@ class AcceptanceStoreTest : public testing::Test {
 
   const std::string folder_ = testing::TempDir() + "acceptance." + std::to_string(::getpid());
   ManualClock clock_;
-  std::string model_hash_ = "m1", calibration_hash_ = "c1";
+  std::string model_hash_ = "m1";
+  int64_t calibrated_utc_ns_ = 5;
 };
 
 TEST_F(AcceptanceStoreTest, ReadingsOfAKilledServerAreThereAndResumed) {
@@ -98,7 +99,9 @@ TEST_F(AcceptanceStoreTest, FinishedOneStaysWithTheLinkUntilModelOrCalibrationCh
   EXPECT_EQ(summary->verdict(), v1::ACCEPTANCE_VERDICT_PASSED);
   EXPECT_NEAR(summary->force_bias(), 0.005, 1e-9);
   EXPECT_EQ(summary->outdated(), "");
-  calibration_hash_ = "c2";
+  calibrated_utc_ns_ = 0;  // as long as the link takes its rest shape
+  EXPECT_EQ(store->Summary(0)->outdated(), "");
+  calibrated_utc_ns_ = 6;
   EXPECT_THAT(store->Summary(0)->outdated(), HasSubstr("calibrated"));
   model_hash_ = "m2";
   EXPECT_THAT(Open()->Summary(0)->outdated(), HasSubstr("model"));
@@ -107,6 +110,33 @@ TEST_F(AcceptanceStoreTest, FinishedOneStaysWithTheLinkUntilModelOrCalibrationCh
   EXPECT_THAT(files->report_html(), HasSubstr("<svg"));
   EXPECT_THAT(files->report_csv(), HasSubstr("trial,kind"));
   EXPECT_TRUE(std::filesystem::exists(folder_ + "/upper/report.html"));
+}
+
+TEST_F(AcceptanceStoreTest, NothingReplacesAnAcceptanceWhoseTrialIsBeingMeasured) {
+  const auto store = Open();
+  ASSERT_TRUE(store->Start(0, "", kPlan, false).ok());
+  ASSERT_TRUE(store->Claim(0));
+  EXPECT_THAT(store->Start(0, "quick", "", true).error().message, HasSubstr("is being measured"));
+  EXPECT_THAT(store->Finish(0, true).error().message, HasSubstr("is being measured"));
+  store->Release(0);
+  EXPECT_TRUE(store->Start(0, "quick", "", true).ok());
+}
+
+TEST_F(AcceptanceStoreTest, WhatCannotBeReadIsNotOverwritten) {
+  ASSERT_TRUE(Open()->Start(0, "", kPlan, false).ok());
+  const std::string path = folder_ + "/upper/current.json";
+  std::ofstream(path, std::ios::trunc) << "{ torn";
+  const auto store = Open();
+  EXPECT_THAT(store->Start(0, "", kPlan, false).error().message, HasSubstr("cannot be read"));
+  EXPECT_FALSE(std::filesystem::exists(path + ".unreadable"));
+  EXPECT_TRUE(store->Start(0, "", kPlan, true).ok());
+  EXPECT_TRUE(std::filesystem::exists(path + ".unreadable"));
+}
+
+TEST_F(AcceptanceStoreTest, AnotherModelIsNotResumed) {
+  ASSERT_TRUE(Open()->Start(0, "", kPlan, false).ok());
+  model_hash_ = "m2";
+  EXPECT_THAT(Open()->Start(0, "", kPlan, false).error().message, HasSubstr("was changed since"));
 }
 
 TEST_F(AcceptanceStoreTest, LogsCarryTheFinishedOne) {

@@ -211,6 +211,14 @@ TEST_F(PressureControllerTest, OverPressureTripsAlsoWhileTheValveIsClosed) {
   EXPECT_THAT(set.error().message, HasSubstr("stays closed: over-pressure"));
 }
 
+// A sensor that is saturated, or whose device sends Pa: no frame can use that, but the valve must close.
+TEST_F(PressureControllerTest, AReadingBeyondWhatFramesTakeTripsAsWell) {
+  Hold(0.5);
+  device_->shows = [](std::optional<double>) { return 1250.0; };
+  RunToTrip(0.1);
+  ExpectTrip(PressureTripCause::kOverPressure, "1250.000 kPa measured");
+}
+
 TEST_F(PressureControllerTest, UnderPressureTrips) {
   Hold(0.1);
   device_->shows = [](std::optional<double> kpa) { return kpa ? -0.25 : 0; };
@@ -335,6 +343,17 @@ TEST_F(PressureControllerTest, ALoopThatStoodStillTrips) {
   controller_.Step(kPeriod);
   ASSERT_EQ(trips_.size(), 1u);
   EXPECT_EQ(trips_[0].cause, PressureTripCause::kLoopStalled) << "the device has closed by itself";
+}
+
+// The device's watchdog counts from the last command: it may have vented already.
+TEST_F(PressureControllerTest, ACommandThatIsLateTripsBeforeItFillsTheSkinAtOnce) {
+  Hold(1);
+  clock_.Advance(std::chrono::milliseconds(420));
+  device_->commands.clear();
+  controller_.Step(kPeriod);
+  ASSERT_EQ(trips_.size(), 1u);
+  EXPECT_EQ(trips_[0].cause, PressureTripCause::kLoopStalled);
+  EXPECT_THAT(device_->commands, ::testing::Each(std::optional<double>()));
 }
 
 TEST_F(PressureControllerTest, AClockThatIsSetChangesNothing) {

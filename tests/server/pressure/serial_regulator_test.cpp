@@ -55,7 +55,12 @@ TEST(SerialRegulatorTest, SpeaksTheLineProtocol) {
   EXPECT_THAT(reading.error().message, HasSubstr("the regulator reports: supply too low"));
   EXPECT_EQ(NextReading(*regulator)->kpa, -0.003);
 
-  for (const char* bad : {"1.25", "p", "p x", "p 1 2", "p 1 -0.1", "p 1 0.5 3", "q 1", "p nan", ""}) {
+  line.Send("p 1.5 1.02\n");
+  reading = NextReading(*regulator);
+  ASSERT_TRUE(reading.ok()) << "an effort beyond its range takes no pressure with it";
+  EXPECT_EQ(reading->kpa, 1.5);
+  EXPECT_EQ(reading->effort, 1);
+  for (const char* bad : {"1.25", "p", "p x", "p 1 x", "p 1 0.5 3", "q 1", "p nan", ""}) {
     line.Send(std::string(bad) + "\n");
     reading = NextReading(*regulator);
     ASSERT_FALSE(reading.ok()) << bad;
