@@ -87,6 +87,28 @@ TEST_F(AcceptTest, InterruptedByAKilledServerItIsResumed) {
   EXPECT_EQ(ListedAcceptance().at("verdict"), "failed");
 }
 
+// What the manometer shows belongs to its condition alone, and to trials that nothing touches as well.
+TEST_F(AcceptTest, AManometersNumbersAreThoseOfTheirConditions) {
+  Write("plan.yaml",
+        "taclink_acceptance: 1\nname: pressures\nseries:\n"
+        "  - {name: none, pressure_kpa: 0}\n  - {name: half, pressure_kpa: 0.5}\n");
+  // One of the two conditions with a number, the other without one.
+  const Finished run = Answered("0.6\\n\\n\\n\\n", "--csv " + Path("trials.csv"));
+  ASSERT_THAT(run.out, HasSubstr("2 trials measured, 0 skipped, 0 open")) << run.err;
+  std::ifstream file(Path("trials.csv"));
+  const std::string trials((std::istreambuf_iterator<char>(file)), {});
+  const size_t first = trials.find(",0.6,");
+  ASSERT_NE(first, std::string::npos) << trials;
+  EXPECT_EQ(trials.find(",0.6,", first + 1), std::string::npos) << trials;
+}
+
+TEST_F(AcceptTest, TheTrialBeforeIsRepeated) {
+  const Finished first = Answered("\\n\\n\\n\\nr\\nq\\n", "--weight 51");
+  EXPECT_THAT(first.out, HasSubstr("the trial before is done again")) << first.err;
+  const Finished second = Answered("s\\ns\\ns\\ns\\ns\\n");
+  EXPECT_THAT(second.out, HasSubstr("Resuming: 0 of 5 trials are measured")) << second.err;
+}
+
 TEST_F(AcceptTest, MistakesAreSaid) {
   EXPECT_THAT(Taclink({"accept", "b", "--server", address_, "--play"}).err, HasSubstr("no link 'b'"));
   EXPECT_THAT(Taclink({"accept", "a", "--server", address_, "--plan", "no.yaml"}).err, HasSubstr("quick"));
