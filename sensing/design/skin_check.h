@@ -22,6 +22,9 @@ struct SkinCheckOptions {
   double least_force_n = 0.1;               ///< that the link is meant to feel everywhere
   double contact_diameter_mm = 5.5;         ///< of the smallest body that is meant to touch it
   double searched_pressure_mpa = 5e-3;      ///< up to which limits of pressure are looked for
+  /// False: what cameras see alone, at a small part of the cost. Forces, limits of pressure and weight are
+  /// left out.
+  bool with_mechanics = true;
 };
 
 /// One state of the skin: slack, or under the pressure and the specific force of the options.
