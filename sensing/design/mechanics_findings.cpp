@@ -199,6 +199,7 @@ void AddWeight(const SkinDesign& design, std::vector<Finding>& findings) {
 
 std::vector<Finding> MechanicsFindings(const SkinDesign& design) {
   std::vector<Finding> findings;
+  if (!design.options.with_mechanics) return findings;
   AddPressureLimits(design, findings);
   AddForces(design, design.slack.forces, findings);
   if (design.loaded) {

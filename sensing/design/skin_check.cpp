@@ -51,17 +51,20 @@ Result<SkinDesign> AnalyzeSkin(const LinkModel& model, const SkinCheckOptions& o
   SkinDesign design{.model = model, .options = options, .slack = {}, .loaded = {}, .pressure = {}, .sag = {}};
   design.slack = StateOf(model, RestGeometry(model), {}, options);
   done(0.1);
-  design.slack.forces = FindForces(estimator, {}, design.slack.resolutions, options.contact_diameter_mm);
+  if (options.with_mechanics)
+    design.slack.forces = FindForces(estimator, {}, design.slack.resolutions, options.contact_diameter_mm);
   done(0.4);
   const KnownLoads loads{options.pressure_mpa, options.specific_force_mps2};
   const UntouchedSkin* untouched = loads == KnownLoads{} ? nullptr : mechanics.Untouched(loads);
   if (untouched != nullptr) {
     design.loaded =
         StateOf(model, DeformedGeometry(model, mechanics.mesh(), untouched->state), loads, options);
-    design.loaded->forces =
-        FindForces(estimator, loads, design.loaded->resolutions, options.contact_diameter_mm);
+    if (options.with_mechanics)
+      design.loaded->forces =
+          FindForces(estimator, loads, design.loaded->resolutions, options.contact_diameter_mm);
   }
   done(0.8);
+  if (!options.with_mechanics) return design;
   design.pressure = FindPressureLimits(
       mechanics.shell(), std::max(options.searched_pressure_mpa, kBeyondReserve * options.pressure_mpa));
   done(0.9);

@@ -24,6 +24,9 @@ struct SkinCheckOptions {
   /// Up to which limits of pressure are looked for at least; beyond the reserve over `pressure_mpa` in any
   /// case.
   double searched_pressure_mpa = 5e-3;
+  /// False: what cameras see alone, at a small part of the cost. Forces, limits of pressure and weight are
+  /// left out.
+  bool with_mechanics = true;
 };
 
 /// One state of the skin: slack, or under the pressure and the specific force of the options.
