@@ -21,7 +21,7 @@ namespace {
 constexpr const char* kVersionKey = "taclink_acceptance";
 constexpr int kPlanVersion = 1;
 constexpr size_t kMostTrials = 2000;
-constexpr double kGolden = 0.6180339887498949;  // paths of successive places lie far apart
+constexpr double kGolden = 0.6180339887498949;  // path step: successive places are far apart
 
 struct MarkerPlace {
   int path = 0, ring = 0;  // from 1
@@ -53,7 +53,7 @@ std::vector<MarkerPlace> PlacesOf(const AcceptanceSeries& series, const LinkMode
     places.push_back({series.markers[i], series.markers[i + 1]});
   if (!places.empty() || !series.force_n) return places;
   const int rings = model.markers.rings(), paths = model.markers.paths;
-  // Not under the outermost rings where there are others: a load there is partly carried by the clamp.
+  // Skips the outermost rings if possible: the clamp carries part of a load there.
   const int first = rings > 2 ? 2 : 1, last = rings > 2 ? rings - 1 : rings;
   for (int i = 0; i < series.places; ++i) {
     const double share = (i + 0.5) / series.places;
@@ -171,7 +171,7 @@ Result<std::vector<AcceptanceTrial>> MakeTrials(const AcceptancePlan& plan, cons
     }
   }
   std::mt19937_64 random(static_cast<uint64_t>(plan.seed));
-  // Not std::shuffle, whose result differs between libraries: a plan's order must be the same everywhere.
+  // Not std::shuffle: its result differs between libraries, and a plan must have the same order everywhere.
   const auto shuffle = [&random](auto& items) {
     for (size_t i = items.size(); i > 1; --i) std::swap(items[i - 1], items[random() % i]);
   };
@@ -181,7 +181,7 @@ Result<std::vector<AcceptanceTrial>> MakeTrials(const AcceptancePlan& plan, cons
   std::vector<AcceptanceTrial> all;
   for (auto& group : groups) {
     shuffle(group);
-    // Held loads last: what remains of them would disturb the short ones.
+    // Held loads last: their residual creep would disturb the short loads.
     std::ranges::stable_partition(group, [](const auto& trial) { return trial.kind != TrialKind::kHold; });
     for (AcceptanceTrial& trial : group) {
       trial.id = static_cast<uint32_t>(all.size() + 1);

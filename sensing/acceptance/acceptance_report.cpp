@@ -15,14 +15,14 @@
 namespace taclink {
 namespace {
 
-// Smaller effects are not worth a finding, whether or not they are significant.
+// Smaller effects are not reported, even if they are significant.
 constexpr double kLeastScale = 0.05, kLeastGain = 0.02, kLeastOffsetKpa = 0.02, kLeastCreep = 0.03;
-constexpr size_t kEnds = 3;                                // samples at either end of a held load
-constexpr double kLeastSpanKpa = 0.2, kLeastSpanH = 0.02;  // that a slope is taken from
+constexpr size_t kEnds = 3;                                // samples averaged at each end of a held load
+constexpr double kLeastSpanKpa = 0.2, kLeastSpanH = 0.02;  // smallest range for a slope
 constexpr double kLeastTurnRad = 1.5 * std::numbers::pi / 180, kLeastShiftMm = 2;
 constexpr double kLeastPhantomN = 0.03, kLeastReasonShare = 0.2;
 
-/// Makes the report of one record, quantity by quantity.
+/// Builds the report of one record, quantity by quantity.
 class Analysis {
  public:
   explicit Analysis(const AcceptanceRecord& record) : record_(record), limits_(record.limits) {}
@@ -75,7 +75,7 @@ class Analysis {
     AcceptanceQuantity bias =
         Describe("force_bias", "Force: mean error over places", "%", kPercent * limits_.force_bias);
     Estimate mean = GroupedMean(errors);
-    // What the references themselves may be off is the same for all loads.
+    // The uncertainty of the references is common to all loads: averaging does not reduce it.
     if (mean.half_width) mean.half_width = std::hypot(*mean.half_width, ReferenceWidth());
     Set(bias, mean, static_cast<int>(errors.size()), kPercent);
     Add(std::move(bias));
@@ -100,7 +100,7 @@ class Analysis {
             "reference.");
   }
 
-  // Half the 95 % width of the references' relative error, of the least certain one.
+  // Half-width of the 95 % interval of the relative reference error, for the least certain reference.
   double ReferenceWidth() const {
     double most = 0;
     for (const AcceptanceTrial& trial : record_.trials) {
@@ -124,8 +124,9 @@ class Analysis {
     Add(std::move(quantity));
   }
 
-  // Of each held load the change from its first samples to its last. The load is constant, so whatever
-  // changes is the link's. Up to two holds hardly tell how holds differ: then the noise within them counts.
+  // Change of each held load from its first samples to its last. The load is constant, so any change comes
+  // from the link. One or two holds do not show the scatter between holds: the noise within them is used
+  // instead.
   void Creep() {
     std::vector<GroupedValue> changes;
     double variances = 0, steps = 0;
@@ -160,7 +161,7 @@ class Analysis {
                FittedRelaxation() + ".");
   }
 
-  // What the holds tell of it, for the model file; empty: they do not determine it.
+  // The relaxation fitted to the holds, for the model file; empty: the holds do not determine it.
   std::string FittedRelaxation() const {
     std::vector<RelaxationRecord> records;
     for (const AcceptanceTrial& trial : record_.trials) {
@@ -186,7 +187,7 @@ class Analysis {
            "]}, standard deviations of the shares " + sigmas;
   }
 
-  // Of a sample, from the differences of successive ones, which do not see the slow change itself. N^2.
+  // Variance of one sample, N^2, from successive differences, which the slow change hardly affects.
   static double VarianceWithin(const std::vector<HeldSample>& held) {
     double sum2 = 0;
     for (size_t i = 1; i < held.size(); ++i) {
@@ -216,7 +217,7 @@ class Analysis {
     Add(std::move(quantity));
   }
 
-  // Largest difference between attitudes; places that both have are compared with each other.
+  // Largest difference between two attitudes, over the places measured in both.
   void AttitudeEffect() {
     std::map<std::string, std::map<int, std::vector<double>>> errors;
     for (const LoadError& load : report_.loads)
@@ -280,7 +281,7 @@ class Analysis {
     std::vector<GroupedValue> hours;
     std::vector<double> drift_mm;
     std::optional<int64_t> first_ns;
-    std::map<int64_t, int> baselines;  // a tare or a start begins the drift anew
+    std::map<int64_t, int> baselines;  // numbers by time: each tare or start restarts the drift
     for (const AcceptanceTrial& trial : record_.trials) {
       if (trial.state != TrialState::kMeasured || !trial.loaded) continue;
       const TrialReading& reading = trial.released ? *trial.released : *trial.loaded;
@@ -333,7 +334,7 @@ class Analysis {
                                      "): check the link's pose, and from where its paths are counted.");
   }
 
-  // What the link says of itself, and forces where nothing touches.
+  // Reasons that the link reported, phantom forces, missed and withheld loads.
   void Reported() {
     std::map<ReasonId, std::pair<int, std::string>> reasons;
     int frames = 0;
@@ -381,7 +382,7 @@ class Analysis {
            Format("%d loads were not measured: the link withheld its forces.", report_.withheld));
   }
 
-  // Whether the plan has trials that tell this quantity.
+  // Whether the plan has trials for this quantity.
   bool IsPlanned(const std::string& id) const {
     std::set<std::string> attitudes;
     std::set<double> pressures;

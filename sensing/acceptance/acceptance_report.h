@@ -14,7 +14,7 @@ enum class Verdict : uint8_t {
   kPassed,
   kFailed,
   kUndecided,    ///< the confidence interval contains the limit: more trials are needed
-  kNotMeasured,  ///< the plan has no trials for it
+  kNotMeasured,  ///< there are no usable trials for it
   kUnlimited,    ///< measured; there is no limit
 };
 inline constexpr const char* kVerdictNames[] = {"passed", "failed", "undecided", "not measured", "no limit"};
@@ -24,28 +24,28 @@ inline const char* Name(Verdict verdict) {
 
 /// One measure of the link's accuracy against its limit.
 struct AcceptanceQuantity {
-  std::string id = {};     ///< stable: "force_bias"
-  std::string label = {};  ///< for people
-  std::string unit = {};   ///< "%", "mm", "N", ...; of all numbers here
+  std::string id = {};     ///< stable, such as "force_bias"
+  std::string label = {};  ///< for display
+  std::string unit = {};   ///< of all numbers here: "%", "mm", "N", ...
   double value = 0;
-  std::optional<double> low = {}, high = {};  ///< of the 95 % confidence interval; none: too few data
-  int loads = 0;                              ///< that it comes from
-  double limit = 0;                           ///< of the magnitude; 0: none
+  std::optional<double> low = {}, high = {};  ///< bounds of the 95 % confidence interval; none: too few data
+  int loads = 0;                              ///< number of loads evaluated
+  double limit = 0;                           ///< limit of the magnitude; 0: none
   Verdict verdict = Verdict::kNotMeasured;
 };
 
-/// What is wrong with a link, as far as the errors tell it.
+/// Causes that the errors identify.
 enum class FindingId : uint8_t {
-  kForceScale,      ///< forces are wrong by a factor, also without pressure: the modulus or thickness
-  kPressureSensor,  ///< the sensor's gain or offset is wrong
-  kCreep,           ///< the skin creeps, and the model does not know it
-  kMounting,        ///< contacts lie off by a rigid motion: pose, or markers numbered from another path
-  kCamera,          ///< cameras moved or changed since the calibration
+  kForceScale,      ///< forces are off by a factor, also at the lowest pressure: modulus or thickness
+  kPressureSensor,  ///< gain or offset of the pressure sensor is wrong
+  kCreep,           ///< the skin creeps more than the model says
+  kMounting,        ///< contacts are displaced by a rigid motion: link pose, or path numbering
+  kCamera,          ///< the cameras moved or changed since the calibration
   kPressureEffect,  ///< the force error depends on the pressure
   kAttitudeEffect,  ///< the force error depends on the attitude
   kPhantom,         ///< forces where nothing touches
-  kWithheld,        ///< loads that the link did not measure, with its own reason
-  kMissed,          ///< loads that were not felt
+  kWithheld,        ///< loads that the link did not measure, or reasons that it reported
+  kMissed,          ///< loads that were not detected
 };
 inline constexpr const char* kFindingNames[] = {
     "force_scale",     "pressure_sensor", "creep",   "mounting", "camera",
@@ -61,7 +61,7 @@ struct AcceptanceFinding {
 
 struct AcceptanceReport {
   Verdict verdict = Verdict::kNotMeasured;
-  /// Trials; withheld: measured without usable frames; missed: nothing was felt of the load.
+  /// Numbers of trials; withheld: measured without usable frames; missed: the load was not detected.
   int measured = 0, skipped = 0, open = 0, withheld = 0, missed = 0;
   std::vector<AcceptanceQuantity> quantities = {};
   std::vector<AcceptanceFinding> findings = {};
@@ -70,7 +70,7 @@ struct AcceptanceReport {
   const AcceptanceQuantity* Quantity(const std::string& id) const;
 };
 
-/// What the trials of a record say, finished or not.
+/// Evaluates the trials of a record, finished or not.
 AcceptanceReport AnalyzeAcceptance(const AcceptanceRecord& record);
 
 }  // namespace taclink

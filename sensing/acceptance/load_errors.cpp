@@ -13,8 +13,7 @@ namespace {
 std::optional<double> BalanceError(const AcceptanceTrial& trial, double reference_n, double scale_n) {
   const TrialReference& reference = trial.reference;
   std::optional<Vec3> direction = reference.direction;
-  // The radial direction stands in for the skin's normal: the profile is not known here, and half of a wall's
-  // slope of 10 degrees changes the result by less than 1 %.
+  // The profile is not known here: the radial direction approximates the skin's normal.
   if (!direction && reference.place_mm) {
     const Vec3& at = *reference.place_mm;
     const Vec3 radial(at.x(), at.y(), 0);
@@ -83,7 +82,7 @@ std::vector<LoadError> LoadErrors(const AcceptanceRecord& record) {
   for (const AcceptanceTrial& trial : record.trials) {
     if (trial.state != TrialState::kMeasured || !trial.loaded || !IsUsable(*trial.loaded)) continue;
     LoadError error = ErrorOf(trial, record.limits.force_floor_n);
-    // Places that no marker names are the same within 10 mm.
+    // Places without a marker are the same if they fall in the same cell of a 10 mm grid.
     Place place{trial.path, trial.ring, 0, 0, 0};
     if (trial.path == 0 && trial.reference.place_mm) {
       const Vec3 at = *trial.reference.place_mm / 10;

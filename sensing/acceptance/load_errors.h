@@ -8,35 +8,35 @@
 
 namespace taclink {
 
-/// Errors of one measured load or pressure against its reference; what was not compared is absent.
+/// Errors of one measured load or pressure against its reference; absent: not compared.
 struct LoadError {
   uint32_t trial = 0;
-  int place = 0;                     ///< loads with the same number were at the same place
-  int condition = 0;                 ///< likewise the same place, force, pressure and attitude: repetitions
+  int place = 0;                     ///< same number: same place
+  int condition = 0;                 ///< same number: same place, force, pressure and attitude (repetitions)
   std::optional<double> force = {};  ///< (measured - reference) / reference; -1: no contact was found
-  std::optional<double> force_to_floor = {};  ///< (measured - reference) / the larger of reference and floor
-  std::optional<double> place_mm = {};        ///< distance from the reference place, along the skin
-  std::optional<double> balance = {};  ///< |resultant of all contacts - load| / the larger of load and floor
-  std::optional<double> ghost_n = {};  ///< all forces after the load was taken off
-  std::optional<double> phantom_n = {};  ///< of other contacts during the load
+  std::optional<double> force_to_floor = {};  ///< (measured - reference) / max(reference, floor)
+  std::optional<double> place_mm = {};        ///< distance along the skin from the reference place
+  std::optional<double> balance = {};         ///< |resultant of all contacts - load| / max(load, floor)
+  std::optional<double> ghost_n = {};         ///< sum of forces after the load was removed
+  std::optional<double> phantom_n = {};       ///< sum of other contacts during the load
   std::optional<double> pressure_kpa =
-      {};  ///< inside the skin: manometer, else planned, else the link's sensor
+      {};  ///< inside the skin: from the manometer, else planned, else from the link's sensor
   std::string attitude = {};
   double hours = 0;  ///< since the first reading
 };
 
-/// Of all measured loads whose readings can be used. A reading can be used if at least half of its frames
-/// have forces.
+/// Errors of all measured trials with usable readings.
 std::vector<LoadError> LoadErrors(const AcceptanceRecord& record);
 
-/// A measured place moved to the reference's distance from the axis: a load presses its contact inwards,
-/// which is not an error of the place.
+/// Moves a measured place to the reference's distance from the axis: a load shifts its contact inward, which
+/// is not an error of place.
 Vec3 AtRadiusOf(const Vec3& reference_mm, const Vec3& measured_mm);
 
+/// Whether at least half of the reading's frames have forces.
 bool IsUsable(const TrialReading& reading);
-/// References below this compare nothing: relative errors would say nothing. N.
+/// Loads with a smaller reference force are not compared: relative errors would be meaningless. N.
 inline constexpr double kLeastReferenceN = 0.02;
-/// The force that the load really had: of the reading's reference, else as planned.
+/// The reference force if given, else the planned force.
 std::optional<double> ReferenceForce(const AcceptanceTrial& trial);
 
 }  // namespace taclink

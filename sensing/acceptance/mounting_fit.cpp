@@ -9,8 +9,7 @@ namespace taclink {
 namespace {
 
 constexpr size_t kLeastPlaces = 4;  // two equations each, six unknowns
-// A component whose width is larger than this is not determined: places on one line leave a rotation about it
-// open.
+// A component with a larger half-width is undetermined: places on one line leave the rotation about it free.
 constexpr double kMostWidthRad = 0.5, kMostWidthMm = 50;
 
 struct PlaceSum {
@@ -58,8 +57,8 @@ std::optional<MountingFit> FitMounting(const std::vector<PlacePair>& pairs) {
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
   const Eigen::VectorXd solution = svd.solve(b);
   const double freedom = static_cast<double>(rows) - 6;
-  // Errors around the axis and along it differ, hence the variance that is robust against that (HC3:
-  // MacKinnon and White, 1985): each residual stands for its own equation, enlarged by its leverage.
+  // Errors around the axis and along it have different variances, hence the heteroscedasticity-consistent
+  // covariance HC3 (MacKinnon and White, 1985): residuals are divided by 1 - leverage.
   const Eigen::VectorXd inverse = (svd.singularValues().array().max(1e-9)).inverse();
   const Eigen::MatrixXd solve = svd.matrixV() * inverse.asDiagonal() * svd.matrixU().transpose();
   const Eigen::ArrayXd leverage = svd.matrixU().rowwise().squaredNorm().array().min(0.99);

@@ -13,7 +13,7 @@ Verdict VerdictOf(double low, double high, double limit) {
   return worst <= limit ? Verdict::kPassed : best > limit ? Verdict::kFailed : Verdict::kUndecided;
 }
 
-// Rounding errors are not results.
+// Sets rounding errors to zero.
 double Rounded(double value) {
   return std::abs(value) < 1e-9 ? 0 : value;
 }

@@ -12,24 +12,24 @@ namespace taclink {
 
 inline constexpr double kPercent = 100;
 
-/// By a format of printf, at most 399 characters.
+/// Formats like printf, at most 399 characters.
 std::string Format(const char* format, auto... values) {
   char text[400];
   std::snprintf(text, sizeof text, format, values...);
   return text;
 }
 
-/// "+3.1 ± 0.8", of the estimate times `scale`.
+/// "+3.1 ± 0.8": the estimate times `scale`.
 std::string Interval(const Estimate& estimate, double scale, const char* format);
 
-/// A quantity without a value.
+/// A quantity that has no value yet.
 AcceptanceQuantity Describe(std::string id, std::string label, std::string unit, double limit);
 
-/// Fills in value, interval and verdict. `loads`: that it comes from.
+/// Sets value, interval and verdict. `loads`: number of loads evaluated.
 void Set(AcceptanceQuantity& quantity, const Estimate& estimate, int loads, double scale = 1);
 void Set(AcceptanceQuantity& quantity, const PercentileEstimate& estimate, int loads, double scale = 1);
 
-/// One error of all loads that have it, by place.
+/// One error of all loads that have it, grouped by place.
 using ErrorOfLoad = std::optional<double> LoadError::*;
 std::vector<GroupedValue> Values(const std::vector<LoadError>& loads, ErrorOfLoad error, bool magnitudes);
 

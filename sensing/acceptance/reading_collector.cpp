@@ -92,11 +92,11 @@ TrialReading ReadingCollector::Reading() const {
   reading.others_n /= reading.usable;
   reading.has_contact = 2 * load_.frames >= reading.usable && load_.frames > 0;
   if (!reading.has_contact) {
-    // Rare frames with a contact count as force that nothing exerts.
+    // A contact in less than half of the frames counts as a phantom force.
     reading.others_n += load_.force_n / reading.usable;
     return reading;
   }
-  // A load that is felt in some of the frames only is felt as less.
+  // Divided by all usable frames: those without a contact lower the mean.
   const double n = reading.usable;
   reading.force_n = load_.force_n / n;
   reading.center_mm = load_.moment_nmm / load_.force_n;

@@ -10,9 +10,9 @@ namespace taclink {
 /// Averages a link's frames into the reading of one phase of a trial. One thread.
 class ReadingCollector {
  public:
-  /// `place_mm`: where the load is, link frame; contacts within `near_mm` of it are the load's, since one
-  /// body may be found as several contacts, and all others count as forces that nothing exerts. None: all
-  /// contacts are the load's. `keeps_held`: also the course of the force, a sample a second.
+  /// `place_mm`: place of the load, link frame. All contacts within `near_mm` of it belong to the load, since
+  /// one body may be found as several contacts; others count as phantom forces. None: all contacts belong to
+  /// the load. `keeps_held`: also records the force over time, one sample a second.
   explicit ReadingCollector(std::optional<Vec3> place_mm, double near_mm = kSameContactMm,
                             bool keeps_held = false);
 
@@ -23,7 +23,7 @@ class ReadingCollector {
   TrialReading Reading() const;
 
  private:
-  /// Of the load's contacts in one frame, or summed over frames.
+  /// The load's contacts in one frame, or summed over frames.
   struct Load {
     int frames = 0;
     double force_n = 0, force2_n2 = 0, variance_n2 = 0;
@@ -39,12 +39,12 @@ class ReadingCollector {
   const double near_mm_;
   const bool keeps_held_;
 
-  TrialReading reading_;  // sums where it will have means
+  TrialReading reading_;  // sums in place of the means
   Load load_;
   int64_t first_ns_ = 0;  // monotonic
   double pressure_sum_mpa_ = 0;
   int pressures_ = 0;
-  HeldSample second_;  // sums over the second that has begun
+  HeldSample second_;  // sums over the current second
   int second_frames_ = 0;
 };
 

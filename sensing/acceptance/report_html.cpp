@@ -66,7 +66,7 @@ std::vector<double> Ticks(double low, double high) {
   return ticks;
 }
 
-/// One plot as SVG; with `is_diagonal` the line y = x, else y = 0.
+/// One plot as SVG, with the line y = x (`is_diagonal`) or y = 0.
 std::string Plot(const std::string& title, const std::string& x_label, const std::string& y_label,
                  const std::vector<Curve>& curves, bool is_diagonal = false) {
   constexpr double kWidth = 420, kHeight = 280, kLeft = 56, kRight = 12, kTop = 28, kBottom = 44;
@@ -80,7 +80,7 @@ std::string Plot(const std::string& title, const std::string& x_label, const std
       high = {std::max(high.x, p.x), std::max(high.y, p.y)};
     }
   }
-  // A single place on the x axis shows nothing that the table does not.
+  // No plot for a single x value: the table shows the same.
   if (!any || (!is_diagonal && high.x - low.x < 1e-6 * std::max(1.0, std::abs(high.x)))) return "";
   if (is_diagonal) low = {0, 0}, high = {std::max(high.x, high.y), std::max(high.x, high.y)};
   const Point margin{0.06 * std::max(high.x - low.x, 1e-6), 0.08 * std::max(high.y - low.y, 1e-6)};

@@ -7,12 +7,11 @@
 
 namespace taclink {
 
-/// The report as one HTML page that needs no other file and no network: verdict, findings, quantities with
-/// their intervals and limits, plots, and all trials.
+/// The report as one self-contained HTML page: verdict, findings, quantities with intervals and limits,
+/// plots, and all trials.
 std::string AcceptanceHtml(const AcceptanceRecord& record, const AcceptanceReport& report);
 
-/// A line for each trial: what was done, the reference, what was measured, and the errors. SI-near units in
-/// the column names (N, mm, kPa).
+/// One line per trial: plan, reference, measurement and errors. The column names give the units (N, mm, kPa).
 std::string AcceptanceCsv(const AcceptanceRecord& record, const AcceptanceReport& report);
 
 }  // namespace taclink

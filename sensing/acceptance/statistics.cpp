@@ -31,7 +31,7 @@ double Mean(std::span<const double> values) {
   return sum / static_cast<double>(values.size());
 }
 
-// The empirical quantile at (n - 1) share, linear between the two values around it.
+// Empirical quantile at position (n - 1) share, linearly interpolated.
 double Quantile(std::vector<double> values, double share) {
   std::ranges::sort(values);
   const double at = share * static_cast<double>(values.size() - 1);
@@ -126,7 +126,7 @@ std::optional<LineFit> FitLine(std::span<const GroupedValue> x, std::span<const 
   }
   LineFit fit;
   fit.slope = {.value = xy / xx, .half_width = {}, .samples = static_cast<int>(groups.size())};
-  // Scores by group: offsets of a group cancel within it, a slope of its own does not.
+  // Scores by group: a group's own offset cancels, its own slope does not.
   double residual2 = 0, scores2 = 0;
   for (const auto& [id, group] : groups) {
     double score = 0;

@@ -12,7 +12,7 @@ namespace {
 using wire::kMetresPerMm;
 using wire::kPascalsPerMpa;
 
-// The enumerators of the API are in the order of those here, from 1.
+// The API's enumerators have the same order, from 1.
 template <typename Wire, typename Value>
 Wire ToWire(Value value) {
   return static_cast<Wire>(static_cast<int>(value) + 1);

@@ -37,7 +37,7 @@ Result<std::string> JsonOf(const v1::Acceptance& message) {
   return json;
 }
 
-// The file's end is what counts: one that was never there is gone as well.
+// A file that does not exist counts as removed.
 Result<void> Remove(const std::string& path) {
   std::error_code error;
   fs::remove(path, error);
@@ -93,7 +93,7 @@ AcceptanceStore::AcceptanceStore(std::vector<AcceptedLink> links, std::string fo
   }
 }
 
-// What another server has done here before this one got the lock is read again.
+// Reloads after locking: another server may have written here before.
 Result<void> AcceptanceStore::Own(size_t link) {
   if (auto good = CheckFolder(); !good) return good;
   Entry& entry = entries_[link];
@@ -160,7 +160,7 @@ int64_t AcceptanceStore::CalibratedUtcNs(size_t link) const {
 
 Result<v1::Acceptance> AcceptanceStore::Start(size_t link, const std::string& plan_name,
                                               const std::string& plan_text, bool restart) {
-  // Names of files are not taken: the caller would read files of this machine.
+  // File names are not accepted: the caller would read files of this machine.
   const std::string text = plan_text.empty() ? std::string(ShippedPlanText(plan_name)) : plan_text;
   if (text.empty()) {
     return Error{ErrorCode::kInvalidArgument, "there is no shipped plan '" + plan_name +
@@ -210,7 +210,7 @@ Result<v1::Acceptance> AcceptanceStore::Start(size_t link, const std::string& pl
   return Save(link);
 }
 
-// Under the lock. The message is made in any case, but returned only if it is on the disk.
+// Requires mutex_. Returns the message only after it was written to the disk.
 Result<v1::Acceptance> AcceptanceStore::Save(size_t link) {
   const Entry& entry = entries_[link];
   v1::Acceptance message = MessageOf(*entry.current, entry.current_plan);
@@ -243,7 +243,7 @@ Result<AcceptanceTrial> AcceptanceStore::Trial(size_t link, uint32_t trial) cons
   }
   AcceptanceTrial planned = *found;
   const LinkModel& model = links_[link].model;
-  // Of an acceptance that was begun with another model there may be markers that this one does not have.
+  // An acceptance that was started with another model may have markers that this model does not have.
   if (planned.path > 0 && planned.path <= model.markers.paths && planned.ring > 0 &&
       planned.ring <= model.markers.rings()) {
     const double angle = model.PathAngle(planned.path - 1);

@@ -15,17 +15,17 @@
 
 namespace taclink::server {
 
-/// What identifies a link for its acceptance.
+/// Identity of a link for its acceptance.
 struct AcceptedLink {
   std::string name;
   LinkModel model;
-  std::string model_hash;     ///< of the model's file
-  std::string recorded = {};  ///< a finished acceptance from elsewhere, as FinishedFile: from a log
-  /// When the cameras in use were calibrated, since 1970-01-01; 0: not known. Any thread.
+  std::string model_hash;     ///< fingerprint of the model file
+  std::string recorded = {};  ///< finished acceptance from a log (FinishedFile); empty: none
+  /// Calibration time of the cameras in use, since 1970-01-01; 0: unknown. Any thread.
   std::function<int64_t()> calibrated_utc_ns = {};
 };
 
-/// A file that one process at a time holds, until it ends or lets go.
+/// A file lock that one process holds at a time, until it ends or this object is destroyed.
 class LockFile {
  public:
   LockFile() = default;
@@ -36,63 +36,66 @@ class LockFile {
     return *this;
   }
   bool held() const { return descriptor_ >= 0; }
-  /// Errors: kUnavailable (the file cannot be made), kFailedPrecondition (another process holds it).
+  /// Errors: kUnavailable (the file cannot be created), kFailedPrecondition (another process holds it).
   Result<void> Acquire(const std::string& path);
 
  private:
   int descriptor_ = -1;
 };
 
-/// The acceptances of all links: at most one under way for each, and the last finished one. Every change is
-/// written to the folder at once (see ReplaceFile), so that a server that is killed loses no reading. Any
-/// thread; calls wait for the disk.
+/// Acceptances of all links: at most one in progress for each, and the last finished one. Every change is
+/// written to the folder at once (ReplaceFile), so that a killed server loses no reading. Any thread; calls
+/// wait for the disk.
 ///
-///     FOLDER/LINK/current.json    under way
-///     FOLDER/LINK/accepted.json   the last finished one; report.html and report.csv beside it
+///     FOLDER/LINK/current.json    in progress
+///     FOLDER/LINK/accepted.json   the last finished one; with report.html and report.csv
 ///     FOLDER/LINK/UTC.json        every finished one
-///     FOLDER/LINK/lock            held by the server that writes here, from its first change on
+///     FOLDER/LINK/lock            lock of the server that writes here, from its first change on
 class AcceptanceStore {
  public:
-  /// `folder` empty: nothing can be accepted. What is in it is read; what cannot be read is logged and stays.
+  /// `folder` empty: acceptances are not possible. Reads the folder; files that cannot be read are logged and
+  /// kept.
   AcceptanceStore(std::vector<AcceptedLink> links, std::string folder, Clock& clock);
 
-  /// Errors: kFailedPrecondition (no folder, or one that another server uses; another is under way and not
-  /// `restart`), kInvalidArgument (the plan), kUnavailable (the disk). `plan_name` for messages; empty text:
-  /// the shipped plan of that name.
+  /// Starts or resumes an acceptance. Errors: kFailedPrecondition (no folder, or one that another server
+  /// uses; an acceptance with another plan or model is in progress and not `restart`), kInvalidArgument (the
+  /// plan), kUnavailable (the disk). `plan_name`: for messages; with an empty `plan_text`, a shipped plan.
   Result<v1::Acceptance> Start(size_t link, const std::string& plan_name, const std::string& plan_text,
                                bool restart);
 
-  /// The trial as it stands, with the references that the plan gives it. Errors: kFailedPrecondition (none is
-  /// under way), kNotFound (no such trial).
+  /// The trial; its reference place and direction default to its marker's. Errors: kFailedPrecondition (none
+  /// is in progress), kNotFound (no such trial).
   Result<AcceptanceTrial> Trial(size_t link, uint32_t trial) const;
-  /// Claims the link for one measurement; false: one is under way. Until Release the acceptance is neither
-  /// replaced nor ended.
+  /// Claims the link for one measurement; false: another one is in progress. Until Release, the acceptance is
+  /// neither replaced nor ended.
   bool Claim(size_t link);
   void Release(size_t link);
-  /// Stores a reading. `reference`: with the loaded phase. Errors: as Trial, and kUnavailable (the disk).
+  /// Stores a reading. `reference`: with the loaded phase. Errors: kFailedPrecondition (none is in progress,
+  /// or no such trial), kUnavailable (the disk).
   Result<v1::Acceptance> Store(size_t link, uint32_t trial, v1::TrialPhase phase, const TrialReading& reading,
                                const std::optional<TrialReference>& reference);
   Result<v1::Acceptance> Skip(size_t link, uint32_t trial, bool reopen);
-  /// Errors: kFailedPrecondition (none is under way, nothing was measured), kUnavailable (the disk).
+  /// Errors: kFailedPrecondition (none is in progress, a trial is being measured, nothing was measured),
+  /// kUnavailable (the disk).
   Result<v1::Acceptance> Finish(size_t link, bool discard);
 
   /// Errors: kFailedPrecondition (there is none).
   Result<v1::Acceptance> Get(size_t link, bool finished, bool with_files) const;
-  /// Of the last finished one. None: there is none. Does not wait for the disk.
+  /// Summary of the last finished one; none: there is none. Does not wait for the disk.
   std::optional<v1::AcceptanceSummary> Summary(size_t link) const;
-  /// The file of the last finished one, for logs. Empty: there is none.
+  /// File content of the last finished one, for logs; empty: there is none.
   std::string FinishedFile(size_t link) const;
 
  private:
   struct Entry {
     std::optional<AcceptanceRecord> current, finished;
-    std::string current_plan, finished_plan;  ///< texts
-    std::string unreadable;  ///< why what is under way cannot be read; empty: it can, or there is none
+    std::string current_plan, finished_plan;  ///< YAML texts
+    std::string unreadable;                   ///< why current.json cannot be read; empty: readable, or none
     bool is_measuring = false;
     LockFile lock;
   };
 
-  /// Of a finished acceptance, with what it holds for.
+  /// Summary of a finished acceptance, with the model and calibration that it is valid for.
   struct Summarized {
     v1::AcceptanceSummary summary;
     std::string model_hash;
@@ -120,7 +123,7 @@ class AcceptanceStore {
 
   mutable std::mutex mutex_;
   std::vector<Entry> entries_;  // by link; guarded by mutex_
-  // So that those who ask for summaries do not wait for the disk. Taken after mutex_.
+  // Separate, so that Summary does not wait for the disk. Locked after mutex_.
   mutable std::mutex summary_mutex_;
   std::vector<std::optional<Summarized>> summaries_;  // by link; guarded by summary_mutex_
 };

@@ -38,7 +38,7 @@ void TrialMeasurement::Begin(Hub& hub) {
   SubscriberOptions wanted{.delivery = Delivery::kEvery, .queue_capacity = kQueue};
   wanted.links.assign(hub.links(), false);
   wanted.links[options_.link] = true;
-  // The hub may still call this while the subscription is destroyed, hence it holds no owner.
+  // Weak, since the hub may still call this while the subscription is destroyed.
   subscription_ = hub.Subscribe(std::move(wanted), [weak = weak_from_this(), strand = strand_] {
     boost::asio::post(strand, [weak] {
       if (const auto measurement = weak.lock()) measurement->Drain();
