@@ -1,4 +1,4 @@
-// Findings about where the cameras are and where they look.
+// Findings about the cameras' positions and viewing directions.
 #include <algorithm>
 #include <cmath>
 
@@ -15,7 +15,7 @@ struct CameraPlace {
   CameraId id;
   Vec3 at = Vec3::Zero(), forward = Vec3::Zero();
   double off_axis_mm = 0;
-  double outside_mm = 0;  // beyond its own end of the skin; negative: within
+  double outside_mm = 0;  // distance beyond its own end of the skin; negative: inside
 };
 
 CameraPlace PlaceOf(const LinkModel& model, CameraId id) {
@@ -63,7 +63,7 @@ void AddSide(const LinkModel& model, const CameraPlace& place, std::vector<Findi
   findings.push_back(std::move(finding));
 }
 
-// Where its own body would be: in the wall, in the skin's cavity, or in the tube.
+// A camera inside the skin: in the wall, in the cavity, or in the tube.
 void AddInside(const LinkModel& model, const CameraPlace& place, std::vector<Finding>& findings) {
   const double z = place.at.z();
   if (!(z > 0 && z < model.length_mm)) return;

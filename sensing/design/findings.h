@@ -10,31 +10,31 @@
 namespace taclink {
 
 enum class Severity : uint8_t {
-  kNote,     ///< good to know
-  kWarning,  ///< the link works, but some of it badly
-  kFault,    ///< the link does not do its work
+  kNote,     ///< information
+  kWarning,  ///< the link works, but with reduced performance
+  kFault,    ///< the link does not work as intended
 };
 const char* Name(Severity severity);
 
-/// Something about a design that its maker should know.
+/// One result of the check of a design.
 struct Finding {
   Severity severity = Severity::kNote;
   std::string id = {};    ///< stable, such as "marker_too_small"
-  std::string what = {};  ///< in words, with the numbers
-  /// Where it is worst; counted from 1.
+  std::string what = {};  ///< description, with the numbers
+  /// The worst place; path and ring from 1.
   std::optional<int> path = {}, ring = {};
   std::optional<double> z_mm = {};
-  int markers = 0;  ///< how many are concerned; 0: it is not about markers
-  /// What was found, and the limit that it is held against.
+  int markers = 0;  ///< number of markers concerned; 0: not about markers
+  /// The computed value and its limit.
   std::optional<double> value = {}, limit = {};
   std::string unit = {};    ///< of both
   std::string change = {};  ///< what to change; empty: nothing
 };
 
-/// A finding about markers, placed at one of them.
+/// Sets the place of a finding to that of a marker.
 Finding AtMarker(const LinkModel& model, int marker, Finding finding);
 
-/// The findings of each concern; see SkinDesign (skin_check.h).
+/// Findings by subject; see SkinDesign (skin_check.h).
 struct SkinDesign;
 std::vector<Finding> GeometryFindings(const SkinDesign& design);
 std::vector<Finding> CameraFindings(const SkinDesign& design);

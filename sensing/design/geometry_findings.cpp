@@ -1,4 +1,4 @@
-// Findings about the skin, its markers and its tube as bodies: what a drawing already shows.
+// Findings about the geometry of the skin, its markers and its tube.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,11 +12,11 @@
 namespace taclink {
 namespace {
 
-// Thickness over radius that the shell was verified for (docs/reports/stability.md).
+// Range of thickness over radius in which the shell was verified (docs/reports/stability.md).
 constexpr double kThinnest = 1e-3, kThickest = 0.2;
-constexpr double kMarkerRoom = 1.15;   // diameters between two markers' centers, for a mould to part them
-constexpr double kCenterSlack = 0.25;  // diameters that center_depth_mm may be off a dome's centroid
-constexpr double kClampShare = 0.5;    // of the decay length: nearer to a clamp, a marker hardly moves
+constexpr double kMarkerRoom = 1.15;   // diameters between two markers' centers that a mould needs
+constexpr double kCenterSlack = 0.25;  // diameters between center_depth_mm and a dome's centroid, at most
+constexpr double kClampShare = 0.5;    // of the decay length; a marker nearer to a clamp hardly moves
 
 double MidRadius(const LinkModel& model, double z_mm) {
   return model.PointAtDepth(0, z_mm, model.thickness_mm / 2).x();
@@ -51,7 +51,7 @@ void AddThickness(const LinkModel& model, std::vector<Finding>& findings) {
   findings.push_back(std::move(finding));
 }
 
-// Of the feet's distances on the wall: domes of two markers must not touch.
+// From the distances of the feet on the wall: domes of two markers must not touch.
 void AddOverlaps(const LinkModel& model, const SkinGeometry& rest, std::vector<Finding>& findings) {
   const int paths = model.markers.paths, rings = model.markers.rings();
   double nearest = std::numeric_limits<double>::infinity();
@@ -149,7 +149,7 @@ void AddTubeClearance(const LinkModel& model, const SkinDesign& design, std::vec
   findings.push_back(AtMarker(model, model.MarkerIndex(0, ring), std::move(finding)));
 }
 
-// A dent decays over sqrt(R t) to either side of the contact; markers further apart may all miss it.
+// A dent decays over sqrt(R t) on either side of the contact; markers further apart may miss it.
 void AddSpacing(const LinkModel& model, double contact_mm, std::vector<Finding>& findings) {
   const auto& z = model.markers.rings_z_mm;
   struct Widest {

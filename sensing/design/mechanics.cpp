@@ -10,14 +10,14 @@
 namespace taclink {
 namespace {
 
-constexpr int kScan = 20;                   // steps from no pressure to the most
-constexpr int kBisections = 7;              // of one step
+constexpr int kScan = 20;                   // steps from zero to the highest pressure
+constexpr int kBisections = 7;              // halvings of one step
 constexpr double kMostGrowth = 0.5;         // of the radius
-constexpr double kPressureSigmaMpa = 5e-5;  // as the server assumes of a pressure sensor
-// Coarser along, forces beside a clamp come out a quarter too high.
+constexpr double kPressureSigmaMpa = 5e-5;  // as the server assumes for a pressure sensor
+// A mesh that is coarser along the axis overestimates forces beside a clamp by a quarter.
 constexpr int kPushRefinement = 1, kPushRefinementAlong = 2;
 constexpr double kPushStepMm = 3;                                               // in length units
-constexpr std::array<double, 6> kDepthShares = {0.15, 0.3, 0.45, 0.6, 0.8, 1};  // of the way to the tube
+constexpr std::array<double, 6> kDepthShares = {0.15, 0.3, 0.45, 0.6, 0.8, 1};  // of the distance to the tube
 
 bool Stands(const NonlinearShell& shell, double pressure_mpa) {
   const auto skin = Inflate(shell, pressure_mpa);
@@ -30,7 +30,7 @@ bool Stands(const NonlinearShell& shell, double pressure_mpa) {
   return true;
 }
 
-// The first pressure of a scan that the skin does not stand, and then by bisection towards the one before.
+// Scans from zero pressure to the first failure, then bisects that step.
 std::optional<double> FirstLost(const NonlinearShell& shell, double most_mpa) {
   double stands = 0;
   for (int i = 1; i <= kScan; ++i) {
@@ -58,7 +58,7 @@ double LongestOutward(const LinkModel& model, const Eigen::VectorXd& markers_mm)
   return longest;
 }
 
-// Of loads at the ring's row of sites, all around.
+// The largest limit over the ring's row of sites.
 void WriteLeastForces(const SkinMechanics& mechanics, const DetectionLimits& limits, SkinForces& forces) {
   const int along = mechanics.mesh().refinement_along, columns = mechanics.columns();
   for (size_t ring = 0; ring < forces.by_ring.size(); ++ring) {
@@ -91,7 +91,7 @@ void FindLeastForces(SkinEstimator& estimator, const std::vector<MarkerResolutio
   WriteLeastForces(estimator.mechanics(), estimator.Limits(), forces);
 }
 
-// The ring that answers pushes alike because the skin is its own mirror image about mid-length; else itself.
+// The ring with the same response, if the skin is symmetric about mid-length; else `ring` itself.
 int MirroredRing(const LinkModel& model, int ring) {
   constexpr int kSamples = 32;
   constexpr double kAlike = 1e-6;  // of the length
@@ -108,7 +108,7 @@ int MirroredRing(const LinkModel& model, int ring) {
   return model.markers.rings() - 1 - ring;
 }
 
-// Until the force falls, or the way ends. Depths count from the surface under the loads.
+// Until the force falls or the last depth is reached. The range counts from the surface under the loads.
 void FindRange(const LinkModel& model, LoadedSkin& skin, int ring, double disc_diameter_mm,
                RingForce& force) {
   const int marker = model.MarkerIndex(0, ring);
@@ -168,7 +168,7 @@ std::optional<WeightSag> FindWeightSag(SkinMechanics& mechanics, double pressure
   for (const double area_mm2 : mechanics.mesh().areas_mm2) sag.mass_kg += model.MassPerArea() * area_mm2;
   const UntouchedSkin* weightless = mechanics.Untouched({pressure_mpa, Vec3::Zero()});
   if (weightless == nullptr) return sag;
-  const Eigen::VectorXd before_mm = weightless->markers_mm;  // it is valid until the next call
+  const Eigen::VectorXd before_mm = weightless->markers_mm;  // `weightless` is valid until the next call
   for (const Attitude attitude : kAttitudes) {
     const UntouchedSkin* skin =
         mechanics.Untouched({pressure_mpa, kStandardGravity * WeightDirection(attitude)});

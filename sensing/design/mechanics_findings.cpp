@@ -10,8 +10,8 @@ namespace taclink {
 namespace {
 
 constexpr double kKpaPerMpa = 1e3;
-constexpr double kSensorScatterMpa = 5e-5;  // of pressure readings about zero
-constexpr double kFelt = 3;                 // standard deviations of a marker that a sag must have to count
+constexpr double kSensorScatterMpa = 5e-5;  // scatter of pressure readings at zero
+constexpr double kFelt = 3;                 // sag that is noticeable, in standard deviations of a marker
 
 void AddPressureLimits(const SkinDesign& design, std::vector<Finding>& findings) {
   const LinkModel& model = design.model;
@@ -29,7 +29,7 @@ void AddPressureLimits(const SkinDesign& design, std::vector<Finding>& findings)
       away.what +=
           limit <= wanted ? ", within its working range of " : ", hardly beyond its working range of ";
       away.what += Digits(wanted) + " kPa";
-      // Of a membrane, that pressure goes as E t / R.
+      // For a membrane this pressure is proportional to E t / R.
       const double factor = kPressureReserve * wanted / limit;
       away.change = "a wall of at least " + Decimals(factor * model.thickness_mm) +
                     " mm, or a modulus of at least " + Digits(factor * model.material.youngs_modulus_mpa) +
@@ -76,7 +76,7 @@ void AddLeastForce(const SkinDesign& design, const SkinForces& forces, std::vect
     most_n = *least_n;
   }
   if (worst < 0) return;
-  // A slack skin feels best: what even that does not feel, the link never feels.
+  // A slack skin is the most sensitive: a force that it does not detect is never detected.
   const bool is_slack = forces.loads == KnownLoads{};
   Finding finding{.severity = weak == 0  ? Severity::kNote
                               : is_slack ? Severity::kFault
@@ -91,7 +91,7 @@ void AddLeastForce(const SkinDesign& design, const SkinForces& forces, std::vect
   if (weak > 0) {
     finding.what += ": more than the " + Digits(design.options.least_force_n) + " N that are wanted, at " +
                     std::to_string(weak) + " of " + std::to_string(model.markers.rings()) + " rings";
-    // A small dent's force goes as E t^2.
+    // The force of a small dent is proportional to E t^2.
     const double factor = design.options.least_force_n / most_n;
     finding.change = "a wall of at most " + Decimals(model.thickness_mm * std::sqrt(factor)) +
                      " mm, or a modulus of at most " + Digits(model.material.youngs_modulus_mpa * factor) +
@@ -109,7 +109,7 @@ void AddRange(const SkinDesign& design, const SkinForces& forces, std::vector<Fi
   int worst = -1;
   double least_mm = 0;
   for (size_t ring = 0; ring < forces.by_ring.size(); ++ring) {
-    if (!forces.by_ring[ring].range_mm) continue;  // not solved: nothing is known of it
+    if (!forces.by_ring[ring].range_mm) continue;  // not solved: unknown
     const double mm = *forces.by_ring[ring].range_mm;
     if (worst >= 0 && mm >= least_mm) continue;
     worst = static_cast<int>(ring);

@@ -8,17 +8,17 @@
 
 namespace taclink {
 
-/// How well the cameras tell where a marker is.
+/// Uncertainty of a marker's position as measured by the cameras.
 struct MarkerResolution {
   Mat3 information = Mat3::Zero();  ///< 1/mm^2, link frame; rank 2: one camera sees it, 0: none
-  /// Standard deviations of R, of phi times R and of Z, mm [duong2021, (4.16)-(4.19)]. None: fewer than two
-  /// cameras see the marker, and its depth is not measured.
+  /// Standard deviations of R, phi R and Z, mm [duong2021, (4.16)-(4.19)]. None: fewer than two cameras see
+  /// the marker, so that its depth is not measured.
   std::optional<Vec3> sigmas_mm;
 };
 
-/// By marker, of those that are seen: least squares of both images [hartley1997], whose positions have a
-/// standard deviation of `sigma_px` along each axis, with the nominal cameras. A marker in the plane of the
-/// two cameras' centers is told by neither: its sigmas are infinite.
+/// By marker: least squares of both images [hartley1997] with the nominal cameras, for image positions with a
+/// standard deviation of `sigma_px` along each axis. Where the images do not determine the position (on the
+/// line through both cameras' centers), the sigmas are infinite.
 std::vector<MarkerResolution> FindResolution(const LinkModel& model, const SkinGeometry& geometry,
                                              const SkinVisibility& visibility, double sigma_px);
 

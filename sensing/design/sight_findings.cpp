@@ -1,4 +1,4 @@
-// Findings about what the cameras see of the markers, and how well.
+// Findings about the visibility of the markers and the accuracy of their positions.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -13,19 +13,19 @@
 namespace taclink {
 namespace {
 
-constexpr double kSmallGapPx = 1;       // outlines nearer to each other grow together with noise and blur
-constexpr double kFlatPx = 1;           // a marker's smaller side
-constexpr double kCoarseShare = 0.3;    // of the thickness: a marker's standard deviation
-constexpr double kGrazingShare = 0.25;  // of the height of a dome's centroid
+constexpr double kSmallGapPx = 1;                  // outlines that are closer merge with noise and blur
+constexpr double kFlatPx = 1;                      // shorter side of a marker, at least
+constexpr double kCoarseShare = 0.3;               // standard deviation of a marker, over the thickness
+constexpr double kGrazingShare = 0.25;             // clearance, over the height of a dome's centroid
 constexpr double kCentroidHeight = 2 / (3 * kPi);  // of a dome, over its diameter
-constexpr double kFurthestOut = 0.5;               // of the skin's length, that a camera may be moved
+constexpr double kFurthestOut = 0.5;               // largest shift of a camera, over the skin's length
 constexpr int kShiftBisections = 8;
 
-// What is wrong with the markers of one camera, for one reason.
+// Markers that one camera does not see, for one reason.
 struct SightGroup {
   std::vector<int> markers;
-  bool is_whole_ring = false;  // all markers of one
-  bool is_unseen = false;      // one that the other camera does not see either
+  bool is_whole_ring = false;  // a whole ring is among them
+  bool is_unseen = false;      // a marker that the other camera does not see either is among them
 };
 
 SightGroup GroupOf(const LinkModel& model, const SkinVisibility& visibility, CameraId id, Sight sight) {
@@ -68,7 +68,7 @@ const char* IdOf(Sight sight) {
   return "";
 }
 
-// By how much a camera has to be moved out for all of these to be in its image; none: that does not help.
+// Outward shift of a camera that brings all of these into its image; none: no shift does.
 std::optional<double> ShiftToSee(const LinkModel& model, CameraId id, const std::vector<int>& markers) {
   const SkinGeometry rest = RestGeometry(model);
   const auto helps = [&](double mm) {
@@ -88,7 +88,7 @@ std::optional<double> ShiftToSee(const LinkModel& model, CameraId id, const std:
   return high;
 }
 
-// The largest tube whose block lets the lines of sight to these markers pass.
+// The largest tube whose block leaves the lines of sight to these markers free.
 double TubeToSee(const LinkModel& model, CameraId id, const std::vector<int>& markers) {
   const Projector camera(model.nominal_rig[id]);
   const SkinGeometry rest = RestGeometry(model);
@@ -126,7 +126,7 @@ std::string LoadsText(const DesignState& state) {
   return state.loads == KnownLoads{} ? "" : " under " + Digits(state.loads.pressure_mpa * 1e3) + " kPa";
 }
 
-// `before`: the slack skin; what is no worse than there is not said again.
+// `before`: the slack skin; only what is worse than there is reported.
 void AddUnseen(const SkinDesign& design, const DesignState& state, const DesignState* before,
                std::vector<Finding>& findings) {
   const LinkModel& model = design.model;
@@ -181,7 +181,7 @@ void AddSizes(const SkinDesign& design, CameraId id, std::vector<Finding>& findi
                  Decimals(size, 2) + " x " + Decimals(views[static_cast<size_t>(smallest)].smaller_px(), 2) +
                  " px; " + Digits(least) + " px across are needed";
   if (too_small > 0) {
-    // The size goes with the diameter, and against the distance along the axis.
+    // The size is proportional to the diameter, and inversely to the distance along the axis.
     const double z = model.markers.rings_z_mm[static_cast<size_t>(model.RingOf(smallest))];
     const double camera_z = model.nominal_rig[id].camera_from_link.Inverse().translation.z();
     const double shorter = std::abs(z - camera_z) * (1 - size / least);
@@ -280,7 +280,7 @@ void AddMargins(const SkinDesign& design, CameraId id, std::vector<Finding>& fin
   findings.push_back(AtMarker(model, worst, std::move(finding)));
 }
 
-// Of a camera's own end: the other end is far from it and seen, or hidden, which is another finding.
+// Only for each camera's own end: the far end is seen, or hidden, which is another finding.
 void AddBlindZones(const SkinDesign& design, std::vector<Finding>& findings) {
   const LinkModel& model = design.model;
   const SkinVisibility& seen = design.slack.visibility;

@@ -34,8 +34,8 @@ std::vector<Vec2> RestWall(const LinkModel& model) {
   return wall;
 }
 
-// A curve of radius over z, at the rows of the grid. Its points are in the order of z but for folds, which
-// are flattened.
+// Resamples a curve of radius over z at the rows of the grid. Points are in the order of z except for folds,
+// which are flattened.
 std::vector<double> OverZ(const std::vector<Vec2>& curve, double length_mm) {
   std::vector<double> radius;
   size_t i = 0;
@@ -80,7 +80,8 @@ SkinGeometry RestGeometry(const LinkModel& model) {
   return geometry;
 }
 
-// The displacement of the mesh's rows is interpolated, not their places: rows are far apart on a curved wall.
+// Interpolates the displacements of the mesh's rows, not their positions: rows are far apart on a curved
+// wall.
 SkinGeometry DeformedGeometry(const LinkModel& model, const ShellMesh& mesh, const ShellState& state) {
   SkinGeometry geometry = EmptyGeometry(model, mesh.columns);
   const double half_mm = model.thickness_mm / 2;

@@ -11,9 +11,9 @@ namespace taclink {
 namespace {
 
 constexpr int kDomeLatitudes = 6, kDomeLongitudes = 16;  // samples of a dome
-constexpr int kSightSamples = 256;                       // of a line of sight
-constexpr double kCenterHeight = 4 / (3 * kPi);          // of a half disc's centroid, times the radius
-// A wall this close beyond the line of sight hides less than half a dome.
+constexpr int kSightSamples = 256;                       // samples of a line of sight
+constexpr double kCenterHeight = 4 / (3 * kPi);          // of a half disc's centroid, in radii
+// A wall that reaches this far over the line of sight hides less than half a dome.
 constexpr double kGrazingMm = 0.02;
 constexpr int kBlindSamples = 400, kBlindAngles = 24;
 
@@ -21,7 +21,7 @@ struct Outline {
   Vec2 center = Vec2::Zero();
   std::vector<Vec2> points;
 
-  /// The farthest that it reaches from its center in a direction.
+  /// Largest extent from its center in a direction.
   double Reach(const Vec2& direction) const {
     double reach = 0;
     for (const Vec2& p : points) reach = std::max(reach, (p - center).dot(direction));
@@ -29,7 +29,7 @@ struct Outline {
   }
 };
 
-// Unprojected parts are left out: the outline is whole only if all samples project.
+// None unless all samples project: a partial outline would be too small.
 std::optional<Outline> OutlineOf(const Projector& camera, const SkinGeometry& geometry, int marker) {
   const auto m = static_cast<size_t>(marker);
   const Vec3& up = geometry.inward[m];
@@ -54,8 +54,8 @@ std::optional<Outline> OutlineOf(const Projector& camera, const SkinGeometry& ge
   return outline;
 }
 
-// The least distance from the wall to the line between a point and a camera, where that is between the
-// skin's ends; infinite where it is nowhere.
+// Smallest distance between the wall and the line from a point to a camera, where it is between the skin's
+// ends; infinite where it is nowhere.
 double ClearanceMm(const SkinGeometry& geometry, const Vec3& point, const Vec3& camera) {
   double least = std::numeric_limits<double>::infinity();
   for (int i = 1; i < kSightSamples; ++i) {
@@ -113,8 +113,8 @@ MarkerView ViewOf(const Projector& camera, const SkinGeometry& geometry, int mar
   return view;
 }
 
-// Convex outlines are apart by the widest gap along any axis; these three are enough for ellipses that lie
-// along or across the image's radius.
+// Distance of convex outlines by separating axes: the widest gap along any axis. These three axes suffice for
+// ellipses that lie along or across the image radius.
 double GapPx(const Outline& a, const Outline& b, const Vec2& principal_point) {
   const Vec2 between = b.center - a.center;
   const Vec2 along = (0.5 * (a.center + b.center) - principal_point).normalized();
@@ -126,7 +126,7 @@ double GapPx(const Outline& a, const Outline& b, const Vec2& principal_point) {
   return gap;
 }
 
-// Of neighbors on the grid.
+// Gaps and occlusion between neighbors on the grid.
 void CompareNeighbors(const LinkModel& model, const Projector& camera, const SkinGeometry& geometry,
                       const std::vector<std::optional<Outline>>& outlines, std::vector<MarkerView>& views) {
   const Vec3& eye = camera.center_in_link();
@@ -169,7 +169,7 @@ bool SeesWall(const Projector& camera, const SkinGeometry& geometry, double z_mm
          !IsBehindTube(geometry, point, camera.center_in_link());
 }
 
-// From either end to the first row that is seen on all sides.
+// Length from either end to the first row that is seen at all angles.
 template <typename Sees>
 BlindZone BlindOf(double length_mm, Sees sees) {
   const auto from_end = [&](bool top) {
