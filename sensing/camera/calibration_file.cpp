@@ -18,7 +18,7 @@ namespace taclink {
 namespace {
 
 constexpr int kFormatVersion = 3;
-constexpr int kWithIdentity = 3;  // the first version that has one
+constexpr int kWithIdentity = 3;  // first version with an identity
 constexpr std::string_view kSerial = "serial:";
 
 // Written for people; read only to be checked.
@@ -61,13 +61,13 @@ std::string SigmasText(const CameraCalibration& one, const std::string& indent) 
   return out.str();
 }
 
-// Of where the markers lie and how large the images are: what a calibration of another skin, or at another
-// resolution, differs in. A material may change.
+// Fingerprint of marker positions and image sizes: a calibration of another skin or resolution differs in it.
+// The material may change.
 std::string SkinFingerprint(const LinkModel& model) {
   std::string text;
   for (int m = 0; m < model.markers.count(); ++m) {
     const Vec3 p = model.RestMarker(m);
-    // Rounded to 1 um, off the decimals that model files are written in, so that machines agree.
+    // Rounded to 1 um with an offset from the decimals of model files, so that all machines agree.
     for (const double mm : {p.x(), p.y(), p.z()}) text += std::to_string(std::lround(1e3 * mm + 0.137)) + " ";
   }
   for (const CameraId id : kBothCameras) {
@@ -77,7 +77,7 @@ std::string SkinFingerprint(const LinkModel& model) {
   return Fingerprint(text);
 }
 
-// Of the file without the lines that it does not cover.
+// Fingerprint of the file without the `link` and `hash` lines.
 std::string FileHash(std::string_view content) {
   std::string covered;
   while (!content.empty()) {

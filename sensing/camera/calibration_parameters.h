@@ -9,8 +9,8 @@
 
 namespace taclink {
 
-/// Of both cameras of the last one of `calibrations`, which have the same lens kinds. `nominal`: the model's.
-/// None of none.
+/// Parameters of both cameras in the last of `calibrations`, with the scatter over all of them; all have the
+/// same lens kinds. `nominal`: the model's cameras. Empty without calibrations.
 std::vector<CalibrationParameter> ParametersOf(std::span<const CalibrationSummary> calibrations,
                                                const StereoRig& nominal);
 

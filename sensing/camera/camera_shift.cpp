@@ -14,7 +14,7 @@
 namespace taclink {
 namespace {
 
-using Motion = Eigen::Matrix<double, 6, 1>;  // as the first of a CameraStep: rotation vector, place
+using Motion = Eigen::Matrix<double, 6, 1>;  // first part of a CameraStep: rotation vector, position
 using Information = Eigen::Matrix<double, 6, 6>;
 
 constexpr size_t kLeastPoints = 20;
@@ -29,7 +29,7 @@ struct NormalEquations {
   Motion gradient = Motion::Zero();
 };
 
-// Of one axis, robust: the median of absolute residuals.
+// Robust noise of one image axis, from the median of absolute residuals.
 double NoisePx(const std::vector<Vec2>& residuals) {
   std::vector<double> sizes;
   for (const Vec2& one : residuals) {

@@ -15,12 +15,12 @@ struct CalibrationParameter {
   std::string name;
   std::string unit;  ///< "mm", "rad", "px", "px^-2", "px^-4", "1"
   double value = 0;
-  double sigma = 0;  ///< standard deviation by the fit; 0: it does not tell
-  /// Over repeated calibrations: mean, and standard deviation (n - 1). None: fewer than two.
+  double sigma = 0;  ///< standard deviation from the fit; 0: unknown
+  /// Mean and standard deviation (n - 1) over repeated calibrations. None: fewer than two.
   std::optional<double> mean = {}, scatter = {};
 };
 
-/// By how much a camera has moved in the link frame and turned, each with its standard deviation.
+/// Displacement of a camera in the link frame, and its rotation, each with its standard deviation.
 struct CameraShift {
   double moved_mm = 0, moved_sigma_mm = 0;
   double turned_rad = 0, turned_sigma_rad = 0;

@@ -15,15 +15,15 @@ namespace taclink {
 namespace {
 
 constexpr size_t kLeastSamples = 20;
-constexpr double kMostShares = 0.9;     // of all terms: a skin that flows is none
-constexpr double kLeastDeviations = 3;  // of a share, to be told from noise
-constexpr double kMostTimeSigma = 1;    // of a time constant's logarithm
+constexpr double kMostShares = 0.9;     // sum over all terms, at most: beyond it the skin would flow
+constexpr double kLeastDeviations = 3;  // of a share, to be distinguished from noise
+constexpr double kMostTimeSigma = 1;    // standard deviation of a time constant's logarithm, at most
 constexpr double kSchwarzGain = 10;     // "very strong" [kass1995]
 constexpr int kMostIterations = 30, kGridTimes = 4;
-constexpr double kFirstShare = 0.03;  // to start from
-constexpr double kLeastGain = 1e-6;   // of chi^2, of an iteration
+constexpr double kFirstShare = 0.03;  // initial value
+constexpr double kLeastGain = 1e-6;   // relative decrease of chi^2 in an iteration, at least
 
-// Shares and logarithms of time constants, in turn.
+// `parameters`: shares and logarithms of time constants, alternating.
 Relaxation SeriesOf(const Eigen::VectorXd& parameters) {
   Relaxation series;
   for (Eigen::Index i = 0; i + 1 < parameters.size(); i += 2)
@@ -41,7 +41,7 @@ bool IsSeries(const Eigen::VectorXd& parameters, double least_s, double most_s) 
   return sum < kMostShares;
 }
 
-// What the records' forces are off the series with the best gains, all records in a column.
+// Residuals of all records in one column, with the best gain for each record.
 Eigen::VectorXd Residuals(std::span<const RelaxationRecord> records, const Relaxation& series) {
   size_t count = 0;
   for (const RelaxationRecord& record : records) count += record.samples.size();
@@ -128,7 +128,7 @@ SeriesFit BestOf(std::span<const RelaxationRecord> records, const std::vector<Ei
   return best;
 }
 
-// Of one term from a grid of time constants, and of two from half of that and the grid.
+// One term, from a grid of time constants; and two terms, from half the first one and the grid.
 std::pair<SeriesFit, SeriesFit> FitSeries(std::span<const RelaxationRecord> records, double least_s,
                                           double most_s) {
   std::vector<Eigen::VectorXd> starts;
@@ -143,8 +143,8 @@ std::pair<SeriesFit, SeriesFit> FitSeries(std::span<const RelaxationRecord> reco
   return {std::move(one), std::move(two)};
 }
 
-// By how much the variance of a mean of residuals is more than that of independent ones: of a process of
-// first order with the correlation that neighbors have.
+// Variance of a mean of residuals relative to that of independent residuals, for a first-order process with
+// the correlation of successive residuals.
 double VarianceFactor(const Eigen::VectorXd& residuals) {
   const Eigen::Index n = residuals.size() - 1;
   const double correlation = std::clamp(
@@ -178,7 +178,7 @@ std::optional<Error> Objection(std::span<const RelaxationRecord> records) {
   return std::nullopt;
 }
 
-// The shortest and the longest time constant that records may show.
+// The shortest and the longest time constant that the records can show.
 std::pair<double, double> TimesOf(std::span<const RelaxationRecord> records) {
   double shortest_s = std::numeric_limits<double>::infinity(), longest_s = 0;
   for (const RelaxationRecord& record : records) {
@@ -196,7 +196,7 @@ std::string Evidence(const SeriesFit& fit, size_t records, Eigen::Index samples,
   return text;
 }
 
-// Why the records do not tell this term. None: they do.
+// Why the records do not determine this term. None: they do.
 std::optional<Error> TermObjection(const RelaxationTerm& term, double sigma, double time_sigma) {
   char text[256];
   if (!(term.share > kLeastDeviations * sigma)) {

@@ -9,29 +9,29 @@
 
 namespace taclink {
 
-/// A body that pressed the skin, was held and was taken off again, as often as it may be; the skin had rested
+/// Forces of a body that pressed the skin, was held and was removed, once or more often. The skin was relaxed
 /// before the first sample.
 struct RelaxationRecord {
   struct Sample {
     double time_s = 0;
-    double apparent_n = 0;   ///< as a model without Relaxation estimates it from the skin's shape
-    double reference_n = 0;  ///< as a force sensor, or a weight, has it
+    double apparent_n = 0;   ///< estimated from the skin's shape by a model without Relaxation
+    double reference_n = 0;  ///< from a force sensor or a weight
   };
-  std::string name{};  ///< for messages: a file
+  std::string name{};  ///< for messages, such as a file name
   std::vector<Sample> samples{};
 };
 
-/// Fits the Prony series with which a skin creeps to records of loads that were held and removed: the
-/// apparent force is the reference's, as RelaxationFilter has it creep, times a gain of each record (an error
-/// of the modulus, or of the place, is no creep). Least squares with the gains eliminated (variable
-/// projection [golub1973]), by Levenberg's and Marquardt's method from a grid of time constants; a second
-/// term only where it improves Schwarz' criterion [schwarz1978] by 10. Standard deviations are those of the
-/// shares beside everything else that was fitted, of residuals that are alike and correlated from sample to
-/// sample as they are found to be.
+/// Fits the Prony series of a creeping skin to records of loads that were held and removed. The apparent
+/// force is the reference force after creep (RelaxationFilter), times a gain of each record (an error of
+/// modulus or place is not creep). Least squares with the gains eliminated (variable projection [golub1973]),
+/// by the Levenberg-Marquardt method from a grid of time constants; a second term only if it improves
+/// Schwarz' criterion [schwarz1978] by 10. The shares' standard deviations are marginal over all fitted
+/// parameters, for residuals of equal variance with the estimated correlation of successive samples.
 ///
-/// `Relaxation::terms` rise in time. Errors: kInvalidArgument (a record whose numbers are not finite, whose
-/// times do not rise or that never presses; fewer than 20 samples), kFailedPrecondition (no creep that is
-/// told from noise, or the series is not determined by these records: what to record instead).
+/// `Relaxation::terms` are in the order of time. Errors: kInvalidArgument (a record with numbers that are not
+/// finite, times that do not rise, no positive force or a single sample; fewer than 20 samples),
+/// kFailedPrecondition (creep is not distinguishable from noise, or the records do not determine the series;
+/// the message says what to record instead).
 Result<Relaxation> FitRelaxation(std::span<const RelaxationRecord> records);
 
 }  // namespace taclink

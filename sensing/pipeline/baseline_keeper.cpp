@@ -132,7 +132,7 @@ void BaselineKeeper::Tell(const FrameTimes& times, LinkState& state, const Clock
   state.baseline_age_s = AgeS(times, clock);
 }
 
-// A dent that recovers is no drift: it would be taken off twice.
+// Not while a dent recovers: its recovery would be subtracted twice.
 void BaselineKeeper::FollowDrift(const FrameTimes& times, const LinkState& state, bool is_recovering,
                                  const Clock& clock) {
   // Degraded by nothing but the drift itself.

@@ -27,7 +27,7 @@ class BaselineKeeper {
 
   /// A baseline was taken from these markers, under these loads, the newest of its frames at `times`. Times
   /// are those of frames, so that pictures solved again later tell the same; the clock's for frames without.
-  /// `calibrated_utc_ns`: when its cameras were calibrated, 0: not known; none: from the same images.
+  /// `calibrated_utc_ns`: calibration time of its cameras, 0: unknown; none: calibrated from the same images.
   void Take(BaselineOrigin origin, const LabelledMarkers& markers, const KnownLoads& loads,
             const FrameTimes& times, const Clock& clock, std::optional<int64_t> calibrated_utc_ns);
   /// How far the untouched skin has gone since, by marker; empty: that is not followed.
@@ -74,7 +74,7 @@ class BaselineKeeper {
     KnownLoads loads;
     DriftFollower follower;
     double shift_mm;                      // of the tare
-    std::optional<CreepHistory> history;  // of a forced one, which forgets what pressed
+    std::optional<CreepHistory> history;  // before a forced tare, which discards the contacts
   };
 
   const LinkModel model_;

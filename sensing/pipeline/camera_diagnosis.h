@@ -26,7 +26,7 @@ class CameraDiagnosis {
   explicit CameraDiagnosis(const LinkModel& model) : model_(model) {}
 
   /// The rest images were taken: their known loads, under which the skin is stable, cameras and labels.
-  /// `moved`: what the rest images themselves showed (RestResult::moved_cameras).
+  /// `moved`: motion that the rest images show (RestResult::moved_cameras).
   void Begin(SkinMechanics& mechanics, const MeasuredLoads& loads, const StereoRig& rig,
              const LabelledMarkers& rest, const std::optional<Reason>& moved);
 
@@ -50,7 +50,7 @@ class CameraDiagnosis {
   const LinkModel model_;
   StereoRig rig_;
   std::optional<CameraDrift> drift_;  // none before Begin
-  std::optional<Reason> moved_;       // since the calibration: until the next rest images
+  std::optional<Reason> moved_;       // since the calibration; kept until the next rest images
   std::optional<Reason> growth_;
   int grown_frames_ = 0;        // in a row
   int64_t grown_until_ns_ = 0;  // exposure; without another measurement the reason ends then

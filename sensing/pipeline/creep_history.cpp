@@ -9,12 +9,12 @@
 namespace taclink {
 namespace {
 
-// Of the marker grid's coarser pitch: loads of the same contact may be found at other sites.
+// In units of the coarser marker pitch: loads of the same contact may be found at other sites.
 constexpr double kReachPitches = 2.5;
-// A load leaves if less of it is real than this, and the rest explains less than LoadEstimator asks of any
-// (its kHillGain is the square).
+// A load is dropped if its real share is below kMostlyReal and its real force is below LoadEstimator's own
+// limit (kHillGain is the square of kTellingDeviations).
 constexpr double kMostlyReal = 0.5, kTellingDeviations = 4.5;
-// N in SkinMechanics' units, in all: it moves no marker by more than the cameras' noise.
+// Sum of forces in units of ForceUnit: it moves no marker by more than the cameras' noise.
 constexpr double kNegligibleN = 2e-3;
 
 double CoarserPitchMm(const LinkModel& model) {
@@ -24,7 +24,7 @@ double CoarserPitchMm(const LinkModel& model) {
   return std::max(along, model.markers.path_pitch_rad() * radius_mm);
 }
 
-// Of the real force by the elastic one.
+// `share`: real force over elastic force.
 void Scale(double share, EstimatedLoad& load) {
   for (double& inward_n : load.inward_n) inward_n *= share;
   load.tangential_n *= share;
@@ -55,7 +55,7 @@ void CreepHistory::Forget() {
   now_n_.resize(0);
 }
 
-// What the elastic skin's load has beyond the real one.
+// Elastic load less real load.
 template <typename Value>
 Value CreepHistory::ByCreep(std::optional<Known<Value>>& known, const Value& real, bool is_measured,
                             double span_s) const {
@@ -90,7 +90,7 @@ MeasuredLoads CreepHistory::Elastic(const MeasuredLoads& real, const Measured& m
   return loads;
 }
 
-// By marker, the load that its memory belongs to: the one that acts nearest. -1: none within reach.
+// By marker, the nearest load, which owns the marker's memory. -1: none within reach.
 std::vector<int> CreepHistory::OwnersOf(const LumpedForces& elastic_n) const {
   std::vector<int> owners(place_mm_.size(), -1);
   std::vector<double> nearest_mm(place_mm_.size(), reach_mm_);
@@ -138,7 +138,7 @@ void CreepHistory::MakeReal(const LumpedForces& elastic_n, std::vector<Estimated
     EstimatedLoad& load = loads[k];
     const Vec3 direction = load.force_n.norm() > 0 ? Vec3(load.force_n.normalized()) : Vec3(Vec3::Zero());
     const double sigma_n = std::sqrt(direction.dot(load.force_covariance_n2 * direction));
-    // What drags without pressing keeps its force but for what relaxes at once.
+    // A purely tangential load has no memory: only the instant response scales it.
     const double share = of.elastic_n > 0 ? instant + of.memory_n / of.elastic_n : instant;
     const bool tells = share >= kMostlyReal || share * of.elastic_n >= kTellingDeviations * sigma_n;
     if (!(share > 0 && tells)) continue;

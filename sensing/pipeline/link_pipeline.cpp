@@ -281,7 +281,7 @@ struct LinkPipeline::Stages {
     predicted_mm.clear();
   }
 
-  // Of the cameras of the rest images that were taken; none: calibrated from these.
+  // Calibration time of the cameras in use; none: calibrated from the rest images.
   std::optional<int64_t> CalibratedUtcNs() const {
     if (rest_origin != BaselineOrigin::kStart || !options.rig) return std::nullopt;
     return options.calibrated_utc_s * 1'000'000'000;
@@ -294,7 +294,7 @@ struct LinkPipeline::Stages {
   // Nobody tells the specific force: the link keeps the attitude in which its rest images were taken.
   static bool NeverMoves(const StereoFrame& frame) { return !frame.specific_force; }
 
-  // Once a frame.
+  // Call once a frame: advances the creep history.
   MeasuredLoads TakeLoads(const StereoFrame& frame) {
     MeasuredLoads measured{
         .pressure_mpa = frame.pressure.stale ? frame.pressure.mpa

@@ -21,7 +21,7 @@ namespace taclink {
 struct PipelineOptions {
   /// Camera parameters of this very link; none: found from the rest pictures.
   std::optional<StereoRig> rig;
-  /// When `rig` was calibrated, since 1970-01-01; 0: not known.
+  /// Calibration time of `rig`, since 1970-01-01; 0: unknown.
   int64_t calibrated_utc_s = 0;
   /// Gauge pressure where the source does not measure it. None: nobody tells it, and forces are degraded.
   std::optional<double> pressure_mpa;

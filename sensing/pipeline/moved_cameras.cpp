@@ -13,8 +13,8 @@
 namespace taclink {
 namespace {
 
-// A wider skin looks like cameras that have come closer, by about twice the widening; the model's inflation
-// is wrong by 5 % (see CameraDiagnosis).
+// A wider skin looks like cameras that moved closer by about twice the widening; the model's inflation has an
+// error of 5 % (see CameraDiagnosis).
 constexpr double kShiftOfWidening = 2 * 0.05;
 
 double MeanWideningMm(const RestShape& rest) {

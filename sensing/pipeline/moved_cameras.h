@@ -9,9 +9,9 @@
 
 namespace taclink {
 
-/// Whether a camera has moved since its calibration, by rest images of the untouched skin: it was mounted
-/// again, or knocked. `rig`: as calibrated. None: neither has, as far as the images tell (see IsLarge); of an
-/// inflated skin, whose model's inflation is wrong by some percent, they tell less.
+/// Detects cameras that moved since their calibration (mounted again, or knocked), from rest images of the
+/// untouched skin. `rig`: as calibrated. None: no large motion (see IsLarge). Less sensitive for an inflated
+/// skin, whose modeled inflation has an error of some percent.
 std::optional<Reason> FindMovedCameras(const RestShape& rest, const StereoRig& rig,
                                        const LabelledMarkers& labels);
 

@@ -36,7 +36,7 @@ struct RestResult {
   /// it is off the model's projection stands in.
   double noise_px = 0;
   MeasuredLoads loads;  ///< as the images show them
-  /// Of known cameras: they have moved since their calibration.
+  /// With known cameras: their motion since the calibration.
   std::optional<Reason> moved_cameras = {};
 };
 

@@ -22,8 +22,8 @@ class SkinStage {
             const CameraEvidenceOptions& options, double noise_px = 0);
 
   /// Takes the markers of the untouched skin (means over frames, with the means' covariances), under known
-  /// loads; `untouched_mm`: what these do, stacked; `residual_mm`: how far the dents of former contacts
-  /// put markers off that, which is no part of the baseline; empty: not.
+  /// loads. `untouched_mm`: displacements by these loads, stacked; `residual_mm`: further displacements by
+  /// dents of former contacts, which are not part of the baseline; empty: none.
   void SetBaseline(const LabelledMarkers& rest, const MeasuredLoads& loads,
                    const Eigen::VectorXd& untouched_mm, const Eigen::VectorXd& residual_mm = {});
   /// Takes what is seen now as the untouched skin; markers that `now` does not show keep their baseline.

@@ -35,14 +35,14 @@ class StateEstimator {
  public:
   StateEstimator(const LinkModel& model, const ForceOptions& options);
 
-  /// Begins a frame of a link that is followed in time, once, before Estimate: the measured loads become
-  /// those that Estimate takes (CreepHistory::Elastic). Without it forces are those of the elastic skin,
-  /// E(0).
+  /// Begins a frame of a link that is followed in time; call once, before Estimate. Converts the measured
+  /// loads to those that Estimate takes (CreepHistory::Elastic). Without this call, forces are those of the
+  /// elastic skin with E(0).
   MeasuredLoads BeginFrame(const MeasuredLoads& loads, const CreepHistory::Measured& measured,
                            int64_t exposure_ns) {
     return creep_.Elastic(loads, measured, exposure_ns);
   }
-  /// Ends it: what was estimated has acted on the skin. Not for an answer that is withheld.
+  /// Ends the frame: adds its estimate to the creep history. Not for an answer that is withheld.
   void EndFrame() { creep_.Advance(); }
   /// Uses `shape`'s measured displacements, from the baseline, and its sources; sets the rest of it, where it
   /// can. Where it can't, the forces are not converged, and the shape is what is measured: what was not stays
@@ -55,27 +55,27 @@ class StateEstimator {
   /// them the ids of those of the call before.
   void FindContacts(ContactFinder& finder, const SkinShape& shape, const NodalForces& forces,
                     std::vector<Contact>& contacts);
-  /// Writes what was estimated of the real known loads last; nothing where there is no answer.
+  /// Writes the last estimate of the real known loads; nothing without an answer.
   void WriteKnownLoads(LinkState& state) const;
   /// How far what is not known of the specific force may put a marker off, one standard deviation, of the
   /// marker that it puts off most, mm; of the last estimate. 0: it is known, or there is no answer.
   double AttitudeErrorMm();
-  /// Forgets the frames before, and what has acted on the skin.
+  /// Forgets the frames before, and the creep history.
   void Restart() {
     skin_.Restart();
     creep_.Forget();
   }
-  /// Goes on with what another estimator of the same model knows to have acted on the skin.
+  /// Continues with the creep history of another estimator of the same model.
   void TakeHistory(const StateEstimator& other) { creep_ = other.creep_; }
-  /// What has acted on the skin, to be restored.
+  /// The creep history, for Restore.
   const CreepHistory& history() const { return creep_; }
   void Restore(const CreepHistory& history) { creep_ = history; }
   /// See CreepHistory::ForgetContacts.
   void ForgetContacts() { creep_.ForgetContacts(); }
-  /// Dents of former contacts remain that would be drift to who does not know of them.
+  /// Dents of former contacts remain, which look like drift without the history.
   bool IsRecovering() const { return creep_.ResidualInward().size() > 0; }
-  /// How far these put the markers off the untouched skin under these loads, stacked, mm, to first order.
-  /// Empty: by nothing that matters, or there is no such skin.
+  /// Displacements of the markers by these dents from the untouched skin under these loads, stacked, mm, to
+  /// first order. Empty: negligible, or there is no such skin.
   Eigen::VectorXd ResidualMm(const KnownLoads& loads);
 
   /// Of the last call.

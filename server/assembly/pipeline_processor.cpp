@@ -13,8 +13,8 @@ namespace {
 
 constexpr int64_t kNsPerS = 1'000'000'000;
 
-// By the markers' images alone: position, tilt and lens trade off against each other from one fit to the
-// next.
+// Compares the markers' images, not the parameters: position, tilt and lens are correlated and vary together
+// between fits.
 std::optional<CameraMove> MoveBetween(const LinkModel& model, const CameraModel& before,
                                       const CameraModel& now) {
   const Projector projector(now);
@@ -35,8 +35,8 @@ PipelineProcessor::PipelineProcessor(const LinkModel& model, const PipelineOptio
 
 void PipelineProcessor::Process(const StereoFrame& frame, LinkState& state) {
   pipeline_.Process(frame, state);
-  // Where no forces are known the rest pictures themselves must show that nothing touches: a calibration is
-  // what mends that.
+  // Without forces, the rest images themselves must show that nothing touches: calibration must remain
+  // possible then.
   touched_ = !state.contacts.empty();
   calibrated_utc_ns_ = state.baseline.calibrated_utc_ns;
 }
@@ -70,7 +70,7 @@ CalibrationProgress PipelineProcessor::PollCalibration() {
     pipeline_.CancelRest();
     progress.end = run_.done.empty() ? Error{ErrorCode::kFailedPrecondition, why} : Finish(why);
   } else if (rest.taken == rest.wanted) {
-    run_.done.push_back(*pipeline_.calibration());  // complete rest pairs have given it
+    run_.done.push_back(*pipeline_.calibration());  // set by the complete rest pairs
     if (done + 1 < run_.order.repeats) {
       pipeline_.BeginRest(run_.order.pairs);
     } else {

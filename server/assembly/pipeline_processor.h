@@ -13,11 +13,11 @@
 
 namespace taclink::server {
 
-/// Frames through a LinkPipeline, which a calibration gives new cameras and a new rest shape.
+/// Passes frames through a LinkPipeline; a calibration replaces its cameras and rest shape.
 class PipelineProcessor final : public LinkProcessor {
  public:
-  /// `file`: the configured calibration file; none: nothing can be saved. `identity`: of the link, without a
-  /// time.
+  /// `file`: the configured calibration file; none: saving is not possible. `identity`: of the link, without
+  /// the time.
   PipelineProcessor(const LinkModel& model, const PipelineOptions& options, std::optional<std::string> file,
                     CalibrationIdentity identity);
 
@@ -35,12 +35,12 @@ class PipelineProcessor final : public LinkProcessor {
   void CancelCalibration() override { pipeline_.CancelRest(); }
 
  private:
-  /// The calibration under way.
+  /// The calibration in progress.
   struct Run {
     CalibrationOrder order;
     std::vector<CalibrationSummary> done;  ///< of order.repeats
-    std::optional<StereoRig> before;       ///< the cameras in use when it began
-    int64_t before_utc_ns = 0;             ///< when these were calibrated; 0: not known
+    std::optional<StereoRig> before;       ///< the cameras in use at its start
+    int64_t before_utc_ns = 0;             ///< calibration time of these; 0: unknown
   };
 
   Result<CalibrationResult> Finish(std::string ended_early) const;
