@@ -30,8 +30,8 @@ std::optional<double> NumberOfLine(std::string_view line) {
   return value;
 }
 
-// What a device has not taken is thrown away: the kernel would wait for it, half a minute long, and a device
-// that comes back would obey commands of long ago.
+// Discards the output that the device did not take: the kernel would wait for it for half a minute, and a
+// device that comes back would execute outdated commands.
 LineReader::~LineReader() {
   if (descriptor_ < 0) return;
   tcflush(descriptor_, TCOFLUSH);
@@ -50,7 +50,7 @@ LineReader& LineReader::operator=(LineReader&& other) noexcept {
   return *this;
 }
 
-// Returns the lines that have come already, else those of one read.
+// Keeps the lines that are waiting; without any, reads once.
 Result<void> LineReader::Fill(std::chrono::milliseconds timeout) {
   if (!lines_.empty()) return {};
   pollfd waiting{.fd = descriptor_, .events = POLLIN, .revents = 0};
@@ -92,7 +92,7 @@ Result<std::string> LineReader::NextInTurn(std::chrono::milliseconds timeout) {
 Result<void> LineReader::Write(const std::string& line) {
   const ssize_t put = write(descriptor_, line.data(), line.size());
   if (put == static_cast<ssize_t>(line.size())) return {};
-  // The rest of a line that went out in part would be taken for the next one: the line is opened again.
+  // The rest of a partly written line would be taken for the next one: the caller reopens the line.
   return Error{ErrorCode::kUnavailable,
                put >= 0 || errno == EAGAIN ? "its other end takes no more commands" : std::strerror(errno)};
 }

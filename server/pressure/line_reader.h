@@ -25,11 +25,11 @@ class LineReader {
   /// The newest whole line that has come; the first after opening may be a piece of one and is left out.
   /// Errors: kTimeout, kUnavailable (the other end has gone).
   Result<std::string> Next(std::chrono::milliseconds timeout);
-  /// Likewise, but each line in its turn: the oldest that was not returned. Of more than 64 that wait the
-  /// oldest are dropped.
+  /// Likewise, but returns every line in order, the oldest first. If more than 64 wait, the oldest are
+  /// dropped.
   Result<std::string> NextInTurn(std::chrono::milliseconds timeout);
-  /// Writes a whole line, or none of it. Never waits. Errors: kUnavailable (the other end takes none or has
-  /// gone).
+  /// Writes a whole line. Never waits. Errors: kUnavailable (the other end takes no more or is gone; part of
+  /// the line may have been written).
   Result<void> Write(const std::string& line);
 
  private:
@@ -37,8 +37,8 @@ class LineReader {
 
   int descriptor_ = -1;
   bool in_step_ = false;           // a line's end was seen
-  std::string text_;               // of the line that is not whole yet
-  std::deque<std::string> lines_;  // whole ones, the oldest first
+  std::string text_;               // the incomplete line
+  std::deque<std::string> lines_;  // complete lines, oldest first
 };
 
 }  // namespace taclink::server

@@ -19,10 +19,10 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kCycle{20};
 constexpr milliseconds kHeartbeat{100};  // a fifth of the device's watchdog
-constexpr milliseconds kCommandGap{20};  // a setpoint that moves is sent no more often
+constexpr milliseconds kCommandGap{20};  // shortest interval between commands of a moving setpoint
 constexpr milliseconds kFirstRetry{100}, kLongestRetry{2000};
-// A device that heard nothing for its watchdog's time has vented by itself: the next setpoint would fill the
-// skin without a ramp. Less than that, for the line takes time as well.
+// A device without commands for its watchdog time has vented by itself: the next setpoint would fill the skin
+// without a ramp. The limit is lower, since the line takes time as well.
 constexpr milliseconds kLongestStall = PressureActuator::kDeviceWatchdog * 7 / 10;
 
 int64_t NsOf(milliseconds duration) {
@@ -76,7 +76,7 @@ void PressureController::Stop() {
     if (status_.state != RegulatorState::kTripped) Close(RegulatorState::kClosed);
     stepped_ns_.reset();
   }
-  // If the device does not take it, its watchdog closes the valve.
+  // If this command fails, the device's watchdog closes the valve.
   if (std::exchange(line_.is_open, false)) static_cast<void>(actuator_->Command(std::nullopt));
 }
 
@@ -98,7 +98,7 @@ Result<void> PressureController::CheckOrder(const PressureOrder& order) const {
   return {};
 }
 
-// A valve that is closed opens only on a reading that can be trusted.
+// A closed valve opens only with a fresh reading within the limits.
 Result<void> PressureController::CheckOpening(int64_t now_ns) const {
   if (!stepped_ns_ || now_ns - *stepped_ns_ > NsOf(kLongestStall))
     return Error{ErrorCode::kUnavailable,
@@ -166,7 +166,7 @@ void PressureController::MoveSetpoint(double span_s) {
   if (!status_.setpoint_kpa) return;
   const double most_kpa = status_.ramp_kpa_per_s * span_s;
   const double left_kpa = *status_.target_kpa - *status_.setpoint_kpa;
-  // All the way at the end: the sum of the steps would miss the target by rounding.
+  // The last step sets the target itself: the sum of the steps would miss it by rounding.
   if (std::abs(left_kpa) <= most_kpa)
     *status_.setpoint_kpa = *status_.target_kpa;
   else
@@ -183,8 +183,8 @@ void PressureController::Close(RegulatorState state) {
   guard_.Restart();
 }
 
-// `judge` runs under the lock and says whether a limit is exceeded; then the valve is closed. The observer is
-// called without the lock.
+// Runs `judge` under the lock, and closes the valve if it returns a trip. The observer is called without the
+// lock.
 template <typename Judge>
 void PressureController::Guarded(Judge judge) {
   std::optional<PressureTrip> trip;
@@ -215,7 +215,7 @@ std::optional<PressureTrip> PressureController::Advance(int64_t now_ns) {
   return guard_.OnTime(status_.reading, MomentAt(now_ns));
 }
 
-// Counted from the last command that the device got, whatever kept the next one back.
+// Time since the last command that the device took, whatever delayed the next one.
 std::optional<PressureTrip> PressureController::LateCommand(int64_t now_ns) const {
   if (!status_.setpoint_kpa || !line_.sent_kpa || !line_.sent_ns) return std::nullopt;
   const double silent_s = SecondsOf(now_ns - *line_.sent_ns), limit_s = SecondsOf(NsOf(kLongestStall));
@@ -247,12 +247,12 @@ void PressureController::Step(milliseconds timeout) {
   } else {
     TakeError(reading.error());
   }
-  if (line_.is_open) SendCommand(now_ns);  // at once where the valve was closed
+  if (line_.is_open) SendCommand(now_ns);  // immediately, if the valve was closed
 }
 
 void PressureController::TakeReading(const RegulatorReading& reading) {
   line_.backoff = milliseconds(0);  // only a reading proves that the device works
-  // One that no frame can use, as of a sensor that is saturated, counts for the limits all the same.
+  // A reading that no frame can use, such as a saturated sensor's, still counts for the limits.
   Guarded([&] {
     status_.reading = reading;
     return guard_.OnReading(reading, MomentAt(reading.time_ns));
@@ -266,14 +266,14 @@ void PressureController::TakeError(const Error& error) {
   if (error.code != ErrorCode::kInvalidArgument && error.code != ErrorCode::kFailedPrecondition)
     return Failed(error);
   SetTrouble(error.message);
-  if (error.code == ErrorCode::kInvalidArgument) return;  // without readings the sensor is lost in the end
+  if (error.code == ErrorCode::kInvalidArgument) return;  // if no reading follows, kSensorLost does
   Guarded([&]() -> std::optional<PressureTrip> {
     if (!status_.setpoint_kpa) return std::nullopt;
     return PressureTrip{.cause = PressureTripCause::kDevice, .text = error.message};
   });
 }
 
-// Closing is sent at once, a heartbeat when it is due, and a setpoint that moves no more often than a line of
+// Closing is sent at once, a heartbeat when it is due, and a moving setpoint no more often than a line of
 // 9600 baud carries.
 void PressureController::SendCommand(int64_t now_ns) {
   std::optional<double> kpa;

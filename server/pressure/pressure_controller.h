@@ -21,27 +21,27 @@ namespace taclink::server {
 /// In the order of the API's RegulatorState.
 enum class RegulatorState : uint8_t {
   kClosed,   ///< the valve is closed and the skin vented
-  kHolding,  ///< the setpoint is the one that was asked for
-  kRamping,  ///< the setpoint is on its way there
+  kHolding,  ///< the setpoint has reached the target
+  kRamping,  ///< the setpoint moves to the target
   kTripped,  ///< closed and vented because a limit was exceeded, until an operator resets it
 };
 
-/// What an operator asks for.
+/// A request of an operator.
 struct PressureOrder {
   std::optional<double> kpa = {};             ///< gauge; none: close the valve and vent at once
-  std::optional<double> ramp_kpa_per_s = {};  ///< none: the configured one, which is the fastest
+  std::optional<double> ramp_kpa_per_s = {};  ///< none: the configured ramp, which is the maximum
   bool reset_trip = false;                    ///< ends the state kTripped
 };
 
 struct RegulatorStatus {
   RegulatorState state = RegulatorState::kClosed;
-  std::optional<double> target_kpa = {};    ///< asked for; none: the valve is closed
-  std::optional<double> setpoint_kpa = {};  ///< commanded now, on its way there; likewise
+  std::optional<double> target_kpa = {};    ///< requested; none: the valve is closed
+  std::optional<double> setpoint_kpa = {};  ///< commanded now, on its way to the target; likewise
   double ramp_kpa_per_s = 0;
   std::optional<RegulatorReading> reading = {};  ///< the newest
   double age_s = 0;                              ///< of the reading
-  std::optional<PressureTrip> trip = {};         ///< of the state kTripped
-  std::string trouble = {};                      ///< of the line or the readings; empty: none
+  std::optional<PressureTrip> trip = {};         ///< in the state kTripped
+  std::string trouble = {};                      ///< problem of the line or the readings; empty: none
 };
 
 struct PressureOrderResult {
@@ -50,12 +50,12 @@ struct PressureOrderResult {
 };
 
 /// Sets the pressure inside a link's skin by a regulator, which is also the link's pressure sensor. Moves the
-/// setpoint along a ramp, judges every reading (PressureGuard), and closes the valve when a limit is
+/// setpoint along a ramp, checks every reading (PressureGuard), and closes the valve when a limit is
 /// exceeded.
 ///
-/// A thread of its own ("prs:LINK") talks to the regulator, so that a device that hangs keeps no other thread
-/// waiting. The thread repeats its command as a heartbeat: when it ends, stalls or dies, the device closes
-/// its valve by itself (PressureActuator). All durations are of the monotonic clock.
+/// A thread of its own ("prs:LINK") talks to the regulator, so that a hanging device blocks no other thread.
+/// The thread repeats its command as a heartbeat: if it ends, stalls or dies, the device closes its valve by
+/// itself (PressureActuator). All durations use the monotonic clock.
 class PressureController final : public PressureSource {
  public:
   /// `name`: of the link, for the log.
@@ -63,7 +63,7 @@ class PressureController final : public PressureSource {
                      const RegulatorOptions& options, std::chrono::milliseconds stale_after, Clock& clock);
   ~PressureController() override;
 
-  /// Called on the controller's thread, without a lock, when the valve was closed by a trip. Before Start.
+  /// Called on the controller's thread, without a lock, after a trip closed the valve. Set before Start.
   void OnTrip(std::function<void(const PressureTrip&)> observer) { on_trip_ = std::move(observer); }
 
   void Start() override;
@@ -71,16 +71,16 @@ class PressureController final : public PressureSource {
   void Apply(StereoFrame& frame) override { readings_.Apply(frame); }
   Result<PressureController*> Controller() override { return this; }
 
-  /// Never waits: the controller's thread does it within its next cycle. The newest order counts. Any thread.
-  /// Errors: kInvalidArgument (outside the limits), kFailedPrecondition (tripped and not reset; no fresh
-  /// reading, or one outside the limits of the trips), kUnavailable (the controller does not run). Then
-  /// nothing has changed.
+  /// Never waits: the controller's thread executes the order within its next cycle. The newest order counts.
+  /// Any thread. Errors: kInvalidArgument (outside the limits), kFailedPrecondition (tripped and not reset;
+  /// no fresh reading, or one outside the limits of the trips), kUnavailable (the controller does not run).
+  /// After an error nothing has changed.
   Result<PressureOrderResult> Set(const PressureOrder& order);
   RegulatorStatus Status() const;  ///< any thread
   const RegulatorOptions& options() const { return options_; }
 
-  /// One cycle: moves the setpoint, commands it, and waits up to `timeout` for a reading. What Start's thread
-  /// does again and again; for tests that do not start it.
+  /// One cycle: moves the setpoint, sends it, and waits up to `timeout` for a reading. Start's thread repeats
+  /// it; public for tests without that thread.
   void Step(std::chrono::milliseconds timeout);
 
  private:
@@ -124,7 +124,7 @@ class PressureController final : public PressureSource {
   // Guarded by mutex_.
   RegulatorStatus status_;  // without age and trouble
   PressureGuard guard_;
-  std::optional<int64_t> stepped_ns_;  // the last Step
+  std::optional<int64_t> stepped_ns_;  // time of the last Step
 
   std::jthread thread_;
 };

@@ -101,7 +101,7 @@ std::optional<PressureTrip> PressureGuard::Jump(const RegulatorReading& reading,
       .limit = limit_kpa};
 }
 
-// The effort of a ramp says nothing about leaks, so that only that of a held pressure counts.
+// Only the effort at a held pressure counts: that of a ramp does not indicate leaks.
 std::optional<PressureTrip> PressureGuard::Leak(const RegulatorReading& reading, const Moment& moment) {
   if (!moment.is_holding || !reading.effort) {
     holding_since_ns_.reset();
@@ -114,7 +114,7 @@ std::optional<PressureTrip> PressureGuard::Leak(const RegulatorReading& reading,
   const double span_s = before_ ? std::max(0.0, SecondsBetween(before_->time_ns, reading.time_ns)) : 0;
   const double kept = std::exp(-span_s / limits_.leak_s);
   effort_sum_ = kept * effort_sum_ + (1 - kept) * *reading.effort;
-  effort_weight_ = kept * effort_weight_ + (1 - kept);  // below 1 at first: the mean is not drawn to 0
+  effort_weight_ = kept * effort_weight_ + (1 - kept);  // below 1 at first, so that the mean is unbiased
   if (SecondsBetween(*holding_since_ns_, reading.time_ns) < limits_.leak_s) return std::nullopt;
   const double mean_effort = effort_sum_ / effort_weight_;
   if (mean_effort <= limits_.leak_effort) return std::nullopt;

@@ -10,7 +10,7 @@
 
 namespace taclink::server {
 
-/// What closes the valve, in the order of the API's PressureTripCause.
+/// Causes of a trip, in the order of the API's PressureTripCause.
 enum class PressureTripCause : uint8_t {
   kOverPressure,
   kUnderPressure,
@@ -22,38 +22,40 @@ enum class PressureTripCause : uint8_t {
   kLoopStalled,
 };
 
-/// Why the valve was closed.
+/// A trip: why and when the valve was closed.
 struct PressureTrip {
   PressureTripCause cause = PressureTripCause::kOverPressure;
   std::string text;  ///< what was measured, the limit, and what to do
-  /// kPa; s of kSensorLost and kLoopStalled, a share of kLeak; none of kDevice.
+  /// kPa; s for kSensorLost and kLoopStalled, a share for kLeak; none for kDevice and for a lost line.
   std::optional<double> measured = {}, limit = {};
-  int64_t utc_ns = 0;  ///< when
+  int64_t utc_ns = 0;  ///< when the valve was closed
 };
 
-/// How many SI units make the unit of `measured` and `limit` of a trip: Pa, s or none.
+/// Factor from the unit of a trip's `measured` and `limit` to SI: Pa, s or none.
 double TripUnitInSi(PressureTripCause cause);
 
-/// Judges the readings of a regulator against its setpoint. Plain state and numbers: no clock, no thread.
+/// Checks the readings of a regulator against its setpoint. Plain state: no clock, no thread.
 class PressureGuard {
  public:
   PressureGuard(const PressureTripLimits& limits, std::chrono::milliseconds stale_after);
 
-  /// What the controller commands at one moment.
+  /// The controller's command at one moment.
   struct Moment {
     int64_t now_ns = 0;                       ///< monotonic
     std::optional<double> setpoint_kpa = {};  ///< none: the valve is closed
-    double ramp_kpa_per_s = 0;                ///< at most, of the setpoint
-    bool is_holding = false;                  ///< the setpoint has arrived
+    double ramp_kpa_per_s = 0;                ///< largest rate of the setpoint
+    bool is_holding = false;                  ///< the setpoint has reached the target
   };
 
-  /// Forgets what it knows of the valve's state before: it opens or closes now.
+  /// Forgets the previous readings: the valve opens or closes now.
   void Restart();
-  /// A new reading. While the valve is closed, only over-pressure counts: the skin may be vented at any rate.
+  /// Checks a new reading. While the valve is closed, only over-pressure counts: the skin may be vented at
+  /// any rate.
   std::optional<PressureTrip> OnReading(const RegulatorReading& reading, const Moment& moment);
-  /// Time has passed. `newest`: the last reading; none: there was none yet.
+  /// Checks the age of the newest reading; none: there was none yet.
   std::optional<PressureTrip> OnTime(const std::optional<RegulatorReading>& newest, const Moment& moment);
-  /// Whether a reading lies within the limits of over- and under-pressure. The text says which it exceeds.
+  /// Checks a reading against the limits of over- and under-pressure. The text says which one it exceeds;
+  /// none: within both.
   std::optional<PressureTrip> OutsideLimits(const RegulatorReading& reading) const;
 
  private:
@@ -65,9 +67,9 @@ class PressureGuard {
   const PressureTripLimits limits_;
   const double stale_s_;
 
-  std::optional<RegulatorReading> before_;  // since the valve opened
+  std::optional<RegulatorReading> before_;  // previous reading since the valve opened
   std::optional<int64_t> opened_ns_;        // first moment with an open valve
-  std::optional<int64_t> away_since_ns_;    // the reading is farther from the setpoint than it may be
+  std::optional<int64_t> away_since_ns_;    // since then the reading is too far from the setpoint
   std::optional<int64_t> holding_since_ns_;
   // While holding: an exponential mean with the time constant leak_s.
   double effort_sum_ = 0, effort_weight_ = 0;

@@ -11,7 +11,7 @@
 namespace taclink::server {
 namespace {
 
-constexpr double kLargestMpa = 0.1;  // as the configuration's constant
+constexpr double kLargestMpa = 0.1;  // as for a configured constant
 
 }  // namespace
 
@@ -55,7 +55,7 @@ std::string PressureReadings::Silence(int64_t age_ns) const {
   return fmt::format("no reading from {} for {:.1f} s", who_, static_cast<double>(age_ns) * 1e-9);
 }
 
-// The newest reading before the exposure; a sensor that has only just begun has but later ones.
+// Uses the newest reading before the exposure; a sensor that has just started has only later ones.
 void PressureReadings::Apply(StereoFrame& frame) const {
   PressureReport& report = frame.pressure;
   const int64_t exposure_ns = frame.times.exposure_monotonic_ns;

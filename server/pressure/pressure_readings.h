@@ -18,22 +18,22 @@ struct PressureReading {
   double mpa = 0;
 };
 
-/// The newest readings of the pressure inside a link's skin, and what is wrong with their sensor. Any thread;
-/// no call waits for anything but the others.
+/// The newest readings of the pressure inside a link's skin, and the problem of their sensor. Any thread;
+/// calls wait only for each other.
 class PressureReadings {
  public:
-  /// `who`: gives the readings, for messages ("the sensor").
+  /// `who`: source of the readings, for messages ("the sensor").
   PressureReadings(PressureOrigin origin, std::chrono::milliseconds stale_after, std::string who);
 
-  /// False: not newer than the newest one, and not taken. Errors: kInvalidArgument (not a finite pressure
+  /// False: not newer than the newest reading, and ignored. Errors: kInvalidArgument (not a finite pressure
   /// within -100 and 100 kPa).
   Result<bool> Add(const PressureReading& reading);
-  /// Empty: the sensor works. Returns whether this is new.
+  /// Empty: the sensor works. Returns whether the text has changed.
   bool SetTrouble(std::string trouble);
   std::string trouble() const;
   std::optional<PressureReading> Newest() const;
 
-  /// Sets the frame's pressure at its exposure, and how it is known.
+  /// Sets the frame's pressure at its exposure, with its origin, age and trouble.
   void Apply(StereoFrame& frame) const;
 
  private:
@@ -46,7 +46,7 @@ class PressureReadings {
 
   mutable std::mutex mutex_;
   // Guarded by mutex_.
-  std::array<PressureReading, 64> ring_{};  // count_ % size is the next place
+  std::array<PressureReading, 64> ring_{};  // the next index is count_ % size
   uint64_t count_ = 0;
   std::string trouble_;
 };

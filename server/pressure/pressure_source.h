@@ -27,7 +27,7 @@ class PressureSource {
   /// kFailedPrecondition (this source is no client), kInvalidArgument (no such pressure).
   virtual Result<bool> Tell(double mpa, int64_t time_ns);
 
-  /// The controller of the regulator that sets this pressure; as long as this source. Errors:
+  /// The controller of the regulator that sets this pressure; valid as long as this source. Errors:
   /// kFailedPrecondition (there is no regulator).
   virtual Result<PressureController*> Controller();
 };

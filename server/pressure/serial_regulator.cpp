@@ -14,7 +14,7 @@ namespace {
 
 constexpr size_t kLongestQuote = 80;
 
-// What a device sends may be anything: only printable ASCII reaches logs and clients.
+// A device may send anything: only printable ASCII reaches logs and clients.
 std::string Quotable(std::string_view text) {
   std::string out(text.substr(0, kLongestQuote));
   for (char& c : out) c = c >= ' ' && c <= '~' ? c : '?';
@@ -73,7 +73,7 @@ class SerialRegulator final : public PressureActuator {
     if (blank == std::string_view::npos) return reading;
     const auto effort = NumberOfLine(text.substr(blank));
     if (!effort) return std::nullopt;
-    // Beyond its range it says nothing more than its end; the pressure counts.
+    // An effort out of range is clamped: the pressure is still valid.
     reading.effort = std::clamp(*effort, 0.0, 1.0);
     return reading;
   }

@@ -7,13 +7,13 @@
 namespace taclink::server {
 namespace {
 
-// The solution of dp/dt = drift - rate p after a time.
+// The solution of dp/dt = drift - rate p after span_s.
 double Relaxed(double kpa, double drift, double rate, double span_s) {
   if (rate == 0) return kpa + drift * span_s;
   return kpa * std::exp(-rate * span_s) - drift / rate * std::expm1(-rate * span_s);
 }
 
-// When that solution reaches a pressure; infinite: never.
+// Time at which that solution reaches a pressure; infinite: never.
 double TimeTo(double to_kpa, double kpa, double drift, double rate) {
   constexpr double kNever = std::numeric_limits<double>::infinity();
   double span_s = kNever;
@@ -45,7 +45,7 @@ void RegulatedAir::Advance(double span_s) {
   const double tau = options_.time_constant_s, slew = options_.slew_kpa_per_s, leak = leak_per_s();
   const double away_kpa = commanded_kpa_ - kpa_;
   if (std::abs(away_kpa) > slew * tau) {
-    // At a limit until the pressure is near enough to the commanded one.
+    // The valve is at its limit until the pressure is close enough to the commanded one.
     const double drift = std::copysign(slew, away_kpa);
     const double near_kpa = commanded_kpa_ - std::copysign(slew * tau, away_kpa);
     const double until_s = TimeTo(near_kpa, kpa_, drift, leak);
@@ -56,7 +56,7 @@ void RegulatedAir::Advance(double span_s) {
     kpa_ = near_kpa;
     span_s -= until_s;
   }
-  // Within the valve's range. A leak that takes more than the valve can feed draws the pressure out of it.
+  // Within the valve's range, until a leak beyond the valve's capacity draws the pressure out of it.
   const double lowest_kpa = commanded_kpa_ - slew * tau;
   if (commanded_kpa_ / (1 + leak * tau) < lowest_kpa) {
     const double until_s = TimeTo(lowest_kpa, kpa_, commanded_kpa_ / tau, 1 / tau + leak);

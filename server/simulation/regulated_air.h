@@ -6,19 +6,19 @@
 
 namespace taclink::server {
 
-/// The air in a skin behind a simulated pressure regulator, kPa gauge:
+/// The air in a skin with a simulated pressure regulator, kPa gauge:
 ///
 ///     dp/dt = clamp((u - p) / tau, -slew, slew) - leak p
 ///
 /// with the commanded pressure u, which is 0 while the valve is closed and the skin is vented. Solved in
-/// closed form: an exponential where the valve is within its range, another one where it is at a limit.
+/// closed form: one exponential while the valve is within its range, another while it is at a limit.
 class RegulatedAir {
  public:
   explicit RegulatedAir(const SimulatedRegulatorOptions& options) : options_(options) {}
 
   /// None: vented.
   void Command(std::optional<double> kpa) { commanded_kpa_ = kpa.value_or(0); }
-  /// An additional loss, kPa/s for each kPa, such as that of a torn skin.
+  /// Additional leak rate, kPa/s per kPa, such as that of a torn skin.
   void SetExtraLeak(double per_s) { extra_leak_per_s_ = per_s; }
   void Advance(double span_s);
 
