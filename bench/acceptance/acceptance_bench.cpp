@@ -22,8 +22,8 @@
 namespace taclink {
 namespace {
 
-// Slack and inflated, eight places each, a hold and pressure steps: what finds all flaws. Weak loads where
-// the skin is soft.
+// Trials that identify every flaw: eight places slack and inflated, a hold and pressure steps. Weak loads on
+// the slack skin, which is soft.
 constexpr const char* kPlan = R"(taclink_acceptance: 1
 name: bench
 series:
@@ -35,7 +35,8 @@ series:
   - {name: high, pressure_kpa: 1.4, repetitions: 2}
 )";
 constexpr double kRateHz = 10, kHoldRateHz = 2, kRampS = 0.3, kPatchMm = 11, kRestS = 1.2;
-// Of a trial, from its beginning: the load comes, rests, and has gone.
+// Times within a trial, s: start of the load, start of the reading; duration of the reading and of the
+// release.
 constexpr double kBeginS = 0.2, kLoadedS = 0.8, kReadS = 0.6, kReleasedS = 0.6;
 constexpr double kModulusOff = 0.1, kGainOff = 0.05, kTurnRad = 5 * kPi / 180, kCameraMm = 0.3,
                  kCreepOff = 0.08;
@@ -45,7 +46,7 @@ double SignOf(bool is_negative) {
   return is_negative ? -1 : 1;
 }
 
-/// A link whose images, pressure sensor and references are as its flaw has them.
+/// A simulated link with a flaw in its images, pressure sensor or references.
 class AcceptedBenchLink {
  public:
   AcceptedBenchLink(const LinkModel& model, uint64_t seed, AcceptanceOutcome& outcome)
@@ -66,7 +67,7 @@ class AcceptedBenchLink {
     LinkModel known = model;
     if (outcome.flaw == LinkFlaw::kModulus)
       known.material.youngs_modulus_mpa *= 1 + kModulusOff * SignOf(outcome.is_negative);
-    // J(60 s) = 1 + kCreepOff of one term whose time is short against the hold.
+    // J(60 s) = 1 + kCreepOff, by one term with a time constant that is short relative to the hold.
     if (outcome.flaw == LinkFlaw::kCreep)
       model_.relaxation.terms = {{.share = 1 - 1 / (1 + kCreepOff), .time_s = 12}};
     PipelineOptions options;
@@ -147,7 +148,7 @@ class AcceptedBenchLink {
     contact.ramp_s = kRampS;
     contact.where = "acceptance";
     const Vec3 place_mm = model_.PointAtDepth(angle, z_mm, 0);
-    // Who holds the reference has the link turned the other way about its axis.
+    // The references are turned the opposite way about the link's axis.
     const double turn = outcome_.flaw == LinkFlaw::kMounting ? -kTurnRad * SignOf(outcome_.is_negative) : 0;
     trial.reference.place_mm = Eigen::AngleAxisd(turn, Vec3::UnitZ()) * place_mm;
     trial.reference.direction =
@@ -171,7 +172,7 @@ class AcceptedBenchLink {
     });
   }
 
-  LinkModel model_;  // as the skin really is
+  LinkModel model_;  // the true skin
   AcceptanceOutcome& outcome_;
   std::mt19937_64 random_;
   std::optional<PlayedLink> link_;
@@ -182,8 +183,8 @@ bool Names(const AcceptanceReport& report, FindingId id) {
   return std::ranges::any_of(report.findings, [id](const auto& finding) { return finding.id == id; });
 }
 
-// What a flaw may be found as. A wrong modulus also shows as an effect of pressure, and the link reports it
-// itself.
+// Findings that a flaw explains, the expected one first. A wrong modulus also causes an effect of pressure
+// and a reason reported by the link.
 std::vector<FindingId> FindingsOf(LinkFlaw flaw) {
   switch (flaw) {
     case LinkFlaw::kModulus:

@@ -16,22 +16,22 @@
 
 namespace taclink {
 
-/// A simulated link to which one scene after another happens: images of a skin through a pipeline whose state
-/// lasts from one scene to the next. The exposures go on from where the last scene ended. One thread.
+/// A simulated link that plays one scene after another: images of a skin pass through a pipeline whose state
+/// persists between scenes. Exposures continue at the end of the previous scene. One thread.
 class PlayedLink {
  public:
   struct Built {
-    LinkModel model;             ///< as the skin really is
-    CameraEffects effects = {};  ///< likewise the cameras
-    LinkModel known;             ///< as the pipeline is told
+    LinkModel model;             ///< the true skin
+    CameraEffects effects = {};  ///< the true cameras
+    LinkModel known;             ///< the model that the pipeline uses
     PipelineOptions options = {};
-    double pressure_gain = 1;  ///< of the sensor
+    double pressure_gain = 1;  ///< of the pressure sensor
     uint64_t seed = 1;
   };
   explicit PlayedLink(const Built& built);
 
   using Watch = std::function<void(const SkinTruth& truth, const LinkState& state)>;
-  /// From the scene's start to its end. Errors: as SimulatedSkin::Make.
+  /// Plays the scene from start to end. Errors: as SimulatedSkin::Make.
   Result<void> Play(const Scene& scene, const Watch& watch = {});
 
  private:

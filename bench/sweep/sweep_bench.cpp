@@ -17,7 +17,7 @@ namespace taclink {
 namespace {
 
 constexpr double kRateHz = 10, kRestS = 1.2, kInflateS = 1, kInflatedS = 1.6;
-// Of one disc: it comes, stays, and goes; its answer is the mean of the frames between.
+// Times within one contact, s: its duration, its ramp, and the interval whose frames are averaged.
 constexpr double kEachS = 1, kRampS = 0.2, kReadFromS = 0.45, kReadToS = 0.65;
 constexpr std::array kDepthsMm = {1.0, 2.5, 4.0};
 constexpr double kDiscMm = 11, kNearMm = 25, kJitterPx = 0.15, kMountMm = 0.3, kMountRad = 0.005;
@@ -45,7 +45,7 @@ PlayedLink MakeLink(const LinkModel& model, const SweepUnit& unit) {
   return PlayedLink({.model = model, .effects = effects, .known = model, .seed = seed});
 }
 
-/// The frames of one disc, averaged.
+/// Mean over the frames of one disc.
 class Answer {
  public:
   void Add(const SkinTruth& truth, const LinkState& state, double near_mm) {
@@ -110,7 +110,7 @@ class SweptLink {
   SweptLink(const LinkModel& model, const SweepUnit& unit)
       : model_(model), unit_(unit), link_(MakeLink(model, unit)) {}
 
-  // Of a failure: what was swept before it is kept.
+  // After a failure the contacts so far are kept.
   Result<void> Sweep() {
     if (auto rested = link_.Play(Still(0, kRestS)); !rested) return rested;
     if (unit_.pressure_kpa > 0) {

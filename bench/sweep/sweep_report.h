@@ -11,46 +11,45 @@
 
 namespace taclink {
 
-/// Median and 95th percentile (nearest rank) of what counts; 0 of none.
+/// Median and 95th percentile (nearest rank); 0 without values.
 struct SweepQuantiles {
   size_t count = 0;
   double median = 0, p95 = 0;
 };
 
-/// What a group of contacts amounts to. Forces count from kSweepLeastN on, and only where the link answers;
-/// what is answered with a reservation is left out of the `ok_` ones.
+/// Summary of a group of contacts. Forces count from kSweepLeastN on, and only where the link reports forces;
+/// the `ok_` members only with status OK.
 struct SweepSummary {
-  size_t contacts = 0, answered = 0, ok = 0, missed = 0;  ///< missed: above kSweepLeastN, answered, not found
+  size_t contacts = 0, answered = 0, ok = 0, missed = 0;  ///< missed: from kSweepLeastN, answered, not found
   SweepQuantiles center_mm, ok_center_mm;
   SweepQuantiles force_share, ok_force_share;  ///< error over the true force
   SweepQuantiles balance_share;                ///< likewise of the sum of all forces
-  double least_n = 0, most_n = 0;              ///< of the true forces that count
+  double least_n = 0, most_n = 0;              ///< range of the true forces that count
   double phantom_n = 0;                        ///< the largest
 };
 inline constexpr double kSweepLeastN = 0.3;
 
 SweepSummary SummarizeSweep(std::span<const SweepContact> contacts);
 
-/// A row for each model and pressure, and one for each depth of it.
+/// One row per model and pressure, and one per depth of it.
 ReportTable SweepTable(const std::vector<SweepContact>& contacts);
 
-/// By marker index of one model and pressure: the largest error over the depths. Not a number: no answer, or
-/// nothing that counts.
+/// Largest error over the depths, by marker index, for one model and pressure. NaN: no forces reported, or
+/// none that count.
 std::vector<double> WorstCenterMm(const LinkModel& model, std::span<const SweepContact> contacts, bool cells);
 std::vector<double> WorstForceShare(const LinkModel& model, std::span<const SweepContact> contacts,
                                     bool cells);
 
-/// A line for each contact, with a header. What was written is read back, so that a sweep can go on.
+/// CSV with a header and one line per contact. It is read back to resume a sweep.
 std::string SweepCsvHeader();
 std::string SweepCsvRow(const SweepContact& contact);
-/// A last line without an end is left out: it was being written. Errors: kInvalidArgument (which line).
+/// A last line without a line end is incomplete and ignored. Errors: kInvalidArgument (which line).
 Result<std::vector<SweepContact>> ParseSweepCsv(const std::string& text);
 
-/// The contacts of units that have all of theirs: one that was being written when a sweep ended is done
-/// again.
+/// The contacts of complete units; a unit that was interrupted is swept again.
 std::vector<SweepContact> WholeUnits(const std::vector<LinkModel>& models,
                                      std::vector<SweepContact> contacts);
-/// The units of which there are contacts.
+/// The units of these contacts.
 std::set<SweepUnit> UnitsOf(std::span<const SweepContact> contacts);
 
 }  // namespace taclink
