@@ -75,7 +75,7 @@ folder(server/attitude sensing/core)
 folder(server/link sensing/core sensing/capture server/config server/process server/hub server/pressure server/attitude)
 folder(server/events sensing/core server/config server/process server/hub)
 folder(server/security sensing/core server/config server/process)
-folder(server/acceptance sensing/core sensing/acceptance wire server/hub)
+folder(server/acceptance sensing/core sensing/acceptance wire server/hub server/process)
 folder(server/arm sensing/core sensing/capture server/config server/hub server/acceptance server/pressure server/attitude server/link
        server/events server/simulation)
 folder(server/messages wire server/pressure server/events server/acceptance server/arm)

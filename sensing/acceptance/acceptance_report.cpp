@@ -7,17 +7,16 @@
 #include <numbers>
 #include <set>
 
+#include "sensing/acceptance/held_loads.h"
 #include "sensing/acceptance/mounting_fit.h"
 #include "sensing/acceptance/quantities.h"
 #include "sensing/core/units.h"
-#include "sensing/identification/relaxation_fit.h"
 
 namespace taclink {
 namespace {
 
 // Smaller effects are not reported, even if they are significant.
 constexpr double kLeastScale = 0.05, kLeastGain = 0.02, kLeastOffsetKpa = 0.02, kLeastCreep = 0.03;
-constexpr size_t kEnds = 3;                                // samples averaged at each end of a held load
 constexpr double kLeastSpanKpa = 0.2, kLeastSpanH = 0.02;  // smallest range for a slope
 constexpr double kLeastTurnRad = 1.5 * std::numbers::pi / 180, kLeastShiftMm = 2;
 constexpr double kLeastPhantomN = 0.03, kLeastReasonShare = 0.2;
@@ -124,77 +123,18 @@ class Analysis {
     Add(std::move(quantity));
   }
 
-  // Change of each held load from its first samples to its last. The load is constant, so any change comes
-  // from the link. One or two holds do not show the scatter between holds: the noise within them is used
-  // instead.
   void Creep() {
-    std::vector<GroupedValue> changes;
-    double variances = 0, steps = 0;
-    for (const AcceptanceTrial& trial : record_.trials) {
-      if (trial.kind != TrialKind::kHold || trial.state != TrialState::kMeasured) continue;
-      if (!trial.loaded || !IsUsable(*trial.loaded)) continue;
-      const auto& held = trial.loaded->held;
-      if (held.size() < 3 * kEnds) continue;
-      double begin_n = 0, end_n = 0;
-      for (size_t i = 0; i < kEnds; ++i) {
-        begin_n += held[i].force_n / kEnds;
-        end_n += held[held.size() - 1 - i].force_n / kEnds;
-      }
-      if (!(begin_n > 0)) continue;
-      changes.push_back({static_cast<int>(trial.id), end_n / begin_n - 1});
-      variances += VarianceWithin(held) * 2 / kEnds / (begin_n * begin_n);
-      steps += static_cast<double>(held.size() - 1);
-    }
-    Estimate creep = GroupedMean(changes);
-    const auto holds = static_cast<double>(changes.size());
-    if (!changes.empty() && changes.size() < 3)
-      creep.half_width = StudentT95(steps) * std::sqrt(variances) / holds;
+    const HeldLoads held = AnalyzeHolds(record_);
     AcceptanceQuantity quantity =
         Describe("creep", "Change of the force of a held load", "%", kPercent * limits_.creep);
-    Set(quantity, creep, static_cast<int>(changes.size()), kPercent);
+    Set(quantity, held.change, held.change.samples, kPercent);
     Add(std::move(quantity));
-    if (creep.excludes_zero() && std::abs(creep.value) >= kLeastCreep)
+    if (held.change.excludes_zero() && std::abs(held.change.value) >= kLeastCreep)
       Find(FindingId::kCreep,
-           "A held load reads " + Interval(creep, kPercent, "%+.1f") +
+           "A held load reads " + Interval(held.change, kPercent, "%+.1f") +
                " % different at its end: the skin creeps more than its model says; give the "
                "model a relaxation" +
-               FittedRelaxation() + ".");
-  }
-
-  // The relaxation fitted to the holds, for the model file; empty: the holds do not determine it.
-  std::string FittedRelaxation() const {
-    std::vector<RelaxationRecord> records;
-    for (const AcceptanceTrial& trial : record_.trials) {
-      if (trial.kind != TrialKind::kHold || trial.state != TrialState::kMeasured || !trial.loaded) continue;
-      const auto reference_n = ReferenceForce(trial);
-      if (trial.loaded->held.size() < 3 * kEnds || !reference_n || !(*reference_n > 0)) continue;
-      RelaxationRecord& record = records.emplace_back();
-      record.name = "trial " + std::to_string(trial.id);
-      for (const HeldSample& sample : trial.loaded->held)
-        record.samples.push_back({sample.time_s, sample.force_n, *reference_n});
-    }
-    if (records.empty()) return "";
-    const auto fit = FitRelaxation(records);
-    if (!fit) return "";
-    std::string shares, times_s, sigmas;
-    for (size_t i = 0; i < fit->terms.size(); ++i) {
-      const char* const comma = i > 0 ? ", " : "";
-      shares += comma + Format("%.3f", fit->terms[i].share);
-      times_s += comma + Format("%.3g", fit->terms[i].time_s);
-      sigmas += comma + Format("%.3f", fit->share_sigmas[i]);
-    }
-    return ", of the holds: relaxation: {shares: [" + shares + "], times_s: [" + times_s +
-           "]}, standard deviations of the shares " + sigmas;
-  }
-
-  // Variance of one sample, N^2, from successive differences, which the slow change hardly affects.
-  static double VarianceWithin(const std::vector<HeldSample>& held) {
-    double sum2 = 0;
-    for (size_t i = 1; i < held.size(); ++i) {
-      const double step = held[i].force_n - held[i - 1].force_n;
-      sum2 += step * step;
-    }
-    return sum2 / static_cast<double>(held.size() - 1) / 2;
+               FittedRelaxation(record_) + ".");
   }
 
   void PressureEffect() {

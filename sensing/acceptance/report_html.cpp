@@ -266,7 +266,8 @@ std::string AcceptanceHtml(const AcceptanceRecord& record, const AcceptanceRepor
       "<th class='n'>Left, N</th><th class='n'>kPa</th><th>Note</th></tr>\n" +
       TrialRows(record, report) + "</table>\n";
   page +=
-      "<p>Relative errors are (measured − reference) / reference. Intervals of means and slopes hold the true "
+      "<p>Relative errors are (measured − reference) / reference. Intervals of means and slopes hold the "
+      "true "
       "value in 95 of 100 acceptances; places are the independent samples. Intervals of percentiles are "
       "resampled from the places that were measured: of fewer than some 20 places they are too narrow for "
       "others. A verdict is undecided where the interval contains the limit, or what the plan has trials for "

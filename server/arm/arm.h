@@ -30,9 +30,9 @@ struct LinkDescription {
   Rigid3 base_from_link = {};  ///< mm; where the Arm is given poses they count instead
   std::string frame = {};      ///< link of the URDF that it is fixed to; empty: the base
   SourceKind source = SourceKind::kSimulated;
-  LinkRules rules = {};          ///< of its force levels, at the start
-  std::string model_hash = {};   ///< Fingerprint of the model's file
-  std::string acceptance = {};   ///< of a log: its acceptance (AcceptanceStore::FinishedFile); empty: none
+  LinkRules rules = {};         ///< of its force levels, at the start
+  std::string model_hash = {};  ///< Fingerprint of the model's file
+  std::string acceptance = {};  ///< of a log: its acceptance (AcceptanceStore::FinishedFile); empty: none
 };
 
 /// What a link is made of.
