@@ -322,7 +322,7 @@ class Analysis {
            Format("%d loads were not measured: the link withheld its forces.", report_.withheld));
   }
 
-  // Whether the plan has trials for this quantity.
+  // Whether the plan has trials for this quantity. A released phase, which tells ghosts, is optional.
   bool IsPlanned(const std::string& id) const {
     std::set<std::string> attitudes;
     std::set<double> pressures;
@@ -340,8 +340,7 @@ class Analysis {
     if (id == "attitude_effect") return attitudes.size() > 1;
     if (id == "pressure_slope")
       return pressures.size() > 1 && *pressures.rbegin() - *pressures.begin() >= kLeastSpanKpa;
-    return has_loads && (id == "force_bias" || id == "force_error" || id == "place_error" || id == "ghost" ||
-                         id == "balance");
+    return has_loads && (id == "force_bias" || id == "force_error" || id == "place_error" || id == "balance");
   }
 
   void Conclude() {

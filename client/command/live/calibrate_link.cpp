@@ -89,7 +89,7 @@ Result<void> CalibrateLink(const LinkCalibration& calibration) {
         fmt::print(stderr, "\r{} of {} rest pairs", progress.pairs_taken(), progress.pairs_wanted());
         return true;
       },
-      Patience(std::chrono::seconds(60)) * calibration.repeats);
+      client::Patience(std::chrono::seconds(60)) * calibration.repeats);
   if (told) fmt::print(stderr, "\n");
   if (!result) return result.error();
   if (!calibration.out.empty()) {

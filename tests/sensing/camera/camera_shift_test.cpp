@@ -11,7 +11,7 @@
 namespace taclink {
 namespace {
 
-constexpr double kNoisePx = 0.05, kMouldMm = 0.1;
+constexpr double kShiftNoisePx = 0.05, kShiftMouldMm = 0.1;
 
 /// A link whose markers lie off the model's places, as a mould makes them, and the camera that was
 /// calibrated.
@@ -19,7 +19,7 @@ class CameraShiftTest : public ::testing::Test {
  protected:
   CameraShiftTest() {
     for (Vec3& place : built_mm_)
-      place += kMouldMm * Vec3(normal_(random_), normal_(random_), normal_(random_));
+      place += kShiftMouldMm * Vec3(normal_(random_), normal_(random_), normal_(random_));
   }
 
   // Of the built markers, against the model's places.
@@ -29,7 +29,7 @@ class CameraShiftTest : public ::testing::Test {
     for (size_t m = 0; m < built_mm_.size(); ++m) {
       const auto pixel = projector.Project(built_mm_[m]);
       if (pixel)
-        images.push_back({markers_mm_[m], *pixel + kNoisePx * Vec2(normal_(random_), normal_(random_))});
+        images.push_back({markers_mm_[m], *pixel + kShiftNoisePx * Vec2(normal_(random_), normal_(random_))});
     }
     return images;
   }
