@@ -72,7 +72,7 @@ TEST_F(CalibrateTest, RigIsFoundWrittenAndSolvesWithIt) {
 
 TEST_F(CalibrateTest, EveryPairAloneTellsTheScatter) {
   const Finished run =
-      Calibrate({"--rest", Picture("top_000000"), Picture("bottom_000000"), "--each", "--json"});
+      Calibrate({"--rest", Picture("top_000002"), Picture("bottom_000002"), "--each", "--json"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const json found = json::parse(run.out);
   EXPECT_EQ(found.at("repeats"), 2);
@@ -81,8 +81,10 @@ TEST_F(CalibrateTest, EveryPairAloneTellsTheScatter) {
   EXPECT_GT(first.at("standard_deviation").get<double>(), 0);
   EXPECT_LT(first.at("standard_deviation").get<double>(), 0.2);
   EXPECT_NEAR(first.at("mean").get<double>(), first.at("value").get<double>(), 0.2);
-  const Finished table = Calibrate({"--rest", Picture("top_000000"), Picture("bottom_000000"), "--each"});
+  const Finished table = Calibrate({"--rest", Picture("top_000002"), Picture("bottom_000002"), "--each"});
   EXPECT_THAT(table.out, HasSubstr("over 2 calibrations"));
+  const Finished same = Calibrate({"--rest", Picture("rest_top"), Picture("rest_bottom"), "--each"});
+  EXPECT_THAT(same.err, HasSubstr("the same images"));
   const Finished one = Calibrate({"--each"});
   EXPECT_THAT(one.err, HasSubstr("give --rest at least twice"));
 }

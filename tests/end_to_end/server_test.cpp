@@ -165,7 +165,7 @@ TEST_F(ServerTest, CalibrationIsSavedAndUsedFromTheNextStartOn) {
   Write("b.yaml", std::regex_replace(config, std::regex("name: a,"), "name: b,"));
   const Finished other = RunToEnd({kTaclinkd, "--config", Path("b.yaml"), "--listen", "127.0.0.1:0"});
   EXPECT_NE(other.exit_code, 0);
-  EXPECT_THAT(other.err, HasSubstr("link: is 'a', but this is the calibration file of link 'b'"));
+  EXPECT_THAT(other.err, HasSubstr("'link' is 'a', but this is the calibration file of link 'b'"));
   Write("a_cameras.yaml", "taclink_calibration: nonsense\n");
   const Finished refused = RunToEnd({kTaclinkd, "--config", Path("arm.yaml"), "--listen", "127.0.0.1:0"});
   EXPECT_NE(refused.exit_code, 0);

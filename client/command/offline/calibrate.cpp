@@ -182,6 +182,9 @@ Result<Found> CalibrateWithScatter(const CalibrateOptions& options, const LinkMo
   Found found{.rest = *std::move(together), .parameters = {}, .repeats = std::max<size_t>(1, all.size())};
   found.parameters = ParametersOf({&found.rest.calibration, 1}, model.nominal_rig);
   const auto scatter = ParametersOf(all, model.nominal_rig);
+  if (!scatter.empty() && std::ranges::all_of(scatter, [](const auto& one) { return one.scatter == 0; }))
+    return Error{ErrorCode::kInvalidArgument,
+                 "--each: all pairs give the same cameras, for they are the same images; take several"};
   for (size_t i = 0; i < scatter.size(); ++i) {
     found.parameters[i].mean = scatter[i].mean;
     found.parameters[i].scatter = scatter[i].scatter;

@@ -140,7 +140,7 @@ TEST_F(CalibrationIdentityTest, AnotherLinksIsRefusedByName) {
   CalibrationIdentity right = left_;
   right.link = "right";
   EXPECT_THAT(Refusal(text_, right),
-              HasSubstr("left.yaml:3: link: is 'left', but this is the calibration file of "
+              HasSubstr("left.yaml:3: 'link' is 'left', but this is the calibration file of "
                         "link 'right'"));
   // The same link under a new name.
   EXPECT_EQ(Refusal(With("\"left\"", "\"right\""), right), "");
@@ -170,7 +170,7 @@ TEST_F(CalibrationIdentityTest, AnotherSkinIsRefused) {
 
 TEST_F(CalibrationIdentityTest, AChangedFileIsRefused) {
   EXPECT_THAT(Refusal(With("focal_px: ", "focal_px: 1"), left_),
-              HasSubstr("hash: is not that of this content"));
+              HasSubstr("'hash' is not that of this content"));
   std::string crlf;
   for (const char c : text_) crlf += c == '\n' ? "\r\n" : std::string(1, c);
   EXPECT_EQ(Refusal(crlf, left_), "") << "line ends are no content";
