@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "sensing/core/calibration_report.h"
 #include "sensing/core/camera_model.h"
@@ -14,12 +16,20 @@ namespace taclink {
 struct PointImage {
   Vec3 at_mm = Vec3::Zero();  ///< link frame
   Vec2 pixel = Vec2::Zero();
+  /// Displacements of the point by one standard deviation of each common error of the shape (pressure,
+  /// weight): the same number for all points, mm.
+  std::vector<Vec3> errors_mm = {};
 };
 
-/// Displacement of a camera from its calibrated pose, `camera`, with the same lens: the rigid motion that
-/// best explains `images`. Gauss-Newton with Huber weights, iteratively reweighted [huber1981]. Errors of the
-/// mould were present at the calibration and hardly affect the result. None: too few points, or no
+/// Displacements of the cameras of a rig, each from its calibrated pose and with the same lens: the rigid
+/// motions and the common errors of the shape, with a standard normal prior, that best explain `images` (by
+/// camera). Gauss-Newton with Huber weights, iteratively reweighted [huber1981]. None: too few points, or no
 /// convergence.
+std::optional<std::array<CameraShift, kCameraCount>> FindCameraShifts(
+    const StereoRig& rig, const std::array<std::vector<PointImage>, kCameraCount>& images);
+
+/// One camera, where the points are exact. Errors of the mould were present at the calibration and hardly
+/// affect the result. None: likewise.
 std::optional<CameraShift> FindCameraShift(const CameraModel& camera, std::span<const PointImage> images);
 
 /// Displacement from which a shift is large, mm.

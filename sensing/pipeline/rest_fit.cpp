@@ -180,6 +180,21 @@ Result<RestShape> RestFit::ShapeAt(const MeasuredLoads& loads) const {
   return *std::move(shape);
 }
 
+// Displacements by one standard deviation of the specific force's errors and of the pressure, stacked, in
+// columns.
+Eigen::MatrixXd RestFit::LoadErrorsMm(const RestShape& shape, const MeasuredLoads& loads) const {
+  Eigen::MatrixXd errors_mm = shape.errors_mm();
+  MeasuredLoads more = loads;
+  more.pressure_mpa += loads.pressure_sigma_mpa;
+  const auto wider = skin_.shape_at(more);
+  if (!wider) return errors_mm;
+  const Eigen::Index columns = errors_mm.cols();
+  errors_mm.conservativeResize(3 * model_.markers.count(), columns + 1);
+  for (int m = 0; m < model_.markers.count(); ++m)
+    errors_mm.block<3, 1>(3 * m, columns) = wider->Displacement(m) - shape.Displacement(m);
+  return errors_mm;
+}
+
 // The cameras, from what stands still in the pairs.
 Result<RestFit::FoundCameras> RestFit::FindCameras(const RestShape& shape) const {
   DetectionPair detections = steady_;
@@ -258,7 +273,7 @@ Result<RestResult> RestFit::ExplainByRig(const StereoRig& rig, const MeasuredLoa
   }
   result.calibration.rig = rig;
   result.noise_px = NoiseOf(*mean, seen.rms_px);
-  result.moved_cameras = FindMovedCameras(*shape, rig, mean->markers());
+  result.moved_cameras = FindMovedCameras(*shape, rig, mean->markers(), LoadErrorsMm(*shape, result.loads));
   return result;
 }
 

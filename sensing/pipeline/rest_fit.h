@@ -62,6 +62,7 @@ class RestFit {
   std::optional<RestTouch> FindTouch(const Result<RestResult>& result, const MeasuredLoads& loads) const;
   std::string CameraTrouble(const Result<RestResult>& result, const MeasuredLoads& loads) const;
   Result<RestShape> ShapeAt(const MeasuredLoads& loads) const;
+  Eigen::MatrixXd LoadErrorsMm(const RestShape& shape, const MeasuredLoads& loads) const;
   Result<FoundCameras> FindCameras(const RestShape& shape) const;
   Result<MarkerMean> Mean(const RestShape& shape, const StereoRig& rig, bool is_fitted) const;
   Result<RestResult> ExplainByRig(const StereoRig& rig, const MeasuredLoads& loads) const;

@@ -149,6 +149,7 @@ TEST_F(ServerTest, CalibrationIsSavedAndUsedFromTheNextStartOn) {
       "taclink_config: 1\nlimits: {max_frame_age_s: 3600}\narm:\n  name: test\n  links:\n"
       "    - {name: a, model: cylinder, source: simulated, scene: rest.yaml, calibration: a_cameras.yaml}\n";
   StartServer(config);  // the file does not exist yet
+  WaitUntilMeasuring(address_, "a");
   const Finished saved =
       Taclink({"calibrate", "--link", "a", "--pairs", "3", "--repeat", "3", "--save", "--server", address_});
   ASSERT_EQ(saved.exit_code, 0) << saved.err;
@@ -161,6 +162,7 @@ TEST_F(ServerTest, CalibrationIsSavedAndUsedFromTheNextStartOn) {
   StartServer(config);
   Process watch(Watch({}));
   EXPECT_TRUE(watch.ReadLine(seconds(60)).has_value());
+  WaitUntilMeasuring(address_, "a");
   EXPECT_THAT(Taclink({"list", "--server", address_}).out, HasSubstr("a: cameras calibrated 2"));
   Write("b.yaml", std::regex_replace(config, std::regex("name: a,"), "name: b,"));
   const Finished other = RunToEnd({kTaclinkd, "--config", Path("b.yaml"), "--listen", "127.0.0.1:0"});
