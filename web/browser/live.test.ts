@@ -1,7 +1,7 @@
 import axe from "axe-core";
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, onTestFinished, test } from "vitest";
-import { launch, Visit } from "./page";
+import { boxOf, launch, Visit } from "./page";
 import { configuration, pressed, Server, taclink, untouched } from "./server";
 
 // In inferno no load is black, a fifth of the scale and more is purple to red; arrows are orange.
@@ -74,7 +74,7 @@ describe("the arm", () => {
     const map = visit.page.locator(".map canvas");
     const readout = visit.page.locator(".readout");
     await visit.page.locator(".label.force").first().waitFor();
-    const box = (await map.boundingBox())!;
+    const box = await boxOf(map);
     await visit.page.mouse.move(box.x + (6.5 / 24) * box.width, box.y + (1 - 4.5 / 10) * box.height);
     await expect.poll(() => readout.innerText()).toMatch(/path 7, ring 5: [1-9]/);
     const pressure = Number(/: ([\d.]+) kPa/.exec(await readout.innerText())![1]);
@@ -288,8 +288,7 @@ describe("the time line", () => {
     await page.locator(".replay", { hasText: /last ([3-9]|\d\d)/ }).waitFor();
     await page.getByRole("button", { name: "10 s" }).click();
     const curves = page.locator(".u-over");
-    await expect.poll(() => curves.boundingBox()).not.toBeNull();
-    const box = (await curves.boundingBox())!;
+    const box = await boxOf(curves);
     await page.mouse.click(box.x + 0.85 * box.width, box.y + box.height / 2);
     await page.getByRole("button", { name: "Back to now" }).waitFor();
     await page.locator(".replay", { hasText: /\d s ago/ }).waitFor();

@@ -1,7 +1,7 @@
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
-import { chromium, type Browser, type Page } from "playwright-core";
+import { chromium, type Browser, type Locator, type Page } from "playwright-core";
 
 const PICTURES =
   process.env.TACLINK_PICTURES ?? fileURLToPath(new URL("../../build/web-pictures", import.meta.url));
@@ -123,5 +123,16 @@ export class Visit {
       },
       [source, is.toString()] as const,
     );
+  }
+}
+
+/** The box of an element in page coordinates; waits until it is laid out, because a component may just be drawn again. */
+export async function boxOf(element: Locator, timeoutMs = 10_000) {
+  const deadline = Date.now() + timeoutMs;
+  for (;;) {
+    const box = await element.boundingBox();
+    if (box) return box;
+    if (Date.now() > deadline) throw new Error(`${element} has no box after ${timeoutMs} ms`);
+    await element.page().waitForTimeout(50);
   }
 }

@@ -1,7 +1,7 @@
 // Makes docs/dashboard/{poke,live,phone,twelve}.png: npm run pictures
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
-import { launch, Visit } from "./page";
+import { boxOf, launch, Visit } from "./page";
 import { configuration, free, pressed, Server, untouched } from "./server";
 
 const DRAWING_MS = 700; // what came is drawn by then
@@ -57,7 +57,7 @@ async function poked(): Promise<void> {
   await page.locator(".poke select").selectOption({ label: "hand" });
   await page.locator(".poke input[type=range]").first().fill("6");
   await visit.drawn();
-  const box = (await page.locator(".scene canvas").boundingBox())!;
+  const box = await boxOf(page.locator(".scene canvas"));
   await page.mouse.move(box.x + 0.51 * box.width, box.y + 0.45 * box.height);
   await page.mouse.down();
   await visit.settledFelt();

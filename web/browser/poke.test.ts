@@ -1,6 +1,6 @@
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
-import { launch, Visit } from "./page";
+import { boxOf, launch, Visit } from "./page";
 import { configuration, free, Server } from "./server";
 
 const POKES = 20;
@@ -31,7 +31,7 @@ test("what is pressed with the mouse is felt as it is", { timeout: 400_000 }, as
   await expect.poll(() => visit.row("skin").innerText(), { timeout: 60_000 }).toContain("0.50 kPa");
   await page.getByRole("button", { name: /^Focus/ }).click();
   await visit.drawn();
-  const box = (await page.locator(".scene canvas").boundingBox())!;
+  const box = await boxOf(page.locator(".scene canvas"));
   const number = random(45);
   const wrong: string[] = [];
   for (let poke = 0; poke < POKES; ++poke) {
@@ -63,7 +63,7 @@ test("a drag moves the body and the wheel presses it deeper", { timeout: 120_000
   await visit.row("skin").getByText("OK").waitFor();
   await page.getByRole("button", { name: /^Focus/ }).click();
   await visit.drawn();
-  const box = (await page.locator(".scene canvas").boundingBox())!;
+  const box = await boxOf(page.locator(".scene canvas"));
   const center = async () => {
     const { stdout } = await import("./server").then(({ taclink }) =>
       taclink("watch", "--json", "--count", "1", "--server", server.address),
