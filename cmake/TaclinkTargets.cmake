@@ -50,8 +50,8 @@ endif()
 target_compile_options(taclink_flags INTERFACE $<$<CXX_COMPILER_ID:Clang>:-Wno-error>)
 
 # Sources are compiled TACLINK_BATCH_SIZE together, because most read the same headers: a cold build takes a third of the
-# time. Names in unnamed namespaces must therefore differ within a target; the presets tsan and lint compile each source by
-# itself. CMake's own unity build is not used: its files name sources by absolute path, so that no other checkout could take
+# time. Names in unnamed namespaces must therefore differ within a target; the preset lint compiles each source by itself.
+# CMake's own unity build is not used: its files name sources by absolute path, so that no other checkout could take
 # an object from the compiler cache.
 set(TACLINK_BATCH_SIZE 1 CACHE STRING "Sources that are compiled together")
 set(CMAKE_UNITY_BUILD OFF)  # build folders from before may have it on
