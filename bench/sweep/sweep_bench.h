@@ -45,7 +45,8 @@ struct SweepOptions {
 
 /// Number of contacts of a unit of this model.
 size_t SweepContactsOfUnit(const LinkModel& model);
-/// All units of these models and pressures.
+/// All units of these models and pressures, every eighth path first: a sweep that is interrupted has covered
+/// evenly spread paths of each.
 std::vector<SweepUnit> SweepUnits(const std::vector<LinkModel>& models,
                                   const std::vector<double>& pressures_kpa);
 
