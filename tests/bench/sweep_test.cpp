@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bench/sweep/sweep_bench.h"
@@ -55,6 +57,18 @@ TEST(SweepReport, ContactsAreReadAsTheyWereWritten) {
   EXPECT_EQ(SweepCsvRow(read->front()), SweepCsvRow(contact));
   EXPECT_TRUE(UnitsOf(*read).contains(contact.unit));
   EXPECT_EQ(ParseSweepCsv(SweepCsvHeader() + "cylinder,0.5\n").error().message, "line 2 is not of a sweep");
+}
+
+TEST(SweepUnits, HoldEveryPathOnce) {
+  const LinkModel cylinder = LoadLinkModel("cylinder").value(), barrel = LoadLinkModel("barrel").value();
+  const std::vector<SweepUnit> units = SweepUnits({cylinder, barrel}, {0, 1});
+  const size_t paths = static_cast<size_t>(cylinder.markers.paths + barrel.markers.paths);
+  EXPECT_EQ(units.size(), 2 * paths);
+  EXPECT_EQ(std::set<SweepUnit>(units.begin(), units.end()).size(), 2 * paths);
+  // The first eighth covers both skins at both pressures.
+  std::set<std::pair<std::string, double>> first;
+  for (size_t i = 0; i < units.size() / 8; ++i) first.emplace(units[i].model, units[i].pressure_kpa);
+  EXPECT_EQ(first.size(), 4u);
 }
 
 // Some places of one path, from images: what the whole sweep does, at the price of a test.
