@@ -51,7 +51,14 @@ std::vector<std::string> Row(const std::string& name, const std::string& what, c
           Pair(sum.ok_force_share, 100, "%.1f"),
           Pair(sum.balance_share, 100, "%.1f"),
           Number(sum.phantom_n, "%.2f"),
+          Number(sum.ok_phantom_n, "%.2f"),
+          part(sum.silently_wrong),
           sum.most_n > 0 ? Number(sum.least_n, "%.2f") + " to " + Number(sum.most_n, "%.2f") : "-"};
+}
+
+bool Holds(const SweepContact& one) {
+  const bool is_force_right = one.force_error_n <= std::max(0.1 * one.true_n, 0.03);
+  return is_force_right && (one.found_n <= 0 || one.center_error_mm <= 4) && one.phantom_n <= 0.03;
 }
 
 template <typename Error>
@@ -78,6 +85,8 @@ SweepSummary SummarizeSweep(std::span<const SweepContact> contacts) {
     ++sum.answered;
     sum.ok += one.is_ok ? 1 : 0;
     sum.phantom_n = std::max(sum.phantom_n, one.phantom_n);
+    if (one.is_ok) sum.ok_phantom_n = std::max(sum.ok_phantom_n, one.phantom_n);
+    sum.silently_wrong += one.is_ok && !Holds(one) ? 1 : 0;
     if (one.found_n > 0) {
       centers.push_back(one.center_error_mm);
       if (one.is_ok) ok_centers.push_back(one.center_error_mm);
@@ -99,11 +108,11 @@ SweepSummary SummarizeSweep(std::span<const SweepContact> contacts) {
 }
 
 ReportTable SweepTable(const std::vector<SweepContact>& contacts) {
-  ReportTable table{
-      .title = "Every place",
-      .header = {"skin", "depth", "contacts", "with forces", "ok", "missed", "center, mm", "ok: center, mm",
-                 "force, %", "ok: force, %", "balance, %", "phantom, N", "forces, N"},
-      .rows = {}};
+  ReportTable table{.title = "Every place",
+                    .header = {"skin", "depth", "contacts", "with forces", "ok", "missed", "center, mm",
+                               "ok: center, mm", "force, %", "ok: force, %", "balance, %", "phantom, N",
+                               "ok: phantom, N", "silently wrong", "forces, N"},
+                    .rows = {}};
   std::map<std::pair<std::string, double>, std::vector<SweepContact>> groups;
   for (const SweepContact& one : contacts) groups[{one.unit.model, one.unit.pressure_kpa}].push_back(one);
   for (const auto& [key, group] : groups) {

@@ -25,7 +25,10 @@ struct SweepSummary {
   SweepQuantiles force_share, ok_force_share;  ///< error over the true force
   SweepQuantiles balance_share;                ///< likewise of the sum of all forces
   double least_n = 0, most_n = 0;              ///< range of the true forces that count
-  double phantom_n = 0;                        ///< the largest
+  double phantom_n = 0, ok_phantom_n = 0;      ///< the largest
+  /// Status OK, though the force errs by more than 10 % and 0.03 N, the center by more than 4 mm, or a
+  /// phantom exceeds 0.03 N.
+  size_t silently_wrong = 0;
 };
 inline constexpr double kSweepLeastN = 0.3;
 

@@ -34,9 +34,18 @@ TEST(SweepReport, CountsStrongForcesAndAllCenters) {
   SweepContact missed = ContactWith(0.5, 0.5, 0);
   missed.found_n = 0;
   contacts.push_back(missed);
+  SweepContact degraded = ContactWith(0.2, 0, 1);
+  degraded.is_ok = false;
+  degraded.found_n = 0;
+  degraded.phantom_n = 0.2;
+  contacts.push_back(degraded);
   const SweepSummary sum = SummarizeSweep(contacts);
-  EXPECT_EQ(sum.contacts, 103u);
-  EXPECT_EQ(sum.answered, 102u);
+  EXPECT_EQ(sum.contacts, 104u);
+  EXPECT_EQ(sum.answered, 103u);
+  EXPECT_EQ(sum.phantom_n, 0.2);
+  EXPECT_EQ(sum.ok_phantom_n, 0);
+  // 90 errors above 10 %, 6 centers beyond 4 mm with a smaller error, the weak and the missed one.
+  EXPECT_EQ(sum.silently_wrong, 98u);
   EXPECT_EQ(sum.missed, 1u);
   EXPECT_EQ(sum.force_share.count, 101u);
   EXPECT_NEAR(sum.force_share.median, 0.51, 1e-9);
