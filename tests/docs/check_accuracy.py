@@ -25,7 +25,7 @@ ROWS = {  # of the report, and in the table
 }
 MEASUREMENTS = "docs/measurements.md"
 CALCULIX = "docs/reports/calculix.md"
-FORCE = "docs/reports/force-accuracy.md"
+SWEEP = "docs/reports/sweep.md"
 VISION = "docs/reports/vision-accuracy.md"
 WHOLE = "docs/reports/whole-accuracy.md"
 COUNT = r"(\d[\d ]*)"  # with spaces between thousands
@@ -46,12 +46,17 @@ CYLINDER, BARREL = (rf"\| tracked \| {skin} \| ([\d.]+) \|" for skin in ("cylind
 SCENES = r"(\d+) scenes, \d+ stereo pairs after the rest frames"
 PRESS, UNTOUCHED = (rf"\| {row} \| {MEDIAN_P99}" for row in ("a press, slowly", "untouched"))
 
+SWEPT_ALL = r"\| all \| all \| "
+MEDIAN_P95 = r"([\d.]+) / ([\d.]+) \| "
+SWEPT = rf"{SWEPT_ALL}{cells(5)}{MEDIAN_P95}{cells(1)}{MEDIAN_P95}{cells(4)}([\d.]+) to ([\d.]+) \|"
+
 # By page what it states; the report; where that has the numbers. All texts with single spaces.
 STATED = {
     README: (
         ("of {} scenes of three-dimensional solids", MEASUREMENTS, SOLIDS),
         ("forces of {} hold", MEASUREMENTS, SOLIDS_ROW),
         ("{2} are silently wrong", MEASUREMENTS, SOLIDS_ROW),
+        ("forces of {4} to {5} N are off by {2} % (median) and {3} % (95th percentile), centers by {0} and {1} mm", SWEEP, SWEPT),
         ("{} mm (cylinder)", VISION, CYLINDER),
         ("{} mm (barrel)", VISION, BARREL),
         ("over {} rendered scenes", VISION, SCENES),
@@ -79,9 +84,8 @@ STATED = {
          r"forces are within (\d+) % down to dents of (\d+) mm \(.*?\), and a (\w+) too small from (\d+) mm on"),
         ("Squeezes all around: {} % of frames", WHOLE, r"Of hugs and squeezes all around, ([\d.]+) % \("),
         ("without a fault, {} % of force vectors", WHOLE, rf"{UNDISTURBED}{cells(5)}([\d.]+) % \|"),
-        ("Contact centers: {} mm median error, {} mm at the", FORCE,
-         rf"### All scenes, noise of .*?\| auto \| cylinder \| default \| {cells(5)}([\d.]+) / ([\d.]+) \|"),
-        ("95th percentile, with {} mm of noise;", FORCE, r"### All scenes, noise of ([\d.]+) mm "),
+        ("`ok` forces of {4} to {5} N are off by {2} % (median) and {3} % (95th percentile), centers by {0} and {1} mm", SWEEP, SWEPT),
+        ("With `degraded` frames: {} % (95th percentile)", SWEEP, rf"{SWEPT_ALL}{cells(6)}[\d.]+ / ([\d.]+) \|"),
         ("{} mm (cylinder)", VISION, CYLINDER),
         ("{} mm (barrel)", VISION, BARREL),
         ("over {} rendered scenes", VISION, SCENES),
