@@ -45,8 +45,8 @@ struct SweepOptions {
 
 /// Number of contacts of a unit of this model.
 size_t SweepContactsOfUnit(const LinkModel& model);
-/// All units of these models and pressures, every eighth path first: a sweep that is interrupted has covered
-/// evenly spread paths of each.
+/// All units of these models and pressures. Every eighth path comes first, so that an interrupted sweep
+/// covers evenly spread paths of each skin and pressure.
 std::vector<SweepUnit> SweepUnits(const std::vector<LinkModel>& models,
                                   const std::vector<double>& pressures_kpa);
 

@@ -85,6 +85,7 @@ STATED = {
         ("Squeezes all around: {} % of frames", WHOLE, r"Of hugs and squeezes all around, ([\d.]+) % \("),
         ("without a fault, {} % of force vectors", WHOLE, rf"{UNDISTURBED}{cells(5)}([\d.]+) % \|"),
         ("`ok` forces of {4} to {5} N are off by {2} % (median) and {3} % (95th percentile), centers by {0} and {1} mm", SWEEP, SWEPT),
+        ("{} of {} inflated barrels falsely report `cameras_moved`", SWEEP, r"false alarm here: (\d+) of the (\d+) links of the barrel"),
         ("With `degraded` frames: {} % (95th percentile)", SWEEP, rf"{SWEPT_ALL}{cells(6)}[\d.]+ / ([\d.]+) \|"),
         ("{} mm (cylinder)", VISION, CYLINDER),
         ("{} mm (barrel)", VISION, BARREL),
